@@ -1,0 +1,1 @@
+//! Arguments → job → exit code; one file per subcommand.

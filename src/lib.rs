@@ -1,0 +1,14 @@
+//! Spectile: a spectral image renderer.
+//!
+//! `scene` (parsed, checked, in metres and nanometres) → `render::plan` → `gpu` → `render` (generate,
+//! evaluate, transfer, merge) → `cube` (a Zarr v3 store). `reference` is an independent f64 path tracer.
+
+pub mod cli;
+pub mod cube;
+pub mod error;
+pub mod format;
+pub mod reference;
+pub mod scene;
+pub mod spectral;
+
+pub use error::{Error, Result};

@@ -1,0 +1,197 @@
+//! A resolved, validated scene: what `scene.toml`, its meshes and its spectra say, in metres and nanometres,
+//! f64, world space. Knows no GPU and no paths.
+
+use std::path::PathBuf;
+
+use glam::{DVec2, DVec3};
+use serde::{Deserialize, Serialize};
+
+use crate::spectral::{Channels, Curve};
+
+/// Index into [`Scene::spectra`].
+pub type SpectrumId = usize;
+/// Index into [`Scene::materials`].
+pub type MaterialId = usize;
+
+/// Everything a render needs to know about what is rendered.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    /// The scene file, absolute.
+    pub file: PathBuf,
+    pub camera: Camera,
+    pub film: Film,
+    pub channels: Channels,
+    pub integrator: Integrator,
+    /// Every distinct spectrum in use, named ones and those written in place.
+    pub spectra: Vec<Spectrum>,
+    /// Only materials that some object uses.
+    pub materials: Vec<Material>,
+    pub objects: Vec<Object>,
+    pub environment: Option<Environment>,
+    /// Said once to the user: held tables, dropped triangles, …
+    pub warnings: Vec<String>,
+    /// Hex SHA-256 over everything above that decides the values of a cube (not paths or warnings).
+    pub digest: String,
+}
+
+/// A curve with the name it goes by in messages.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spectrum {
+    pub name: String,
+    pub curve: Curve,
+}
+
+/// An orthonormal camera frame and a projection. A ray through film position (x, y), in pixels from the top left of
+/// the *full* film, leaves along `forward + sx·right + sy·up` with
+/// sx = (2x/width - 1)·tan_half.x and sy = (1 - 2y/height)·tan_half.y (perspective).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Camera {
+    pub position: DVec3,
+    pub forward: DVec3,
+    /// cross(forward, up), negated under `flip_x`: columns run along it.
+    pub right: DVec3,
+    pub up: DVec3,
+    pub projection: Projection,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum Projection {
+    Perspective {
+        tan_half: DVec2,
+    },
+    /// Rays start on a disk of `aperture_radius` around `position` and meet at `focus_distance` along `forward`.
+    ThinLens {
+        tan_half: DVec2,
+        aperture_radius: f64,
+        focus_distance: f64,
+    },
+    /// Parallel rays along `forward` from position + sx·right + sy·up, where sx, sy span ± `half_size` (metres).
+    Orthographic {
+        half_size: DVec2,
+    },
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Film {
+    /// Full size in pixels.
+    pub width: u32,
+    pub height: u32,
+    pub filter: Filter,
+    /// x0, y0, x1, y1: the cube covers columns x0..x1 and rows y0..y1 of the full film.
+    pub crop: [u32; 4],
+}
+
+impl Film {
+    /// Width and height of the cube in pixels.
+    pub fn cube_size(&self) -> [u32; 2] {
+        [self.crop[2] - self.crop[0], self.crop[3] - self.crop[1]]
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Filter {
+    Box,
+    /// σ = 0.5 px per axis, cut at ±2 px per axis, by filter importance sampling.
+    Gaussian,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Integrator {
+    /// Scattering events; next-event estimation at the last one included.
+    pub max_bounces: u32,
+    /// 0 = off; otherwise the first scattering event (1-based) at which roulette may end a path.
+    pub russian_roulette_start: u32,
+    pub sampler: Sampler,
+    pub wavelengths: Wavelengths,
+    /// As written in the scene: `auto`, `dpept-pixel`, …
+    pub evaluator: String,
+    /// Samples per pixel of a full epoch, a power of two up to 1,024.
+    pub epoch: u32,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Sampler {
+    Sobol,
+    Independent,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Wavelengths {
+    /// Eq. 4 of the method.
+    Uniform,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Material {
+    pub name: String,
+    pub bsdf: Bsdf,
+    /// Whether the back side (against the geometric normal) scatters like the front; otherwise it absorbs.
+    pub two_sided: bool,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum Bsdf {
+    Diffuse { reflectance: SpectrumId },
+    Black,
+}
+
+/// One shape of one material. An OBJ with several materials becomes several objects.
+#[derive(Debug, Clone)]
+pub struct Object {
+    /// For messages, e.g. `objects.3 (floor.obj, material "white")`.
+    pub name: String,
+    pub shape: Shape,
+    pub material: MaterialId,
+    pub emission: Option<Emission>,
+}
+
+/// World-space geometry, transforms applied.
+#[derive(Debug, Clone)]
+pub enum Shape {
+    /// Also quads and cubes. Front = counter-clockwise.
+    Mesh(Mesh),
+    /// Normal outward, also under mirroring.
+    Sphere {
+        center: DVec3,
+        radius: f64,
+    },
+    Disk {
+        center: DVec3,
+        normal: DVec3,
+        radius: f64,
+    },
+    /// The side wall only; normal outward.
+    Cylinder {
+        from: DVec3,
+        to: DVec3,
+        radius: f64,
+    },
+}
+
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Mesh {
+    pub positions: Vec<DVec3>,
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// Radiance leaving a surface, W m⁻² sr⁻¹ nm⁻¹, the same in all directions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Emission {
+    pub radiance: SpectrumId,
+    pub sides: Sides,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sides {
+    Front,
+    Both,
+}
+
+/// Radiance arriving from every direction that leaves the scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Environment {
+    pub radiance: SpectrumId,
+}

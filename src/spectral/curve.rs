@@ -1,0 +1,207 @@
+//! A curve: a physical quantity over wavelength, as the scene gives it.
+
+use super::planck;
+
+/// What a table means beyond its ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outside {
+    Zero,
+    /// The end values go on.
+    Hold,
+}
+
+/// A function of wavelength (nm). Values carry the unit of what they describe.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Curve {
+    Constant(f64),
+    /// Piecewise linear through (nm, value), nm ascending; two equal nm make a step. At least one node.
+    Linear {
+        nm: Vec<f64>,
+        value: Vec<f64>,
+        outside: Outside,
+    },
+    /// `scale` x Planck radiance at `kelvin`.
+    Blackbody {
+        kelvin: f64,
+        scale: f64,
+    },
+}
+
+impl Curve {
+    /// The value at `nm`. At a step the value from above holds.
+    pub fn eval(&self, nm: f64) -> f64 {
+        match self {
+            Curve::Constant(v) => *v,
+            Curve::Blackbody { kelvin, scale } => scale * planck::radiance(nm, *kelvin),
+            Curve::Linear { nm: x, value: y, outside } => {
+                let last = x.len() - 1;
+                if nm < x[0] || nm > x[last] {
+                    return match outside {
+                        Outside::Zero => 0.0,
+                        Outside::Hold if nm < x[0] => y[0],
+                        Outside::Hold => y[last],
+                    };
+                }
+                let i = x.partition_point(|&xi| xi <= nm);
+                if i > last {
+                    return y[last];
+                }
+                let (x0, x1) = (x[i - 1], x[i]);
+                let t = (nm - x0) / (x1 - x0);
+                y[i - 1] + t * (y[i] - y[i - 1])
+            }
+        }
+    }
+
+    /// The pieces of the curve between `from` and `to` nm as (nm, value) nodes of a piecewise linear function that
+    /// starts at `from` and ends at `to`; a step is two nodes of equal nm. `None` for curves that are not piecewise
+    /// linear.
+    pub fn linear_pieces(&self, from: f64, to: f64) -> Option<Vec<(f64, f64)>> {
+        match self {
+            Curve::Constant(v) => Some(vec![(from, *v), (to, *v)]),
+            Curve::Blackbody { .. } => None,
+            Curve::Linear { nm: x, value: y, outside } => {
+                let (first, last) = (x[0], x[x.len() - 1]);
+                let beyond = |end: f64| if *outside == Outside::Hold { end } else { 0.0 };
+                // Value just inside the interval, at either end.
+                let start = if from < first {
+                    beyond(y[0])
+                } else if from >= last {
+                    beyond(y[y.len() - 1])
+                } else {
+                    self.eval(from)
+                };
+                let mut nodes = vec![(from, start)];
+                let mut push = |node: (f64, f64)| {
+                    if nodes.last() != Some(&node) {
+                        nodes.push(node);
+                    }
+                };
+                if first > from && first < to {
+                    push((first, beyond(y[0])));
+                }
+                let (a, b) = (x.partition_point(|&xi| xi <= from), x.partition_point(|&xi| xi < to));
+                for i in a..b.max(a) {
+                    push((x[i], y[i]));
+                }
+                if last > from && last < to {
+                    push((last, beyond(y[y.len() - 1])));
+                }
+                // Value approached from below at `to`.
+                let end = if to <= first {
+                    beyond(y[0])
+                } else if to > last {
+                    beyond(y[y.len() - 1])
+                } else {
+                    let i = x.partition_point(|&xi| xi < to);
+                    if x[i] == to || i == 0 { y[i] } else { self.eval(to) }
+                };
+                push((to, end));
+                if nodes.len() == 1 {
+                    nodes.push((to, end));
+                }
+                Some(nodes)
+            }
+        }
+    }
+
+    /// The mean over [from, to] nm: exact for piecewise linear curves, Gauss-Legendre for black bodies.
+    pub fn mean(&self, from: f64, to: f64) -> f64 {
+        if let Curve::Constant(v) = self {
+            return *v;
+        }
+        match self.linear_pieces(from, to) {
+            Some(nodes) => {
+                let area: f64 = nodes.windows(2).map(|w| (w[1].0 - w[0].0) * 0.5 * (w[0].1 + w[1].1)).sum();
+                area / (to - from)
+            }
+            None => mean_smooth(|nm| self.eval(nm), from, to),
+        }
+    }
+
+    /// The largest value over [from, to] nm.
+    pub fn max(&self, from: f64, to: f64) -> f64 {
+        match self.linear_pieces(from, to) {
+            Some(nodes) => nodes.iter().map(|n| n.1).fold(f64::NEG_INFINITY, f64::max),
+            None => {
+                // Planck's curve has one maximum, at Wien's wavelength.
+                let Curve::Blackbody { kelvin, .. } = self else { unreachable!("only black bodies are not piecewise") };
+                let wien = 2_897_771.955 / kelvin;
+                self.eval(wien.clamp(from, to))
+            }
+        }
+    }
+
+    /// Whether the value is the same at every wavelength.
+    pub fn is_constant(&self) -> bool {
+        match self {
+            Curve::Constant(_) => true,
+            Curve::Linear { value, outside: Outside::Hold, .. } => value.windows(2).all(|w| w[0] == w[1]),
+            _ => false,
+        }
+    }
+}
+
+/// Mean of a smooth function over [from, to]: 5-point Gauss-Legendre on panels of at most 1/64 of the wavelength.
+fn mean_smooth(f: impl Fn(f64) -> f64, from: f64, to: f64) -> f64 {
+    const NODE: [f64; 3] = [0.0, 0.538_469_310_105_683_1, 0.906_179_845_938_664];
+    const WEIGHT: [f64; 3] = [0.568_888_888_888_888_9, 0.478_628_670_499_366_5, 0.236_926_885_056_189_1];
+    let panels = ((to / from).ln() * 64.0).ceil().max(1.0) as usize;
+    let ratio = (to / from).powf(1.0 / panels as f64);
+    let (mut sum, mut a) = (0.0, from);
+    for panel in 0..panels {
+        let b = if panel + 1 == panels { to } else { a * ratio };
+        let (centre, half) = (0.5 * (a + b), 0.5 * (b - a));
+        let mut panel_sum = WEIGHT[0] * f(centre);
+        for i in 1..3 {
+            panel_sum += WEIGHT[i] * (f(centre - half * NODE[i]) + f(centre + half * NODE[i]));
+        }
+        sum += half * panel_sum;
+        a = b;
+    }
+    sum / (to - from)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table(outside: Outside) -> Curve {
+        Curve::Linear { nm: vec![400.0, 500.0, 500.0, 600.0], value: vec![1.0, 2.0, 5.0, 3.0], outside }
+    }
+
+    #[test]
+    fn values_steps_and_ends() {
+        let zero = table(Outside::Zero);
+        assert_eq!(zero.eval(399.0), 0.0);
+        assert_eq!(zero.eval(400.0), 1.0);
+        assert_eq!(zero.eval(450.0), 1.5);
+        assert_eq!(zero.eval(500.0), 5.0);
+        assert_eq!(zero.eval(600.0), 3.0);
+        assert_eq!(zero.eval(601.0), 0.0);
+        assert_eq!(table(Outside::Hold).eval(601.0), 3.0);
+    }
+
+    #[test]
+    fn means_are_exact_over_steps_and_ends() {
+        let zero = table(Outside::Zero);
+        assert!((zero.mean(400.0, 500.0) - 1.5).abs() < 1e-14);
+        assert!((zero.mean(500.0, 600.0) - 4.0).abs() < 1e-14);
+        assert!((zero.mean(300.0, 700.0) - 550.0 / 400.0).abs() < 1e-14);
+        assert!((table(Outside::Hold).mean(300.0, 700.0) - (550.0 + 100.0 + 300.0) / 400.0).abs() < 1e-14);
+        assert_eq!(zero.mean(700.0, 800.0), 0.0);
+        assert_eq!(zero.mean(100.0, 400.0), 0.0);
+    }
+
+    /// VALIDATION section 1.6: 8-12 um at 300 K is 38.50042 W m-2 sr-1.
+    #[test]
+    fn blackbody_band() {
+        let b = Curve::Blackbody { kelvin: 300.0, scale: 1.0 };
+        for (from, to, expected) in
+            [(3e3, 5e3, 1.865956), (8e3, 12e3, 38.50042), (8e3, 14e3, 54.93346), (380.0, 2e4, 107.8647)]
+        {
+            let got = b.mean(from, to) * (to - from);
+            assert!((got / expected - 1.0).abs() < 1e-6, "{from}-{to}: {got} {expected}");
+        }
+    }
+}

@@ -1,0 +1,44 @@
+//! Planck's law.
+
+/// First radiation constant for spectral radiance, 2hc² (SI 2019), in W m² sr⁻¹.
+pub const C1L: f64 = 1.191_042_972_397_188_4e-16;
+/// Second radiation constant hc/k (SI 2019), in m K.
+pub const C2: f64 = 1.438_776_877_503_933_6e-2;
+
+/// Black-body spectral radiance in W m⁻² sr⁻¹ nm⁻¹ at `nm` nanometres and `kelvin`.
+///
+/// Written as c₁λ⁻⁵ e⁻ˣ / (1 - e⁻ˣ) with `exp_m1`, which neither overflows for small λT nor cancels for
+/// large λT; what underflows is 0. Non-positive wavelengths or temperatures give 0.
+pub fn radiance(nm: f64, kelvin: f64) -> f64 {
+    if nm <= 0.0 || kelvin <= 0.0 {
+        return 0.0;
+    }
+    let m = nm * 1e-9;
+    let x = C2 / (m * kelvin);
+    let per_metre = C1L / m.powi(5) * (-x).exp() / -(-x).exp_m1();
+    per_metre * 1e-9
+}
+
+#[cfg(test)]
+mod tests {
+    use super::radiance;
+
+    /// VALIDATION section 1.6.
+    #[test]
+    fn planck_matches_published_values() {
+        for (nm, kelvin, expected) in [
+            (550.0, 300.0, 3.193330e-32),
+            (4e3, 300.0, 7.219764e-4),
+            (1e4, 300.0, 9.924033e-3),
+            (1e4, 310.0, 1.160066e-2),
+            (4e3, 900.0, 2.177613),
+            (2.2e3, 1500.0, 29.91619),
+            (550.0, 2856.0, 249.0188),
+            (550.0, 5778.0, 2.585764e4),
+            (2e4, 220.0, 1.470571e-3),
+        ] {
+            let got = radiance(nm, kelvin);
+            assert!((got / expected - 1.0).abs() < 5e-7, "{nm} nm {kelvin} K: {got} {expected}");
+        }
+    }
+}
