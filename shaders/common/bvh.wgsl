@@ -1,0 +1,165 @@
+// Traversal of the compressed wide BVH (Ylitie, Karras and Laine, HPG 2017), nodes as obvhs builds them.
+
+const STACK_SIZE: u32 = 32u;
+// A driver in use ends loops silently after 65,535 iterations of an invocation: two traversals must stay below half.
+const MAX_STEPS: u32 = 12000u;
+
+// For four children: entry and exit distances from quantised planes; a bit pattern for each child that is hit.
+fn hit_children(lo: array<vec4<f32>, 3>, hi: array<vec4<f32>, 3>, scale: vec3<f32>, base_lo: vec3<f32>, base_hi: vec3<f32>,
+                limit: f32, bits: vec4<u32>) -> u32 {
+    let near = max(max(lo[0] * scale.x + base_lo.x, lo[1] * scale.y + base_lo.y), max(lo[2] * scale.z + base_lo.z, vec4<f32>(0.0)));
+    let far = min(min(hi[0] * scale.x + base_hi.x, hi[1] * scale.y + base_hi.y), min(hi[2] * scale.z + base_hi.z, vec4<f32>(limit)));
+    let hit = select(vec4<u32>(0u), bits, near <= far);
+    return (hit.x | hit.y) | (hit.z | hit.w);
+}
+
+// What each of four children contributes to the hit mask: internal children set one bit in the high byte, ordered
+// by the ray's octant; leaves set one bit per primitive in the low 24.
+fn child_bits(meta4: u32, octant4: u32) -> vec4<u32> {
+    let is_inner = (meta4 & (meta4 << 1u)) & 0x10101010u;
+    let inner_mask = (is_inner >> 4u) * 0xffu;
+    let index4 = (meta4 ^ (octant4 & inner_mask)) & 0x1f1f1f1fu;
+    let bits4 = (meta4 >> 5u) & 0x07070707u;
+    return unpack4xU8(bits4) << unpack4xU8(index4);
+}
+
+fn planes(word: u32) -> vec4<f32> {
+    return vec4<f32>(unpack4xU8(word));
+}
+
+// The nearest hit closer than `limit` (any hit, where `any_hit`). Sets `overflow` when it had to give up.
+fn traverse(ray: Ray, limit: f32, any_hit: bool, overflow: ptr<function, bool>) -> Hit {
+    var hit = Hit(limit, NONE, 0.0, 0.0);
+    if (!(limit > 0.0)) {
+        return hit;
+    }
+    let sheared_ray = sheared(ray);
+    // A zero component becomes tiny, so that its reciprocal stays finite.
+    let tiny = abs(ray.direction) < vec3<f32>(1.0e-18);
+    let direction = select(ray.direction, select(vec3<f32>(1.0e-18), vec3<f32>(-1.0e-18), ray.direction < vec3<f32>(0.0)), tiny);
+    let inverse = 1.0 / direction;
+    let negative = direction < vec3<f32>(0.0);
+    let octant = select(0u, 4u, negative.x) | select(0u, 2u, negative.y) | select(0u, 1u, negative.z);
+    let octant4 = (7u - octant) * 0x01010101u;
+
+    var stack: array<vec2<u32>, STACK_SIZE>;
+    var stack_size = 0u;
+    // (first child, hit bits in the high byte | which children are nodes), starting with the root.
+    var nodes_left = vec2<u32>(0u, 0x80000000u);
+    // (first primitive, hit bits in the low 24).
+    var primitives_left = vec2<u32>(0u, 0u);
+    var steps = 0u;
+    loop {
+        steps += 1u;
+        if (nodes_left.y > 0x00ffffffu) {
+            let bit = firstLeadingBit(nodes_left.y);
+            let slot = (bit - 24u) ^ (octant4 & 0xffu);
+            let rank = countOneBits(nodes_left.y & ~(0xffffffffu << slot) & 0xffu);
+            let node = nodes_left.x + rank;
+            nodes_left.y &= ~(1u << bit);
+            if (nodes_left.y > 0x00ffffffu) {
+                if (stack_size == STACK_SIZE) {
+                    *overflow = true;
+                    break;
+                }
+                stack[stack_size] = nodes_left;
+                stack_size += 1u;
+            }
+
+            // The node's frame, and the rounding slack of the slab test that keeps it conservative.
+            let n0 = load_node(node, 0u);
+            let n1 = load_node(node, 1u);
+            let n2 = load_node(node, 2u);
+            let n3 = load_node(node, 3u);
+            let n4 = load_node(node, 4u);
+            let exponents = (vec3<u32>(n0.w) >> vec3<u32>(0u, 8u, 16u)) & vec3<u32>(0xffu);
+            let scale = bitcast<vec3<f32>>(exponents << vec3<u32>(23u)) * inverse;
+            let base = (bitcast<vec3<f32>>(n0.xyz) - ray.origin) * inverse;
+            let slack = (abs(base) + 255.0 * abs(scale)) * 4.8e-7;
+            let base_lo = base - slack;
+            let base_hi = base + slack;
+
+            let x = select(n2, n2.zwxy, negative.x);
+            let y = select(n3, n3.zwxy, negative.y);
+            let z = select(n4, n4.zwxy, negative.z);
+            var mask = hit_children(
+                array<vec4<f32>, 3>(planes(x.x), planes(y.x), planes(z.x)),
+                array<vec4<f32>, 3>(planes(x.z), planes(y.z), planes(z.z)),
+                scale, base_lo, base_hi, hit.distance, child_bits(n1.z, octant4));
+            mask |= hit_children(
+                array<vec4<f32>, 3>(planes(x.y), planes(y.y), planes(z.y)),
+                array<vec4<f32>, 3>(planes(x.w), planes(y.w), planes(z.w)),
+                scale, base_lo, base_hi, hit.distance, child_bits(n1.w, octant4));
+            nodes_left = vec2<u32>(n1.x, (mask & 0xff000000u) | (n0.w >> 24u));
+            primitives_left = vec2<u32>(n1.y, mask & 0x00ffffffu);
+        } else {
+            primitives_left = nodes_left;
+            nodes_left = vec2<u32>(0u, 0u);
+        }
+
+        while (primitives_left.y != 0u) {
+            steps += 1u;
+            let bit = firstTrailingBit(primitives_left.y);
+            primitives_left.y &= primitives_left.y - 1u;
+            let primitive = primitives_left.x + bit;
+            let w0 = load_primitive(primitive, 0u);
+            let w1 = load_primitive(primitive, 1u);
+            let w2 = load_primitive(primitive, 2u);
+#if SHAPES
+            let kind = bitcast<u32>(w0.w) >> 24u;
+            if (kind != 0u) {
+                let t = intersect_shape(ray, kind, w0, w1, w2.x, hit.distance);
+                if (t > 0.0) {
+                    hit = Hit(t, primitive, 0.0, 0.0);
+                }
+                continue;
+            }
+#endif
+            let found = intersect_triangle(sheared_ray, w0.xyz, w1.xyz, w2.xyz);
+            if (found.x > 0.0 && found.x < hit.distance) {
+                hit = Hit(found.x, primitive, found.y, found.z);
+            }
+        }
+
+        if (any_hit && hit.primitive != NONE) {
+            break;
+        }
+        if (steps > MAX_STEPS) {
+            *overflow = true;
+            break;
+        }
+        if (nodes_left.y <= 0x00ffffffu) {
+            if (stack_size == 0u) {
+                break;
+            }
+            stack_size -= 1u;
+            nodes_left = stack[stack_size];
+        }
+    }
+    return hit;
+}
+
+// Keeps the normal of tiny triangles out of the subnormals.
+fn scaled_to_one(v: vec3<f32>) -> vec3<f32> {
+    let a = abs(v);
+    return v / max(max(a.x, a.y), max(a.z, 1.0e-37));
+}
+
+fn surface_at(ray: Ray, hit: Hit) -> Surface {
+    let w0 = load_primitive(hit.primitive, 0u);
+    let w1 = load_primitive(hit.primitive, 1u);
+    let w2 = load_primitive(hit.primitive, 2u);
+    let tag = bitcast<u32>(w0.w);
+    let material = tag & 0x00ffffffu;
+    let emitter = bitcast<u32>(w1.w);
+#if SHAPES
+    if ((tag >> 24u) != 0u) {
+        let s = shape_surface(tag >> 24u, w0, w1, w2.x, ray.origin + hit.distance * ray.direction);
+        return Surface(s[0], s[1], material, emitter);
+    }
+#endif
+    // From the vertices: more exact than along the ray.
+    let p = (1.0 - hit.u - hit.v) * w0.xyz + hit.u * w1.xyz + hit.v * w2.xyz;
+    let n = normalize(cross(scaled_to_one(w1.xyz - w0.xyz), scaled_to_one(w2.xyz - w0.xyz)));
+    return Surface(p, n, material, emitter);
+}

@@ -1,0 +1,45 @@
+// Group 0: the scene, one immutable copy per device. Nodes and primitives may be spread over several windows, since a
+// binding is limited.
+
+@group(0) @binding(1) var<storage, read> materials: array<Material>;
+@group(0) @binding(2) var<storage, read> emitters: array<Emitter>;
+// Upper ends of the emitters' intervals in [0, 1].
+@group(0) @binding(3) var<storage, read> emitter_cdf: array<f32>;
+#repeat NODE_WINDOWS
+@group(0) @binding($(4+i)) var<storage, read> nodes_$i: array<vec4<u32>>;
+#end
+#repeat PRIMITIVE_WINDOWS
+@group(0) @binding($(8+i)) var<storage, read> primitives_$i: array<vec4<f32>>;
+#end
+
+// Word `part` (0..5) of an 80-byte CWBVH node.
+fn load_node(node: u32, part: u32) -> vec4<u32> {
+#if MANY_NODE_WINDOWS
+    let window = node / NODE_WINDOW;
+    let at = (node % NODE_WINDOW) * 5u + part;
+    switch (window) {
+#repeat NODE_WINDOWS
+        case $iu: { return nodes_$i[at]; }
+#end
+        default: { return vec4<u32>(0u); }
+    }
+#else
+    return nodes_0[node * 5u + part];
+#endif
+}
+
+// Word `part` (0..3) of a 48-byte primitive.
+fn load_primitive(primitive: u32, part: u32) -> vec4<f32> {
+#if MANY_PRIMITIVE_WINDOWS
+    let window = primitive / PRIMITIVE_WINDOW;
+    let at = (primitive % PRIMITIVE_WINDOW) * 3u + part;
+    switch (window) {
+#repeat PRIMITIVE_WINDOWS
+        case $iu: { return primitives_$i[at]; }
+#end
+        default: { return vec4<f32>(0.0); }
+    }
+#else
+    return primitives_0[primitive * 3u + part];
+#endif
+}

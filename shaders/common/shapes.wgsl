@@ -1,0 +1,106 @@
+// Spheres, disks and cylinders, intersected as they are. Each returns a distance in (0, limit), or a negative one.
+//   sphere:   [center, tag] [radius, -, -, emitter]
+//   disk:     [center, tag] [normal, emitter] [radius]
+//   cylinder: [from, tag]   [to, emitter]     [radius]
+
+const KIND_SPHERE: u32 = 1u;
+const KIND_DISK: u32 = 2u;
+const KIND_CYLINDER: u32 = 3u;
+
+// The nearest of two ordered roots within (0, limit).
+fn nearest_root(t0: f32, t1: f32, limit: f32) -> f32 {
+    let near = min(t0, t1);
+    let far = max(t0, t1);
+    let t = select(far, near, near > 0.0);
+    return select(-1.0, t, t > 0.0 && t < limit);
+}
+
+// Haines, Guenther and Akenine-Moeller, Ray Tracing Gems ch. 7: the discriminant from the distance between center
+// and ray, the small root from the product of both.
+fn intersect_sphere(ray: Ray, center: vec3<f32>, radius: f32, limit: f32) -> f32 {
+    let f = ray.origin - center;
+    let dd = dot(ray.direction, ray.direction);
+    let b = -dot(f, ray.direction);
+    let closest = f + (b / dd) * ray.direction;
+    let discriminant = radius * radius - dot(closest, closest);
+    if (discriminant < 0.0) {
+        return -1.0;
+    }
+    let c = (length(f) - radius) * (length(f) + radius);
+    let q = b + select(-1.0, 1.0, b >= 0.0) * sqrt(dd * discriminant);
+    if (q == 0.0) {
+        return -1.0;
+    }
+    return nearest_root(c / q, q / dd, limit);
+}
+
+fn intersect_disk(ray: Ray, center: vec3<f32>, normal: vec3<f32>, radius: f32, limit: f32) -> f32 {
+    let slope = dot(ray.direction, normal);
+    if (slope == 0.0) {
+        return -1.0;
+    }
+    let t = dot(center - ray.origin, normal) / slope;
+    if (!(t > 0.0 && t < limit)) {
+        return -1.0;
+    }
+    let p = ray.origin + t * ray.direction - center;
+    let radial = p - dot(p, normal) * normal;
+    return select(-1.0, t, dot(radial, radial) <= radius * radius);
+}
+
+fn intersect_cylinder(ray: Ray, base: vec3<f32>, to: vec3<f32>, radius: f32, limit: f32) -> f32 {
+    let height = length(to - base);
+    let axis = (to - base) / height;
+    let f = ray.origin - base;
+    let f_along = dot(f, axis);
+    let d_along = dot(ray.direction, axis);
+    let f_across = f - f_along * axis;
+    let d_across = ray.direction - d_along * axis;
+    let dd = dot(d_across, d_across);
+    if (dd == 0.0) {
+        return -1.0;
+    }
+    let b = -dot(f_across, d_across);
+    let closest = f_across + (b / dd) * d_across;
+    let discriminant = radius * radius - dot(closest, closest);
+    if (discriminant < 0.0) {
+        return -1.0;
+    }
+    let c = (length(f_across) - radius) * (length(f_across) + radius);
+    let q = b + select(-1.0, 1.0, b >= 0.0) * sqrt(dd * discriminant);
+    if (q == 0.0) {
+        return -1.0;
+    }
+    // Either root may lie beyond the wall's ends.
+    let roots = vec2<f32>(min(c / q, q / dd), max(c / q, q / dd));
+    let heights = f_along + roots * d_along;
+    let valid = (roots > vec2<f32>(0.0)) & (roots < vec2<f32>(limit)) & (heights >= vec2<f32>(0.0)) & (heights <= vec2<f32>(height));
+    return select(select(-1.0, roots.y, valid.y), roots.x, valid.x);
+}
+
+fn intersect_shape(ray: Ray, kind: u32, w0: vec4<f32>, w1: vec4<f32>, radius: f32, limit: f32) -> f32 {
+    switch (kind) {
+        case KIND_SPHERE: { return intersect_sphere(ray, w0.xyz, w1.x, limit); }
+        case KIND_DISK: { return intersect_disk(ray, w0.xyz, w1.xyz, radius, limit); }
+        default: { return intersect_cylinder(ray, w0.xyz, w1.xyz, radius, limit); }
+    }
+}
+
+// Where the ray meets the shape, pulled back onto it, and its normal.
+fn shape_surface(kind: u32, w0: vec4<f32>, w1: vec4<f32>, radius: f32, p: vec3<f32>) -> array<vec3<f32>, 2> {
+    switch (kind) {
+        case KIND_SPHERE: {
+            let n = normalize(p - w0.xyz);
+            return array<vec3<f32>, 2>(w0.xyz + w1.x * n, n);
+        }
+        case KIND_DISK: {
+            return array<vec3<f32>, 2>(p - dot(p - w0.xyz, w1.xyz) * w1.xyz, w1.xyz);
+        }
+        default: {
+            let axis = normalize(w1.xyz - w0.xyz);
+            let along = dot(p - w0.xyz, axis) * axis;
+            let n = normalize(p - w0.xyz - along);
+            return array<vec3<f32>, 2>(w0.xyz + along + radius * n, n);
+        }
+    }
+}

@@ -1,0 +1,46 @@
+// Watertight ray-triangle intersection (Woop, Benthin and Wald, JCGT 2(1), 2013).
+
+// The ray as the test wants it: the axis in which the direction is largest becomes z, and a shear makes the ray
+// point along it.
+struct ShearedRay {
+    origin: vec3<f32>,
+    axis: u32,
+    shear: vec3<f32>,
+}
+
+// Cyclic permutation that brings component `axis` to z.
+fn permuted(p: vec3<f32>, axis: u32) -> vec3<f32> {
+    return select(select(p, p.yzx, axis == 0u), p.zxy, axis == 1u);
+}
+
+fn sheared(ray: Ray) -> ShearedRay {
+    let a = abs(ray.direction);
+    let axis = select(select(2u, 1u, a.y >= a.z), 0u, a.x >= a.y && a.x >= a.z);
+    let d = permuted(ray.direction, axis);
+    return ShearedRay(ray.origin, axis, vec3<f32>(d.x / d.z, d.y / d.z, 1.0 / d.z));
+}
+
+// Distance and barycentric weights (of b and c), or a negative distance. The sign of an edge function is read from a
+// comparison of two separately rounded products: rounding is monotonic, so the comparison is right or a tie, a tie
+// counts as inside for both neighbours, and no compiler can fuse it away.
+fn intersect_triangle(ray: ShearedRay, a_in: vec3<f32>, b_in: vec3<f32>, c_in: vec3<f32>) -> vec3<f32> {
+    let a = permuted(a_in - ray.origin, ray.axis);
+    let b = permuted(b_in - ray.origin, ray.axis);
+    let c = permuted(c_in - ray.origin, ray.axis);
+    let a2 = a.xy - ray.shear.xy * a.z;
+    let b2 = b.xy - ray.shear.xy * b.z;
+    let c2 = c.xy - ray.shear.xy * c.z;
+    let left = vec3<f32>(c2.x * b2.y, a2.x * c2.y, b2.x * a2.y);
+    let right = vec3<f32>(c2.y * b2.x, a2.y * c2.x, b2.y * a2.x);
+    if (!(all(left >= right) || all(left <= right))) {
+        return vec3<f32>(-1.0, 0.0, 0.0);
+    }
+    let edge = left - right;
+    let determinant = edge.x + edge.y + edge.z;
+    if (determinant == 0.0) {
+        return vec3<f32>(-1.0, 0.0, 0.0);
+    }
+    let z = ray.shear.z * vec3<f32>(a.z, b.z, c.z);
+    let inverse = 1.0 / determinant;
+    return vec3<f32>(dot(edge, z) * inverse, edge.y * inverse, edge.z * inverse);
+}

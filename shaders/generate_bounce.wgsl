@@ -1,0 +1,176 @@
+// Generate, one bounce of every path: the next vertex, what it emits, next-event estimation, the next direction.
+// No wavelength takes part in any decision.
+//
+// A vertex is saved as records (factor spectrum, source spectrum, weight), to be read as
+//     throughput *= factor;  radiance += weight * throughput * source,
+// with every wavelength-independent term of the path (densities, cosines, MIS) folded into the weight.
+
+@group(1) @binding(0) var<uniform> wave: Wave;
+@group(1) @binding(1) var<storage, read> units: array<vec4<u32>>;
+@group(1) @binding(2) var<storage, read_write> states: array<vec4<f32>>;
+@group(1) @binding(3) var<storage, read_write> heads: array<vec2<u32>>;
+@group(1) @binding(4) var<storage, read_write> records: array<vec2<u32>>;
+@group(1) @binding(5) var<storage, read_write> counters: array<atomic<u32>>;
+@group(1) @binding(6) var<uniform> step: Step;
+#if ROULETTE
+@group(1) @binding(7) var<storage, read_write> throughputs: array<f32>;
+#endif
+
+// `count` records so far; evaluation may stop after the last one with a weight, `used`.
+struct RecordList {
+    path: u32,
+    count: u32,
+    used: u32,
+}
+
+fn append(list: ptr<function, RecordList>, factor: u32, source: u32, weight: f32) {
+    records[(*list).path * frame.max_records + (*list).count] = vec2<u32>(factor | (source << 16u), bitcast<u32>(weight));
+    (*list).count += 1u;
+    if (weight > 0.0) {
+        (*list).used = (*list).count;
+    }
+}
+
+fn end_path(list: RecordList, rays: u32) {
+    atomicAdd(&counters[COUNTER_RAYS], rays);
+    heads[list.path].y = list.used;
+    states[2u * list.path + 1u].w = bitcast<f32>(ENDED);
+}
+
+@compute @workgroup_size(64)
+fn generate_bounce(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let path = id.x + id.y * groups.x * 64u;
+    if (path >= wave.path_count) {
+        return;
+    }
+    let state1 = states[2u * path + 1u];
+    let packed = bitcast<u32>(state1.w);
+    if (packed == ENDED) {
+        return;
+    }
+    let state0 = states[2u * path];
+    let ray = Ray(state0.xyz, state1.xyz);
+    // Density of `direction`, for MIS; the camera's own rays compete with nothing.
+    let density = state0.w;
+    var list = RecordList(path, packed & 0xffffu, packed >> 16u);
+    var overflow = false;
+#if ROULETTE
+    var scale = throughputs[path];
+#else
+    let scale = 1.0;
+#endif
+
+    // The next vertex.
+    let hit = traverse(ray, INFINITE, false, &overflow);
+    if (hit.primitive == NONE) {
+#if ENVIRONMENT
+        // The environment is sampled in proportion to the cosine, like the surface: the densities differ by `pick`.
+        let weight = select(power_heuristic(1.0, frame.environment_pick), 1.0, step.bounce == 0u);
+        append(&list, 0u, frame.environment_spectrum, scale * weight);
+#endif
+        if (overflow) {
+            atomicAdd(&counters[COUNTER_OVERFLOW], 1u);
+        }
+        end_path(list, 2u * step.bounce + 1u);
+        return;
+    }
+    let surface = surface_at(ray, hit);
+    let from_front = dot(surface.normal, ray.direction) < 0.0;
+
+    // What it emits.
+#if EMITTERS
+    if (surface.emitter != NONE) {
+        let spectrum = emitters[surface.emitter].spectrum;
+        if (from_front || (spectrum & EMITS_BOTH_SIDES) != 0u) {
+            var weight = 1.0;
+            if (step.bounce > 0u) {
+                weight = power_heuristic(density, light_density(surface.emitter, ray.origin, ray.direction, hit.distance, surface.normal));
+            }
+            append(&list, 0u, spectrum & SPECTRUM_MASK, scale * weight);
+        }
+    }
+#endif
+
+    let material = materials[surface.material];
+    if (step.bounce == frame.max_bounces || material.factor == NONE || !(from_front || material.two_sided != 0u) || overflow) {
+        if (overflow) {
+            atomicAdd(&counters[COUNTER_OVERFLOW], 1u);
+        }
+        end_path(list, 2u * step.bounce + 1u);
+        return;
+    }
+
+    // Random numbers of this bounce.
+    let slot = wave.pixel_begin + path / wave.samples;
+    let index = wave.sample_begin + path % wave.samples;
+    let in_tile = slot % wave.tile_pixels;
+    let pixel = units[slot / wave.tile_pixels].xy + vec2<u32>(in_tile % wave.tile_width, in_tile / wave.tile_width);
+    let key = pixel_key(frame.seed_low, frame.seed_high, pixel.x, pixel.y, wave.epoch);
+    let dimension = DIMENSION_BOUNCE + step.bounce * DIMENSIONS_PER_BOUNCE;
+    let u_light = random_pair(key, dimension + DIMENSION_LIGHT_POINT, index, wave.epoch_mask);
+    let u_bsdf = random_pair(key, dimension + DIMENSION_BSDF, index, wave.epoch_mask);
+    let u_choice = random_pair(key, dimension + DIMENSION_CHOICE, index, wave.epoch_mask);
+
+    // Next-event estimation. A Lambertian surface reflects factor/pi, sampled with cosine/pi.
+    let normal = select(-surface.normal, surface.normal, from_front);
+    let origin = offset_origin(surface.position, normal);
+    var weight = 0.0;
+    var source = 0u;
+    var shadow = Ray(origin, vec3<f32>(0.0, 0.0, 1.0));
+    var shadow_limit = 0.0;
+#if ENVIRONMENT
+    if (u_choice.x < frame.environment_pick) {
+        shadow.direction = cosine_hemisphere(normal, u_light);
+        shadow_limit = INFINITE;
+        weight = power_heuristic(frame.environment_pick, 1.0) / frame.environment_pick;
+        source = frame.environment_spectrum;
+    }
+#endif
+#if EMITTERS
+#if ENVIRONMENT
+    else {
+        let u_emitter = (u_choice.x - frame.environment_pick) / (1.0 - frame.environment_pick);
+#else
+    {
+        let u_emitter = u_choice.x;
+#endif
+        let emitter = emitters[choose_emitter(u_emitter)];
+        let point = sample_emitter(emitter, origin, u_light);
+        let towards = point.position - origin;
+        let cosine = dot(normal, towards) / length(towards);
+        if (point.density > 0.0 && cosine > 0.0) {
+            let facing = select(point.normal, -point.normal, dot(point.normal, towards) > 0.0);
+            shadow.direction = offset_origin(point.position, facing) - origin;
+            shadow_limit = 1.0;
+            weight = cosine * INV_PI / point.density * power_heuristic(point.density, cosine * INV_PI);
+            source = emitter.spectrum & SPECTRUM_MASK;
+        }
+    }
+#endif
+#if LIGHTS
+    if (traverse(shadow, shadow_limit, true, &overflow).primitive != NONE) {
+        weight = 0.0;
+    }
+#endif
+    append(&list, material.factor, source, scale * weight);
+
+    // The next direction.
+    let direction = cosine_hemisphere(normal, u_bsdf);
+#if ROULETTE
+    if (step.bounce + 1u >= frame.roulette_start) {
+        let survival = clamp(material.albedo, 0.05, 1.0);
+        if (u_choice.y >= survival) {
+            end_path(list, 2u * step.bounce + 2u);
+            return;
+        }
+        scale /= survival;
+    }
+    throughputs[path] = scale;
+#endif
+    if (overflow) {
+        atomicAdd(&counters[COUNTER_OVERFLOW], 1u);
+    }
+    heads[path].y = list.used;
+    states[2u * path] = vec4<f32>(origin, dot(normal, direction) * INV_PI);
+    states[2u * path + 1u] = vec4<f32>(direction, bitcast<f32>(list.count | (list.used << 16u)));
+}

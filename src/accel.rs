@@ -1,0 +1,284 @@
+//! From world-space objects to what rays meet: primitives in device units and a compressed wide BVH over them.
+//!
+//! Device units: the scene recentred and scaled by a power of two to about [-1, 1], in f64, before anything becomes f32,
+//! so that a scene far from the origin, or measured in micrometres, loses nothing.
+
+use glam::{DVec3, Vec3A};
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::node::Bvh2Node;
+use obvhs::cwbvh::CwBvh;
+use obvhs::cwbvh::builder::build_cwbvh;
+use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
+use obvhs::{Boundable, BvhBuildParams};
+
+use crate::gpu::layout::{NONE, Primitive};
+use crate::scene::{Scene, Shape};
+
+/// Kinds of primitives in the high byte of [`Primitive::tag`]; 0 is a triangle.
+const KIND_SPHERE: u32 = 1;
+const KIND_DISK: u32 = 2;
+const KIND_CYLINDER: u32 = 3;
+
+/// The largest number of materials: ids have 24 bits beside the primitive's kind.
+pub const MAX_MATERIALS: usize = 1 << 24;
+
+/// World space → device units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DeviceSpace {
+    pub center: DVec3,
+    /// Device units per metre, a power of two.
+    pub scale: f64,
+    /// Radius of a sphere around the device origin that holds the scene, in device units.
+    pub radius: f64,
+}
+
+impl DeviceSpace {
+    pub fn point(&self, world: DVec3) -> [f32; 3] {
+        ((world - self.center) * self.scale).as_vec3().to_array()
+    }
+
+    pub fn length(&self, metres: f64) -> f32 {
+        (metres * self.scale) as f32
+    }
+}
+
+/// Everything a ray can meet, ready for the device.
+pub struct Accel {
+    pub space: DeviceSpace,
+    /// CWBVH nodes, 80 bytes each; the root is the first. At least one.
+    pub nodes: Vec<[u32; 20]>,
+    /// In the order of the BVH's leaves.
+    pub primitives: Vec<Primitive>,
+    /// The emitting primitives: (index into `primitives`, object, area in device units).
+    pub emitters: Vec<(u32, usize, f64)>,
+    /// Whether anything but triangles occurs.
+    pub has_shapes: bool,
+    /// Triangles without area, which no ray can meet and which were left out.
+    pub degenerate: usize,
+}
+
+impl Accel {
+    /// Builds the structure; never fails, an empty scene gives one empty node.
+    pub fn build(scene: &Scene) -> Accel {
+        let space = device_space(scene);
+        let mut loose = Vec::new();
+        let mut degenerate = 0;
+        for (index, object) in scene.objects.iter().enumerate() {
+            collect(&object.shape, object.material as u32, index as u32, &space, &mut loose, &mut degenerate);
+        }
+        let has_shapes = loose.iter().any(|p| p.tag >> 24 != 0);
+        let (nodes, order) = build_nodes(&loose);
+        let mut primitives: Vec<Primitive> = order.iter().map(|&i| loose[i as usize]).collect();
+        let mut emitters = Vec::new();
+        for (index, primitive) in primitives.iter_mut().enumerate() {
+            // `collect` left the object here; from now on it is the emitter.
+            let object = primitive.emitter as usize;
+            primitive.emitter = NONE;
+            if scene.objects[object].emission.is_some() {
+                primitive.emitter = emitters.len() as u32;
+                emitters.push((index as u32, object, area(primitive)));
+            }
+        }
+        Accel { space, nodes, primitives, emitters, has_shapes, degenerate }
+    }
+}
+
+fn device_space(scene: &Scene) -> DeviceSpace {
+    let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let mut include = |p: DVec3, extent: DVec3| {
+        min = min.min(p - extent);
+        max = max.max(p + extent);
+    };
+    for object in &scene.objects {
+        match &object.shape {
+            Shape::Mesh(mesh) => {
+                mesh.triangles.iter().flatten().for_each(|&i| include(mesh.positions[i as usize], DVec3::ZERO))
+            }
+            Shape::Sphere { center, radius } => include(*center, DVec3::splat(*radius)),
+            Shape::Disk { center, radius, .. } => include(*center, DVec3::splat(*radius)),
+            Shape::Cylinder { from, to, radius } => {
+                include(*from, DVec3::splat(*radius));
+                include(*to, DVec3::splat(*radius));
+            }
+        }
+    }
+    if min.x > max.x {
+        return DeviceSpace { center: scene.camera.position, scale: 1.0, radius: 1.0 };
+    }
+    let half = (0.5 * (max - min)).max_element();
+    let scale = if half > 0.0 { (-half.log2().ceil()).exp2() } else { 1.0 };
+    let radius = (0.5 * (max - min)).length() * scale;
+    DeviceSpace { center: 0.5 * (min + max), scale, radius: radius.max(f64::from(f32::MIN_POSITIVE)) }
+}
+
+/// Appends a shape's primitives, the object's index standing in for the emitter.
+fn collect(shape: &Shape, material: u32, object: u32, space: &DeviceSpace, out: &mut Vec<Primitive>, degenerate: &mut usize) {
+    let base = Primitive { tag: material, emitter: object, ..Primitive::default() };
+    match shape {
+        Shape::Mesh(mesh) => {
+            let positions: Vec<[f32; 3]> = mesh.positions.iter().map(|&p| space.point(p)).collect();
+            for t in &mesh.triangles {
+                let [a, b, c] = t.map(|i| positions[i as usize]);
+                let primitive = Primitive { a, b, c, ..base };
+                if triangle_area(&primitive) > 0.0 {
+                    out.push(primitive);
+                } else {
+                    *degenerate += 1;
+                }
+            }
+        }
+        Shape::Sphere { center, radius } => out.push(Primitive {
+            a: space.point(*center),
+            tag: material | KIND_SPHERE << 24,
+            b: [space.length(*radius), 0.0, 0.0],
+            ..base
+        }),
+        Shape::Disk { center, normal, radius } => out.push(Primitive {
+            a: space.point(*center),
+            tag: material | KIND_DISK << 24,
+            b: normal.normalize().as_vec3().to_array(),
+            c: [space.length(*radius), 0.0, 0.0],
+            ..base
+        }),
+        Shape::Cylinder { from, to, radius } => out.push(Primitive {
+            a: space.point(*from),
+            tag: material | KIND_CYLINDER << 24,
+            b: space.point(*to),
+            c: [space.length(*radius), 0.0, 0.0],
+            ..base
+        }),
+    }
+}
+
+fn vector(p: [f32; 3]) -> DVec3 {
+    DVec3::from(p.map(f64::from))
+}
+
+fn triangle_area(p: &Primitive) -> f64 {
+    0.5 * (vector(p.b) - vector(p.a)).cross(vector(p.c) - vector(p.a)).length()
+}
+
+/// Area in device units.
+fn area(p: &Primitive) -> f64 {
+    use std::f64::consts::PI;
+    match p.tag >> 24 {
+        KIND_SPHERE => 4.0 * PI * f64::from(p.b[0]).powi(2),
+        KIND_DISK => PI * f64::from(p.c[0]).powi(2),
+        KIND_CYLINDER => 2.0 * PI * f64::from(p.c[0]) * (vector(p.b) - vector(p.a)).length(),
+        _ => triangle_area(p),
+    }
+}
+
+impl Boundable for Primitive {
+    fn aabb(&self) -> Aabb {
+        let v = |p: [f32; 3]| Vec3A::from(p);
+        let around = |points: &[Vec3A], radius: f32| {
+            let mut bounds = Aabb::from_points(points);
+            // Rounding of center and radius included.
+            let margin = Vec3A::splat(radius * (1.0 + 1e-6)) + 2e-7 * bounds.max.abs().max(bounds.min.abs());
+            bounds.min -= margin;
+            bounds.max += margin;
+            bounds
+        };
+        match self.tag >> 24 {
+            KIND_SPHERE => around(&[v(self.a)], self.b[0]),
+            KIND_DISK => around(&[v(self.a)], self.c[0]),
+            KIND_CYLINDER => around(&[v(self.a), v(self.b)], self.c[0]),
+            _ => Aabb::from_points(&[v(self.a), v(self.b), v(self.c)]),
+        }
+    }
+}
+
+/// Deepest tree that the shader's traversal stack can take (`STACK_SIZE` in bvh.wgsl).
+const MAX_DEPTH: usize = 30;
+
+/// The nodes, and for each place in the leaves the primitive that stands there.
+fn build_nodes(primitives: &[Primitive]) -> (Vec<[u32; 20]>, Vec<u32>) {
+    if primitives.is_empty() {
+        return (vec![[0; 20]], Vec::new());
+    }
+    let mut bvh = build_cwbvh(primitives, BvhBuildParams::medium_build(), &mut std::time::Duration::default());
+    if depth(&bvh) > MAX_DEPTH {
+        // Many coincident boxes: clustering by surface area then builds chains instead of trees.
+        bvh = bvh2_to_cwbvh(&balanced(primitives), 3, true, false);
+    }
+    let nodes = bvh.nodes.iter().map(|node| bytemuck::cast(*node)).collect();
+    (nodes, bvh.primitive_indices)
+}
+
+/// Levels of nodes.
+fn depth(bvh: &CwBvh) -> usize {
+    let mut deepest = 0;
+    let mut open = vec![(0usize, 1usize)];
+    while let Some((node, level)) = open.pop() {
+        deepest = deepest.max(level);
+        let node = &bvh.nodes[node];
+        let children = node.imask.count_ones() as usize;
+        open.extend((0..children).map(|i| (node.child_base_idx as usize + i, level + 1)));
+    }
+    deepest
+}
+
+/// A binary tree by median splits along the widest axis: as deep as log2 of the number of primitives, whatever they are.
+fn balanced(primitives: &[Primitive]) -> Bvh2 {
+    let boxes: Vec<Aabb> = primitives.iter().map(Boundable::aabb).collect();
+    let mut order: Vec<u32> = (0..primitives.len() as u32).collect();
+    let mut nodes = vec![Bvh2Node::default()];
+    let mut open = vec![(0usize, 0..primitives.len())];
+    while let Some((at, range)) = open.pop() {
+        let bounds = order[range.clone()].iter().fold(Aabb::INVALID, |b, &i| b.union(&boxes[i as usize]));
+        if range.len() == 1 {
+            nodes[at] = Bvh2Node::new(bounds, 1, range.start as u32);
+            continue;
+        }
+        let extent = bounds.max - bounds.min;
+        let axis = (0..3).max_by(|&a, &b| extent[a].total_cmp(&extent[b])).unwrap_or(0);
+        let middle = range.len() / 2;
+        let center = |i: &u32| boxes[*i as usize].min[axis] + boxes[*i as usize].max[axis];
+        order[range.clone()].select_nth_unstable_by(middle, |a, b| center(a).total_cmp(&center(b)));
+        let first_child = nodes.len();
+        nodes.resize(first_child + 2, Bvh2Node::default());
+        nodes[at] = Bvh2Node::new(bounds, 0, first_child as u32);
+        open.push((first_child, range.start..range.start + middle));
+        open.push((first_child + 1, range.start + middle..range.end));
+    }
+    Bvh2 { nodes, primitive_indices: order, ..Bvh2::default() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn triangle(a: [f32; 3], b: [f32; 3], c: [f32; 3]) -> Primitive {
+        Primitive { a, b, c, ..Primitive::default() }
+    }
+
+    /// obvhs's own validation walks the whole tree: bounds, completeness, depth.
+    #[test]
+    fn trees_are_valid_on_odd_input() {
+        let one = vec![triangle([0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])];
+        let coincident = vec![one[0]; 5000];
+        let grid: Vec<_> = (0..40_000)
+            .map(|i| {
+                let (x, y) = ((i % 200) as f32, (i / 200) as f32);
+                triangle([x, y, 0.0], [x + 1.0, y, 0.0], [x, y + 1.0, 0.1 * x])
+            })
+            .collect();
+        let flat: Vec<_> = (0..100).map(|i| triangle([i as f32, 0.0, 0.0], [i as f32 + 1e-6, 0.0, 0.0], [i as f32, 0.0, 1.0])).collect();
+        for primitives in [one, coincident, grid, flat] {
+            let (nodes, order) = build_nodes(&primitives);
+            let mut seen = order.clone();
+            seen.sort_unstable();
+            assert!(seen.iter().enumerate().all(|(i, &p)| i as u32 == p), "each primitive stands in one leaf");
+            let bvh = CwBvh {
+                nodes: nodes.into_iter().map(bytemuck::cast).collect(),
+                primitive_indices: order,
+                ..CwBvh::default()
+            };
+            bvh.validate(&primitives, false);
+            assert!(depth(&bvh) <= MAX_DEPTH);
+        }
+        assert_eq!(build_nodes(&[]).0, vec![[0; 20]]);
+    }
+}

@@ -1,0 +1,151 @@
+//! Every structure that the GPU sees, twins of `shaders/common/types.wgsl`; a test compares sizes and offsets with
+//! what naga reads in the WGSL.
+
+use bytemuck::{Pod, Zeroable};
+
+/// `Frame` in WGSL: what stays the same during a render. Lengths in device units.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
+pub struct Frame {
+    pub camera_position: [f32; 3],
+    pub seed_low: u32,
+    pub camera_forward: [f32; 3],
+    pub seed_high: u32,
+    pub camera_right: [f32; 3],
+    pub aperture_radius: f32,
+    pub camera_up: [f32; 3],
+    pub focus_distance: f32,
+    pub half_size: [f32; 2],
+    pub film_size: [f32; 2],
+    pub max_bounces: u32,
+    pub roulette_start: u32,
+    pub emitter_count: u32,
+    pub environment_pick: f32,
+    pub environment_spectrum: u32,
+    pub max_records: u32,
+    pub channels: u32,
+    pub stratum_bits: u32,
+}
+
+/// `Wave` in WGSL: one range of samples of the pixels of one or several units of one epoch.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable)]
+pub struct Wave {
+    pub path_count: u32,
+    pub pixel_count: u32,
+    pub samples: u32,
+    pub sample_begin: u32,
+    pub pixel_begin: u32,
+    pub tile_width: u32,
+    pub tile_pixels: u32,
+    pub epoch: u32,
+    pub epoch_mask: u32,
+}
+
+/// `Step` in WGSL: one dispatch of a wave.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+pub struct Step {
+    pub bounce: u32,
+}
+
+/// `Emitter` in WGSL: one emitting primitive.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
+pub struct Emitter {
+    pub primitive: u32,
+    /// Spectrum id, with [`EMITS_BOTH_SIDES`].
+    pub spectrum: u32,
+    pub pick: f32,
+    pub area: f32,
+}
+
+/// Bit of [`Emitter::spectrum`].
+pub const EMITS_BOTH_SIDES: u32 = 0x8000_0000;
+
+/// `Material` in WGSL.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
+pub struct Material {
+    /// Spectrum of the throughput; [`NONE`] where nothing is scattered.
+    pub factor: u32,
+    pub two_sided: u32,
+    pub albedo: f32,
+    pub unused: u32,
+}
+
+/// `NONE` in WGSL.
+pub const NONE: u32 = u32::MAX;
+
+/// One primitive, 48 bytes: three words of four. A triangle is its three vertices; see `shaders/common/shapes.wgsl`
+/// for the others.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
+pub struct Primitive {
+    pub a: [f32; 3],
+    /// Material in the low 24 bits, kind in the high 8.
+    pub tag: u32,
+    pub b: [f32; 3],
+    /// Index of the emitter, or [`NONE`].
+    pub emitter: u32,
+    pub c: [f32; 3],
+    pub unused: u32,
+}
+
+/// The counters that every pass may raise, in the order of the `COUNTER_…` constants in WGSL.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable)]
+pub struct Counters {
+    pub overflow: u32,
+    pub non_finite: u32,
+    pub negative: u32,
+    pub bad_slot: u32,
+    pub bad_sample: u32,
+    pub rays: u32,
+    pub unused: [u32; 2],
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::mem::{offset_of, size_of};
+
+    /// What naga says about the struct `name` in types.wgsl: its size, and its members' names and offsets.
+    fn wgsl_struct(name: &str) -> (u32, Vec<(String, u32)>) {
+        let source = include_str!("../../shaders/common/types.wgsl");
+        let module = naga::front::wgsl::parse_str(source).unwrap();
+        let found = module.types.iter().find_map(|(_, t)| match &t.inner {
+            naga::TypeInner::Struct { members, span } if t.name.as_deref() == Some(name) => {
+                Some((*span, members.iter().map(|m| (m.name.clone().unwrap(), m.offset)).collect()))
+            }
+            _ => None,
+        });
+        found.unwrap_or_else(|| panic!("no struct {name} in types.wgsl"))
+    }
+
+    macro_rules! same_layout {
+        ($name:ident { $($field:ident),* }) => {
+            let (span, members) = wgsl_struct(stringify!($name));
+            assert_eq!(size_of::<$name>(), span as usize, "size of {}", stringify!($name));
+            let ours = vec![$((stringify!($field).to_owned(), offset_of!($name, $field) as u32)),*];
+            assert_eq!(ours, members, "members of {}", stringify!($name));
+        };
+    }
+
+    #[test]
+    fn structs_match_the_wgsl() {
+        same_layout!(Frame {
+            camera_position, seed_low, camera_forward, seed_high, camera_right, aperture_radius, camera_up,
+            focus_distance, half_size, film_size, max_bounces, roulette_start, emitter_count, environment_pick,
+            environment_spectrum, max_records, channels, stratum_bits
+        });
+        same_layout!(Wave {
+            path_count, pixel_count, samples, sample_begin, pixel_begin, tile_width, tile_pixels, epoch, epoch_mask
+        });
+        same_layout!(Step { bounce });
+        same_layout!(Emitter { primitive, spectrum, pick, area });
+        same_layout!(Material { factor, two_sided, albedo, unused });
+        assert_eq!(size_of::<Primitive>(), 48);
+        assert_eq!(offset_of!(Counters, rays) / 4, 5);
+    }
+}

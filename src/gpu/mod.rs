@@ -1,0 +1,9 @@
+//! The only place, with `render::worker`, that names wgpu.
+
+pub mod adapter;
+pub mod buffer;
+pub mod layout;
+pub mod pass;
+pub mod self_test;
+pub mod shader;
+pub mod upload;

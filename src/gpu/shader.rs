@@ -1,0 +1,198 @@
+//! Shaders composed per scene from the modules it needs.
+//!
+//! A pass is the ordered concatenation of plain WGSL files. Four line directives leave out what a scene does not need,
+//! so that its text is the same as if the feature did not exist:
+//! `#if NAME`, `#else`, `#endif` (NAME defined and not 0) and `#repeat NAME` … `#end` (as many times as NAME says, with
+//! `$i` and `$(4+i)` counting). `$NAME` stands for a value; constants are declared on top.
+
+use std::collections::BTreeMap;
+
+use crate::{Error, Result};
+
+/// A WGSL file compiled into the binary.
+#[derive(Debug, Clone, Copy)]
+pub struct Module {
+    pub name: &'static str,
+    pub text: &'static str,
+}
+
+macro_rules! modules {
+    ($($ident:ident = $path:literal;)*) => {
+        $(pub const $ident: Module = Module { name: $path, text: include_str!(concat!("../../shaders/", $path)) };)*
+    };
+}
+
+modules! {
+    TYPES = "common/types.wgsl";
+    RNG = "common/rng.wgsl";
+    GEOMETRY = "common/geometry.wgsl";
+    FRAME = "common/frame.wgsl";
+    SCENE = "common/scene.wgsl";
+    TRIANGLE = "common/triangle.wgsl";
+    SHAPES = "common/shapes.wgsl";
+    BVH = "common/bvh.wgsl";
+    LIGHT = "common/light.wgsl";
+    GENERATE_CAMERA = "generate_camera.wgsl";
+    GENERATE_BOUNCE = "generate_bounce.wgsl";
+    EVALUATE_PIXEL = "evaluate_pixel.wgsl";
+    SELF_TEST = "self_test.wgsl";
+}
+
+/// Names with values: switches for `#if`, counts for `#repeat`, texts for `$NAME`.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Defines {
+    values: BTreeMap<&'static str, u32>,
+    constants: Vec<(&'static str, u32)>,
+}
+
+impl Defines {
+    /// Sets a switch or count.
+    pub fn set(&mut self, name: &'static str, value: impl Into<u32>) -> &mut Self {
+        self.values.insert(name, value.into());
+        self
+    }
+
+    /// Declares `const NAME: u32` on top of the shader, and sets NAME.
+    pub fn constant(&mut self, name: &'static str, value: u32) -> &mut Self {
+        self.constants.push((name, value));
+        self.set(name, value)
+    }
+
+    fn get(&self, name: &str) -> u32 {
+        self.values.get(name).copied().unwrap_or(0)
+    }
+}
+
+/// A composed shader, and where each of its lines came from.
+#[derive(Debug, Clone)]
+pub struct Source {
+    pub label: &'static str,
+    pub text: String,
+    origin: Vec<(&'static str, usize)>,
+}
+
+/// Concatenates `modules` as `defines` say; the last one is the pass and names it.
+pub fn compose(modules: &[Module], defines: &Defines) -> Source {
+    let label = modules.last().expect("a pass has modules").name;
+    let mut source = Source { label, text: String::new(), origin: Vec::new() };
+    for (name, value) in &defines.constants {
+        source.push(format!("const {name}: u32 = {value}u;"), ("constants", 0));
+    }
+    for module in modules {
+        let lines: Vec<(usize, &str)> = module.text.lines().enumerate().map(|(i, l)| (i + 1, l)).collect();
+        emit(&lines, module, defines, None, &mut source);
+    }
+    source
+}
+
+impl Source {
+    fn push(&mut self, line: String, origin: (&'static str, usize)) {
+        self.text.push_str(&line);
+        self.text.push('\n');
+        self.origin.push(origin);
+    }
+
+    /// Parses the text; an error names the file and line it came from.
+    pub fn parse(&self) -> Result<naga::Module> {
+        naga::front::wgsl::parse_str(&self.text).map_err(|e| {
+            let line = e.location(&self.text).map_or(0, |l| l.line_number as usize);
+            let (file, line) = self.origin.get(line.saturating_sub(1)).copied().unwrap_or((self.label, 0));
+            Error::Internal(format!("shaders/{file}:{line}: {}", e.message()))
+        })
+    }
+}
+
+/// The end of the block that `lines[start]` opens, and the position of its `#else`.
+fn block(lines: &[(usize, &str)], start: usize, module: &Module) -> (usize, Option<usize>) {
+    let (mut depth, mut otherwise) = (0, None);
+    for (at, (_, line)) in lines.iter().enumerate().skip(start) {
+        let line = line.trim();
+        if line.starts_with("#if ") || line.starts_with("#repeat ") {
+            depth += 1;
+        } else if line == "#else" && depth == 1 {
+            otherwise = Some(at);
+        } else if line == "#endif" || line == "#end" {
+            depth -= 1;
+            if depth == 0 {
+                return (at, otherwise);
+            }
+        }
+    }
+    panic!("shaders/{}:{}: this directive is never closed", module.name, lines[start].0);
+}
+
+fn emit(lines: &[(usize, &str)], module: &Module, defines: &Defines, index: Option<u32>, out: &mut Source) {
+    let mut at = 0;
+    while at < lines.len() {
+        let (number, line) = lines[at];
+        let directive = line.trim();
+        if let Some(name) = directive.strip_prefix("#if ") {
+            let (end, otherwise) = block(lines, at, module);
+            let chosen = match (defines.get(name.trim()) != 0, otherwise) {
+                (true, _) => at + 1..otherwise.unwrap_or(end),
+                (false, Some(otherwise)) => otherwise + 1..end,
+                (false, None) => end..end,
+            };
+            emit(&lines[chosen], module, defines, index, out);
+            at = end + 1;
+        } else if let Some(name) = directive.strip_prefix("#repeat ") {
+            let (end, _) = block(lines, at, module);
+            for i in 0..defines.get(name.trim()) {
+                emit(&lines[at + 1..end], module, defines, Some(i), out);
+            }
+            at = end + 1;
+        } else {
+            out.push(substitute(line, defines, index), (module.name, number));
+            at += 1;
+        }
+    }
+}
+
+/// Replaces `$i`, `$(4+i)` and `$NAME`.
+fn substitute(line: &str, defines: &Defines, index: Option<u32>) -> String {
+    let mut result = String::with_capacity(line.len());
+    let mut rest = line;
+    while let Some(at) = rest.find('$') {
+        result.push_str(&rest[..at]);
+        rest = &rest[at + 1..];
+        if let Some((offset, after)) = rest.strip_prefix('(').and_then(|r| r.split_once("+i)")) {
+            let offset: u32 = offset.parse().expect("$(number+i)");
+            result.push_str(&(offset + index.expect("$(…+i) stands in a #repeat")).to_string());
+            rest = after;
+        } else if let (Some(i), Some(after)) = (index, rest.strip_prefix('i')) {
+            result.push_str(&i.to_string());
+            rest = after;
+        } else {
+            let end = rest.find(|c: char| !c.is_ascii_uppercase() && c != '_').unwrap_or(rest.len());
+            result.push_str(&defines.get(&rest[..end]).to_string());
+            rest = &rest[end..];
+        }
+    }
+    result + rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn directives_choose_repeat_and_count() {
+        let text = "a\n#if X\nb\n#repeat N\nc$i $(4+i)\n#if Y\nd\n#else\ne\n#endif\n#end\n#else\nf\n#endif\n$WORKGROUP";
+        let module = Module { name: "m", text };
+        let compose_with = |x: u32, n: u32| {
+            let mut defines = Defines::default();
+            defines.set("X", x).set("N", n).set("WORKGROUP", 64u32);
+            compose(&[module], &defines)
+        };
+        assert_eq!(compose_with(1, 2).text, "a\nb\nc0 4\ne\nc1 5\ne\n64\n");
+        assert_eq!(compose_with(0, 2).text, "a\nf\n64\n");
+        assert_eq!(compose_with(1, 1).origin[2], ("m", 5));
+    }
+
+    #[test]
+    fn errors_name_the_file_and_line() {
+        let module = Module { name: "m", text: "#if X\n#endif\nfn f() -> u32 {\n  return 1.5;\n}" };
+        let error = compose(&[module], &Defines::default()).parse().unwrap_err().to_string();
+        assert!(error.contains("shaders/m:"), "{error}");
+    }
+}

@@ -1,0 +1,74 @@
+//! The scene on a device: one immutable copy, large arrays in windows below the binding limit.
+
+use crate::gpu::adapter::Gpu;
+use crate::gpu::buffer;
+use crate::render::prepare::{Prepared, WindowList, Windows};
+use crate::{Error, Result};
+
+const NODE_BYTES: u64 = 80;
+const PRIMITIVE_BYTES: u64 = 48;
+/// Bindings that scene.wgsl keeps for the windows of nodes and of primitives.
+const MAX_WINDOWS: u64 = 4;
+
+/// Buffers of group 0 and the spectral tables, found by their WGSL names.
+pub struct SceneBuffers {
+    named: Vec<(String, wgpu::Buffer)>,
+    /// Sum of all sizes, bytes.
+    pub bytes: u64,
+}
+
+/// How many windows of how many elements, with bindings of at most `binding` bytes.
+pub fn windows(prepared: &Prepared, binding: u64) -> Result<Windows> {
+    let split = |what: &str, count: usize, bytes: u64| {
+        let size = (binding / bytes).min(u64::from(u32::MAX));
+        let windows = (count as u64).div_ceil(size).max(1);
+        if windows > MAX_WINDOWS {
+            return Err(Error::Usage(format!(
+                "the scene has {count} {what}, and this device binds at most {}; use fewer triangles or a larger device",
+                MAX_WINDOWS * size
+            )));
+        }
+        Ok(WindowList { count: windows as u32, size: size as u32 })
+    };
+    Ok(Windows {
+        nodes: split("BVH nodes", prepared.accel.nodes.len(), NODE_BYTES)?,
+        primitives: split("triangles and shapes", prepared.accel.primitives.len(), PRIMITIVE_BYTES)?,
+    })
+}
+
+impl SceneBuffers {
+    pub fn new(gpu: &Gpu, prepared: &Prepared, windows: &Windows) -> Result<SceneBuffers> {
+        let mut named = Vec::new();
+        let mut add = |name: String, buffer: wgpu::Buffer| named.push((name, buffer));
+        let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
+        let frame = buffer::empty(gpu, "frame", size_of_val(&prepared.frame) as u64, usage);
+        gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&prepared.frame));
+        add("frame".into(), frame);
+        add("materials".into(), buffer::storage(gpu, "materials", &prepared.materials));
+        add("emitters".into(), buffer::storage(gpu, "emitters", &prepared.emitters));
+        add("emitter_cdf".into(), buffer::storage(gpu, "emitter_cdf", &prepared.picks.cdf));
+        let mut add_windows = |name: &str, list: WindowList, bytes: &[u8], element: u64| {
+            for i in 0..u64::from(list.count) {
+                let size = u64::from(list.size) * element;
+                let end = ((i + 1) * size).min(bytes.len() as u64);
+                let label = format!("{name}_{i}");
+                add(label.clone(), buffer::storage(gpu, &label, &bytes[(i * size) as usize..end as usize]));
+            }
+        };
+        add_windows("nodes", windows.nodes, bytemuck::cast_slice(&prepared.accel.nodes), NODE_BYTES);
+        let primitives = bytemuck::cast_slice(&prepared.accel.primitives);
+        add_windows("primitives", windows.primitives, primitives, PRIMITIVE_BYTES);
+        add("spectra".into(), buffer::storage(gpu, "spectra", &prepared.tables.strata));
+        if prepared.features.knots {
+            add("knot_starts".into(), buffer::storage(gpu, "knot_starts", &prepared.tables.knot_starts));
+            add("knots".into(), buffer::storage(gpu, "knots", &prepared.tables.knots));
+        }
+        let bytes = named.iter().map(|(_, b)| b.size()).sum();
+        Ok(SceneBuffers { named, bytes })
+    }
+
+    /// The binding for the variable `name`, if it is one of the scene's.
+    pub fn find(&self, name: &str) -> Option<wgpu::BufferBinding<'_>> {
+        self.named.iter().find(|(n, _)| n == name).map(|(_, b)| b.as_entire_buffer_binding())
+    }
+}

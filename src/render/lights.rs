@@ -1,0 +1,101 @@
+//! Decision probabilities of next-event estimation (DESIGN section 6), common to all channels.
+
+use crate::accel::Accel;
+use crate::scene::{Scene, Sides};
+use std::f64::consts::PI;
+
+/// With which probability next-event estimation asks which light.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct LightPicks {
+    /// The environment's probability; multiples of 2⁻²⁴, like the random numbers that decide.
+    pub environment: f64,
+    /// Upper ends of the emitters' intervals in [0, 1], given that it is not the environment.
+    pub cdf: Vec<f32>,
+    /// Probability of each emitter, exactly what the device's choice amounts to.
+    pub emitters: Vec<f64>,
+}
+
+/// q = ½ mean over channels of a light's share + ½ its normalised largest share over channels, where the share is its
+/// power over the total power in that channel. Channels without power are left out; if none has any, all lights are
+/// equally likely. `accel.emitters` and the environment are the lights.
+pub fn light_picks(scene: &Scene, accel: &Accel) -> LightPicks {
+    // Emitters of one spectrum differ by area only, so shares are worked out per spectrum.
+    let mut areas = vec![0.0; scene.spectra.len()];
+    let emitted = |object: usize| scene.objects[object].emission.as_ref().expect("emitters come from emitting objects");
+    let area_of = |&(_, object, area): &(u32, usize, f64)| {
+        area * if emitted(object).sides == Sides::Both { 2.0 } else { 1.0 }
+    };
+    for emitter in &accel.emitters {
+        areas[emitted(emitter.1).radiance] += area_of(emitter);
+    }
+    let mut groups: Vec<(Option<usize>, f64)> =
+        areas.iter().enumerate().filter(|(_, a)| **a > 0.0).map(|(s, a)| (Some(s), *a)).collect();
+    if scene.environment.is_some() {
+        // The flux of radiance L into the scene's bounding sphere is that of a surface of the sphere's area.
+        groups.push((None, 4.0 * PI * accel.space.radius.powi(2)));
+    }
+    let spectrum = |group: Option<usize>| match (group, &scene.environment) {
+        (Some(s), _) => s,
+        (None, Some(environment)) => environment.radiance,
+        (None, None) => unreachable!("only an environment adds a group without emitters"),
+    };
+    let shares = probabilities(&groups.iter().map(|&(g, area)| {
+        let curve = &scene.spectra[spectrum(g)].curve;
+        scene.channels.bounds.iter().map(|b| area * curve.mean(b[0], b[1])).collect()
+    }).collect::<Vec<Vec<f64>>>());
+
+    let environment = match groups.last() {
+        Some((None, _)) if accel.emitters.is_empty() => 1.0,
+        // Steps of 2^-24, and never so small or large that a side would never be asked.
+        Some((None, _)) => (shares[groups.len() - 1] * STEPS).round().clamp(1.0, STEPS - 1.0) / STEPS,
+        _ => 0.0,
+    };
+    let share_of = |spectrum: usize| groups.iter().position(|g| g.0 == Some(spectrum)).map_or(0.0, |g| shares[g] / groups[g].1);
+    let weights: Vec<f64> = accel.emitters.iter().map(|e| share_of(emitted(e.1).radiance) * area_of(e)).collect();
+    let total: f64 = weights.iter().sum();
+    let mut picks = LightPicks { environment, ..LightPicks::default() };
+    let (mut sum, mut last) = (0.0, 0.0);
+    for (i, weight) in weights.iter().enumerate() {
+        sum += if total > 0.0 { weight / total } else { 1.0 / weights.len() as f64 };
+        let end = if i + 1 == weights.len() { 1.0 } else { (sum.min(1.0) * STEPS).round() / STEPS };
+        picks.cdf.push(end as f32);
+        picks.emitters.push((end - last) * (1.0 - environment));
+        last = end;
+    }
+    picks
+}
+
+/// Random numbers on the device have 24 bits.
+const STEPS: f64 = 16_777_216.0;
+
+/// q of DESIGN section 6 for `powers[light][channel]`.
+fn probabilities(powers: &[Vec<f64>]) -> Vec<f64> {
+    let channels = powers.first().map_or(0, Vec::len);
+    let totals: Vec<f64> = (0..channels).map(|k| powers.iter().map(|p| p[k]).sum()).collect();
+    let lit: Vec<usize> = (0..channels).filter(|&k| totals[k] > 0.0).collect();
+    if lit.is_empty() {
+        return vec![1.0 / powers.len().max(1) as f64; powers.len()];
+    }
+    let share = |p: &Vec<f64>, k: usize| p[k] / totals[k];
+    let mean: Vec<f64> = powers.iter().map(|p| lit.iter().map(|&k| share(p, k)).sum::<f64>() / lit.len() as f64).collect();
+    let largest: Vec<f64> = powers.iter().map(|p| lit.iter().map(|&k| share(p, k)).fold(0.0, f64::max)).collect();
+    let largest_total: f64 = largest.iter().sum();
+    mean.iter().zip(&largest).map(|(m, l)| 0.5 * m + 0.5 * l / largest_total).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::probabilities;
+
+    #[test]
+    fn shares_follow_design_section_6() {
+        // A sun that owns nine of ten channels and heat that owns one: mean shares .9/.1, largest shares 1/1.
+        let sun: Vec<f64> = (0..10).map(|k| if k < 9 { 100.0 } else { 0.0 }).collect();
+        let heat: Vec<f64> = (0..10).map(|k| if k < 9 { 0.0 } else { 1e-6 }).collect();
+        let q = probabilities(&[sun, heat]);
+        assert!((q[0] - 0.7).abs() < 1e-12 && (q[1] - 0.3).abs() < 1e-12, "{q:?}");
+        // Dark channels are left out; without any power the choice is uniform.
+        assert_eq!(probabilities(&[vec![0.0, 1.0], vec![0.0, 3.0]]), vec![0.25, 0.75]);
+        assert_eq!(probabilities(&[vec![0.0; 4], vec![0.0; 4]]), vec![0.5, 0.5]);
+    }
+}

@@ -1,0 +1,332 @@
+//! One device at work: generate, evaluate, transfer. The names are the method's own.
+
+use std::sync::Arc;
+
+use crate::gpu::adapter::Gpu;
+use crate::gpu::buffer;
+use crate::gpu::layout::{Counters, Wave};
+use crate::gpu::pass::Pass;
+use crate::gpu::shader;
+use crate::gpu::upload::{self, SceneBuffers};
+use crate::render::prepare::{EvaluateShape, Prepared};
+use crate::render::wave::{self, DeviceLimits, WavePlan};
+use crate::{Error, Result};
+
+/// A rectangle x0, y0, x1, y1 of the full film: one tile in one epoch.
+pub type UnitRect = [u32; 4];
+
+/// Staging buffers: the next unit computes while the last one is merged.
+const SLOTS: usize = 2;
+
+/// Device time of the passes, seconds, where the adapter has timestamps.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Profile {
+    pub generate_s: f64,
+    pub evaluate_s: f64,
+}
+
+/// A device with everything a scene needs on it.
+pub struct Worker {
+    pub gpu: Gpu,
+    pub plan: WavePlan,
+    pub profile: Profile,
+    prepared: Arc<Prepared>,
+    camera: Stage,
+    bounce: Stage,
+    evaluate: Stage,
+    shape: EvaluateShape,
+    path_buffers: PathBuffers,
+    timestamps: Option<Timestamps>,
+    slots: Vec<Slot>,
+    next_slot: usize,
+}
+
+/// A pass with its bind groups.
+struct Stage {
+    pass: Pass,
+    groups: Vec<wgpu::BindGroup>,
+}
+
+/// What lies between the passes of a wave.
+struct PathBuffers {
+    wave: wgpu::Buffer,
+    units: wgpu::Buffer,
+    steps: wgpu::Buffer,
+    step_stride: u32,
+    states: wgpu::Buffer,
+    heads: wgpu::Buffer,
+    records: wgpu::Buffer,
+    throughputs: Option<wgpu::Buffer>,
+    counters: wgpu::Buffer,
+    means: wgpu::Buffer,
+}
+
+/// A staging buffer and the units whose means it will hold.
+struct Slot {
+    staging: wgpu::Buffer,
+    pending: Option<Pending>,
+}
+
+struct Pending {
+    units: Vec<UnitRect>,
+    submission: wgpu::SubmissionIndex,
+}
+
+/// What a group of units brought back.
+pub struct Collected<'a> {
+    pub units: &'a [UnitRect],
+    /// [unit][row of the full tile][column][channel]; slots outside a unit's rectangle hold zeros.
+    pub means: &'a [f32],
+    pub counters: Counters,
+}
+
+impl Worker {
+    /// Uploads the scene and compiles its passes. `max_paths` bounds the waves (tests, small memories).
+    pub fn new(gpu: Gpu, prepared: Arc<Prepared>, tile: [u32; 2], max_paths: Option<u32>) -> Result<Worker> {
+        let limits = DeviceLimits { binding: binding_limit(&gpu), software: gpu.is_software, max_paths };
+        let plan = WavePlan::new(&prepared, tile, limits)?;
+        let windows = upload::windows(&prepared, limits.binding)?;
+        let scene = SceneBuffers::new(&gpu, &prepared, &windows)?;
+        let path_buffers = PathBuffers::new(&gpu, &prepared, &plan);
+
+        let shape = EvaluateShape::new(prepared.tables.channels_padded as u32 / 4, if gpu.is_software { 8 } else { 32 });
+        let defines = prepared.defines(&windows);
+        let stage = |modules: &[shader::Module], defines: &shader::Defines| {
+            let pass = Pass::new(&gpu, &shader::compose(modules, defines))?;
+            let groups = (0..2)
+                .map(|group| pass.bind(&gpu, group, |name| scene.find(name).or_else(|| path_buffers.find(name))))
+                .collect::<Result<_>>()?;
+            Ok::<_, Error>(Stage { pass, groups })
+        };
+        let camera = stage(&prepared.camera_modules(), &defines)?;
+        let bounce = stage(&prepared.bounce_modules(), &defines)?;
+        let evaluate = stage(&prepared.evaluate_modules(), &prepared.evaluate_defines(shape))?;
+        let slots = (0..SLOTS)
+            .map(|_| Slot {
+                staging: buffer::empty(
+                    &gpu,
+                    "staging",
+                    plan.mean_bytes() + size_of::<Counters>() as u64,
+                    wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+                ),
+                pending: None,
+            })
+            .collect();
+        gpu.check()?;
+        let profile = Profile::default();
+        let timestamps = None;
+        Ok(Worker { gpu, plan, profile, prepared, camera, bounce, evaluate, shape, path_buffers, timestamps, slots, next_slot: 0 })
+    }
+
+    /// Measures the passes from now on, at the price of waiting for every wave.
+    pub fn enable_profile(&mut self) {
+        self.timestamps = self.gpu.timestamps.then(|| Timestamps::new(&self.gpu));
+    }
+
+    /// Starts one epoch of `units`; their means arrive through [`Worker::collect`]. Collects what used the same staging
+    /// buffer before, if anything.
+    pub fn submit(
+        &mut self,
+        units: &[UnitRect],
+        epoch: u32,
+        epoch_samples: u32,
+        collected: &mut dyn FnMut(Collected) -> Result<()>,
+    ) -> Result<()> {
+        let slot = self.next_slot;
+        self.next_slot = (slot + 1) % SLOTS;
+        self.collect_slot(slot, collected)?;
+
+        let buffers = &self.path_buffers;
+        self.gpu.queue.write_buffer(&buffers.units, 0, bytemuck::cast_slice(units));
+        for wave in self.plan.waves(units.len() as u32, epoch, epoch_samples) {
+            self.submit_wave(&wave)?;
+        }
+
+        let mut encoder = self.encoder("transfer");
+        let buffers = &self.path_buffers;
+        let size = self.unit_bytes() * units.len() as u64;
+        let staging = &self.slots[slot].staging;
+        encoder.copy_buffer_to_buffer(&buffers.means, 0, staging, 0, size);
+        encoder.copy_buffer_to_buffer(&buffers.counters, 0, staging, size, size_of::<Counters>() as u64);
+        encoder.clear_buffer(&buffers.counters, 0, None);
+        let submission = self.gpu.queue.submit([encoder.finish()]);
+        buffer::map(staging);
+        self.slots[slot].pending = Some(Pending { units: units.to_vec(), submission });
+        Ok(())
+    }
+
+    /// Waits for everything that is under way, in the order of submission.
+    pub fn collect(&mut self, collected: &mut dyn FnMut(Collected) -> Result<()>) -> Result<()> {
+        for i in 0..SLOTS {
+            self.collect_slot((self.next_slot + i) % SLOTS, collected)?;
+        }
+        Ok(())
+    }
+
+    fn collect_slot(&mut self, slot: usize, collected: &mut dyn FnMut(Collected) -> Result<()>) -> Result<()> {
+        let Some(pending) = self.slots[slot].pending.take() else { return Ok(()) };
+        buffer::wait(&self.gpu, pending.submission)?;
+        let size = self.unit_bytes() * pending.units.len() as u64;
+        let staging = &self.slots[slot].staging;
+        {
+            let lost = |e| Error::DevicesLost(format!("{}: {e}", self.gpu.name));
+            let end = size + size_of::<Counters>() as u64;
+            let view = staging.slice(..end).get_mapped_range().map_err(lost)?;
+            let counters: Counters = bytemuck::pod_read_unaligned(&view[size as usize..]);
+            collected(Collected {
+                units: &pending.units,
+                means: bytemuck::cast_slice(&view[..size as usize]),
+                counters,
+            })?;
+        }
+        staging.unmap();
+        Ok(())
+    }
+
+    fn unit_bytes(&self) -> u64 {
+        u64::from(self.plan.tile_pixels()) * u64::from(self.plan.channels) * 4
+    }
+
+    fn encoder(&self, label: &str) -> wgpu::CommandEncoder {
+        self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some(label) })
+    }
+
+    /// Generate: camera rays, then a bounce at a time. Evaluate: all channels along the saved paths.
+    fn submit_wave(&mut self, wave: &Wave) -> Result<()> {
+        self.gpu.queue.write_buffer(&self.path_buffers.wave, 0, bytemuck::bytes_of(wave));
+        let mut encoder = self.encoder("wave");
+        {
+            let mut pass = self.begin(&mut encoder, "generate", 0);
+            let [x, y] = fold(wave.path_count.div_ceil(64));
+            self.camera.set(&mut pass, &[]);
+            pass.dispatch_workgroups(x, y, 1);
+            for step in wave::steps(self.prepared.frame.max_bounces) {
+                self.bounce.set(&mut pass, &[step.bounce * self.path_buffers.step_stride]);
+                pass.dispatch_workgroups(x, y, 1);
+            }
+        }
+        {
+            let mut pass = self.begin(&mut encoder, "evaluate", 1);
+            let [x, y] = fold(wave.pixel_count.div_ceil(self.shape.pixels));
+            self.evaluate.set(&mut pass, &[]);
+            pass.dispatch_workgroups(x, y, self.shape.blocks);
+        }
+        if let Some(timestamps) = &self.timestamps {
+            timestamps.resolve(&mut encoder);
+        }
+        let submission = self.gpu.queue.submit([encoder.finish()]);
+        if let Some(timestamps) = &self.timestamps {
+            buffer::wait(&self.gpu, submission)?;
+            let [generate, evaluate] = timestamps.read(&self.gpu)?;
+            self.profile.generate_s += generate;
+            self.profile.evaluate_s += evaluate;
+        }
+        Ok(())
+    }
+
+    fn begin<'e>(&self, encoder: &'e mut wgpu::CommandEncoder, label: &'static str, index: u32) -> wgpu::ComputePass<'e> {
+        encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+            label: Some(label),
+            timestamp_writes: self.timestamps.as_ref().map(|t| wgpu::ComputePassTimestampWrites {
+                query_set: &t.queries,
+                beginning_of_pass_write_index: Some(2 * index),
+                end_of_pass_write_index: Some(2 * index + 1),
+            }),
+        })
+    }
+}
+
+/// What one binding may show: the device's limit, but no more than 1 GiB, so that offsets stay within 32 bits of words.
+pub fn binding_limit(gpu: &Gpu) -> u64 {
+    gpu.limits.max_storage_buffer_binding_size.min(gpu.limits.max_buffer_size).min(1 << 30)
+}
+
+/// Workgroup counts in x and y for at least `groups` groups: a dimension takes at most 65,535.
+fn fold(groups: u32) -> [u32; 2] {
+    let y = groups.div_ceil(65_535).max(1);
+    [groups.div_ceil(y), y]
+}
+
+impl Stage {
+    /// `offsets`: one per dynamic binding of the pass.
+    fn set(&self, pass: &mut wgpu::ComputePass<'_>, offsets: &[u32]) {
+        pass.set_pipeline(&self.pass.pipeline);
+        pass.set_bind_group(0, &self.groups[0], &[]);
+        pass.set_bind_group(1, &self.groups[1], offsets);
+    }
+}
+
+impl PathBuffers {
+    fn new(gpu: &Gpu, prepared: &Prepared, plan: &WavePlan) -> PathBuffers {
+        use wgpu::BufferUsages as U;
+        let storage = U::STORAGE | U::COPY_SRC | U::COPY_DST;
+        let step_stride = gpu.limits.min_uniform_buffer_offset_alignment.max(16);
+        let steps = wave::steps(prepared.frame.max_bounces);
+        let mut step_bytes = vec![0u8; steps.len() * step_stride as usize];
+        for (step, bytes) in steps.iter().zip(step_bytes.chunks_mut(step_stride as usize)) {
+            bytes[..size_of_val(step)].copy_from_slice(bytemuck::bytes_of(step));
+        }
+        let steps = buffer::empty(gpu, "steps", step_bytes.len() as u64, U::UNIFORM | U::COPY_DST);
+        gpu.queue.write_buffer(&steps, 0, &step_bytes);
+        PathBuffers {
+            wave: buffer::empty(gpu, "wave", size_of::<Wave>() as u64, U::UNIFORM | U::COPY_DST),
+            units: buffer::empty(gpu, "units", u64::from(plan.units) * size_of::<UnitRect>() as u64, storage),
+            steps,
+            step_stride,
+            states: buffer::empty(gpu, "states", plan.state_bytes(), storage),
+            heads: buffer::empty(gpu, "heads", plan.head_bytes(), storage),
+            records: buffer::empty(gpu, "records", plan.record_bytes(), storage),
+            throughputs: plan.roulette.then(|| buffer::empty(gpu, "throughputs", plan.throughput_bytes(), storage)),
+            counters: buffer::empty(gpu, "counters", size_of::<Counters>() as u64, storage),
+            means: buffer::empty(gpu, "means", plan.mean_bytes(), storage),
+        }
+    }
+
+    fn find(&self, name: &str) -> Option<wgpu::BufferBinding<'_>> {
+        let buffer = match name {
+            "wave" => &self.wave,
+            "units" => &self.units,
+            "step" => {
+                let size = wgpu::BufferSize::new(16);
+                return Some(wgpu::BufferBinding { buffer: &self.steps, offset: 0, size });
+            }
+            "states" => &self.states,
+            "heads" => &self.heads,
+            "records" => &self.records,
+            "throughputs" => self.throughputs.as_ref()?,
+            "counters" => &self.counters,
+            "means" => &self.means,
+            _ => return None,
+        };
+        Some(buffer.as_entire_buffer_binding())
+    }
+}
+
+/// Begin and end of the generate and evaluate passes of a wave.
+struct Timestamps {
+    queries: wgpu::QuerySet,
+    resolved: wgpu::Buffer,
+}
+
+impl Timestamps {
+    fn new(gpu: &Gpu) -> Timestamps {
+        let queries = gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
+            label: Some("timestamps"),
+            ty: wgpu::QueryType::Timestamp,
+            count: 4,
+        });
+        let usage = wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC;
+        Timestamps { queries, resolved: buffer::empty(gpu, "timestamps", 32, usage) }
+    }
+
+    fn resolve(&self, encoder: &mut wgpu::CommandEncoder) {
+        encoder.resolve_query_set(&self.queries, 0..4, &self.resolved, 0);
+    }
+
+    /// Seconds of generate and evaluate.
+    fn read(&self, gpu: &Gpu) -> Result<[f64; 2]> {
+        let ticks: Vec<u64> = buffer::read(gpu, &self.resolved, 32)?;
+        let period = f64::from(gpu.queue.get_timestamp_period()) * 1e-9;
+        Ok([0, 2].map(|i| ticks[i + 1].saturating_sub(ticks[i]) as f64 * period))
+    }
+}

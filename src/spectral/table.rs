@@ -1,0 +1,346 @@
+//! Spectra as the device wants them: for every channel a few strata of the wavelength coordinate μ, in each of them a
+//! value and a slope; and exact knots for what no affordable number of strata resolves.
+
+use super::{Channels, Curve};
+
+/// Pointwise bound relative to the channel's peak (DESIGN section 7).
+pub const POINTWISE_BOUND: f64 = 1e-4;
+/// Most entries (strata x channels) per spectrum.
+const MAX_ENTRIES: usize = 1 << 18;
+/// More strata than this would leave too few bits for the place within one.
+const MAX_STRATUM_BITS: u32 = 12;
+
+/// One spectrum over one stratum of one channel: `value + place * slope`, place in [0, 1).
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Line {
+    value: f64,
+    slope: f64,
+}
+
+/// The tables of a scene. Spectrum ids are positions in `curves` as given to [`SpectralTables::build`], after
+/// reordering: see `id`.
+#[derive(Debug)]
+pub struct SpectralTables {
+    /// Each channel has 2^stratum_bits strata.
+    pub stratum_bits: u32,
+    /// Spectra held in strata; the others, held in knots, have higher ids.
+    pub stratified: usize,
+    /// Channels rounded up to a multiple of four.
+    pub channels_padded: usize,
+    /// [stratum][spectrum][quad][value x 4, slope x 4].
+    pub strata: Vec<f32>,
+    /// First knot of (knotted spectrum, padded channel), with one more entry at the end.
+    pub knot_starts: Vec<u32>,
+    /// (μ, value), μ ascending within a channel.
+    pub knots: Vec<[f32; 2]>,
+    /// Device id of each curve that was given.
+    pub ids: Vec<u32>,
+    /// Reached per curve: largest pointwise error relative to the channel's peak, and largest relative error of a
+    /// channel's mean.
+    pub bounds: Vec<Bounds>,
+}
+
+/// Errors of one spectrum's table over all channels.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Bounds {
+    pub pointwise: f64,
+    pub mean: f64,
+}
+
+impl SpectralTables {
+    /// Tables for `curves` over `channels`, in the order given (spectra that need knots move to the end).
+    pub fn build(curves: &[&Curve], channels: &Channels) -> SpectralTables {
+        let channels_padded = channels.len().next_multiple_of(4);
+        let max_bits = (MAX_ENTRIES / channels_padded).max(1).ilog2().min(MAX_STRATUM_BITS);
+        let needed: Vec<Option<(u32, Bounds)>> = curves.iter().map(|c| strata_needed(c, channels, max_bits)).collect();
+        let stratum_bits = needed.iter().flatten().map(|n| n.0).max().unwrap_or(0);
+
+        // The stratified first, the knotted after them.
+        let stratified: Vec<usize> = (0..curves.len()).filter(|&i| needed[i].is_some()).collect();
+        let knotted: Vec<usize> = (0..curves.len()).filter(|&i| needed[i].is_none()).collect();
+        let mut ids = vec![0; curves.len()];
+        for (id, &i) in stratified.iter().chain(&knotted).enumerate() {
+            ids[i] = id as u32;
+        }
+
+        let mut tables = SpectralTables {
+            stratum_bits,
+            stratified: stratified.len(),
+            channels_padded,
+            strata: vec![0.0; (stratified.len() * channels_padded * 2) << stratum_bits],
+            knot_starts: vec![0],
+            knots: Vec::new(),
+            ids,
+            bounds: vec![Bounds::default(); curves.len()],
+        };
+        for (id, &i) in stratified.iter().enumerate() {
+            tables.bounds[i] = tables.fill_strata(id, curves[i], channels);
+        }
+        for &i in &knotted {
+            tables.bounds[i] = tables.add_knots(curves[i], channels);
+        }
+        tables
+    }
+
+    fn fill_strata(&mut self, id: usize, curve: &Curve, channels: &Channels) -> Bounds {
+        let strata = 1usize << self.stratum_bits;
+        let quads = self.channels_padded / 4;
+        let mut bounds = Bounds::default();
+        for k in 0..channels.len() {
+            let lines = fit_channel(curve, channels, k, strata);
+            bounds = bounds.max(channel_bounds(curve, channels, k, &lines));
+            for (stratum, line) in lines.iter().enumerate() {
+                let at = (((stratum * self.stratified + id) * quads + k / 4) * 2) * 4 + k % 4;
+                self.strata[at] = line.value as f32;
+                self.strata[at + 4] = line.slope as f32;
+            }
+        }
+        bounds
+    }
+
+    fn add_knots(&mut self, curve: &Curve, channels: &Channels) -> Bounds {
+        let mut bounds = Bounds::default();
+        for k in 0..self.channels_padded {
+            if k < channels.len() {
+                let [from, to] = channels.bounds[k];
+                let nodes = curve.linear_pieces(from, to).unwrap_or_else(|| smooth_nodes(curve, from, to));
+                for (nm, value) in &nodes {
+                    self.knots.push([((nm - from) / (to - from)) as f32, *value as f32]);
+                }
+                let area: f64 = nodes.windows(2).map(|w| (w[1].0 - w[0].0) * 0.5 * (w[0].1 + w[1].1)).sum();
+                let exact = curve.mean(from, to);
+                if exact != 0.0 {
+                    bounds.mean = bounds.mean.max((area / (to - from) / exact - 1.0).abs());
+                }
+            } else {
+                self.knots.extend([[0.0, 0.0], [1.0, 0.0]]);
+            }
+            self.knot_starts.push(self.knots.len() as u32);
+        }
+        bounds
+    }
+
+    /// Steps of a binary search that finds the segment in any channel's knots; 0 without knots.
+    pub fn knot_steps(&self) -> u32 {
+        let segments = self.knot_starts.windows(2).map(|w| w[1] - w[0] - 1).max().unwrap_or(0);
+        segments.next_power_of_two().max(1).ilog2()
+    }
+
+    pub fn has_knots(&self) -> bool {
+        !self.knots.is_empty()
+    }
+}
+
+impl Bounds {
+    fn max(self, other: Bounds) -> Bounds {
+        Bounds { pointwise: self.pointwise.max(other.pointwise), mean: self.mean.max(other.mean) }
+    }
+}
+
+/// Stratum bits that keep the bounds in every channel, or `None` where `max_bits` do not.
+fn strata_needed(curve: &Curve, channels: &Channels, max_bits: u32) -> Option<(u32, Bounds)> {
+    let mut bits = 0;
+    let mut worst = Bounds::default();
+    // What satisfied the channels so far is where the next channel starts.
+    for k in 0..channels.len() {
+        loop {
+            let lines = fit_channel(curve, channels, k, 1 << bits);
+            let bounds = channel_bounds(curve, channels, k, &lines);
+            if bounds.pointwise <= POINTWISE_BOUND {
+                worst = worst.max(bounds);
+                break;
+            }
+            bits += 1;
+            if bits > max_bits {
+                return None;
+            }
+        }
+    }
+    Some((bits, worst))
+}
+
+fn fit_channel(curve: &Curve, channels: &Channels, k: usize, strata: usize) -> Vec<Line> {
+    let edge = |j: usize| channels.wavelength(k, j as f64 / strata as f64);
+    (0..strata).map(|j| fit(curve, edge(j), edge(j + 1))).collect()
+}
+
+/// The line over [from, to] with the curve's mean and first moment (so that its product with a linear factor has the
+/// right mean as well), or the curve itself where it is linear; never negative.
+fn fit(curve: &Curve, from: f64, to: f64) -> Line {
+    if let Some(nodes) = curve.linear_pieces(from, to) {
+        if let [(_, a), (_, b)] = nodes[..] {
+            return Line { value: a, slope: b - a };
+        }
+        // Mean and first moment about the middle, exactly, piece by piece; x in [-1/2, 1/2].
+        let (mut mean, mut moment) = (0.0, 0.0);
+        for w in nodes.windows(2) {
+            let x = [0, 1].map(|i| (w[i].0 - from) / (to - from) - 0.5);
+            let (h, y) = (x[1] - x[0], [w[0].1, w[1].1]);
+            mean += 0.5 * h * (y[0] + y[1]);
+            moment += h / 6.0 * (y[0] * (2.0 * x[0] + x[1]) + y[1] * (x[0] + 2.0 * x[1]));
+        }
+        return non_negative(mean, 12.0 * moment);
+    }
+    // Smooth: five Gauss-Legendre points.
+    const NODE: [f64; 3] = [0.0, 0.538_469_310_105_683_1, 0.906_179_845_938_664];
+    const WEIGHT: [f64; 3] = [0.568_888_888_888_888_9, 0.478_628_670_499_366_5, 0.236_926_885_056_189_1];
+    let (mut mean, mut moment) = (0.0, 0.0);
+    for i in 0..3 {
+        for sign in if i == 0 { &[1.0][..] } else { &[-1.0, 1.0][..] } {
+            let x = 0.5 * sign * NODE[i];
+            let y = curve.eval(from + (x + 0.5) * (to - from));
+            mean += 0.5 * WEIGHT[i] * y;
+            moment += 0.5 * WEIGHT[i] * x * y;
+        }
+    }
+    non_negative(mean, 12.0 * moment)
+}
+
+/// The line with this mean and, as far as it stays non-negative, this slope.
+fn non_negative(mean: f64, slope: f64) -> Line {
+    let slope = slope.clamp(-2.0 * mean.max(0.0), 2.0 * mean.max(0.0));
+    Line { value: mean - 0.5 * slope, slope }
+}
+
+fn channel_bounds(curve: &Curve, channels: &Channels, k: usize, lines: &[Line]) -> Bounds {
+    let [from, to] = channels.bounds[k];
+    let peak = curve.max(from, to);
+    if peak <= 0.0 {
+        return Bounds::default();
+    }
+    let strata = lines.len() as f64;
+    let mut pointwise = 0.0f64;
+    for (j, line) in lines.iter().enumerate() {
+        let edge = |j: f64| channels.wavelength(k, j / strata);
+        let (a, b) = (edge(j as f64), edge(j as f64 + 1.0));
+        let nodes = curve.linear_pieces(a, b).unwrap_or_else(|| {
+            (0..=8).map(|i| a + (b - a) * f64::from(i) / 8.0).map(|nm| (nm, curve.eval(nm))).collect()
+        });
+        for (nm, value) in nodes {
+            let place = (nm - a) / (b - a);
+            pointwise = pointwise.max((line.value + place * line.slope - value).abs() / peak);
+        }
+    }
+    let mean = lines.iter().map(|l| l.value + 0.5 * l.slope).sum::<f64>() / strata;
+    let exact = curve.mean(from, to);
+    Bounds { pointwise, mean: if exact != 0.0 { (mean / exact - 1.0).abs() } else { mean.abs() } }
+}
+
+/// A smooth curve as nodes close enough for linear interpolation.
+fn smooth_nodes(curve: &Curve, from: f64, to: f64) -> Vec<(f64, f64)> {
+    let n = (((to / from).ln() * 4096.0).ceil() as usize).clamp(1, 1 << 16);
+    (0..=n)
+        .map(|i| if i == n { to } else { from * (to / from).powf(i as f64 / n as f64) })
+        .map(|nm| (nm, curve.eval(nm)))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spectral::Outside;
+
+    /// The device's lookup, in f32.
+    fn lookup(t: &SpectralTables, curve: usize, k: usize, mu: u32) -> f32 {
+        let id = t.ids[curve] as usize;
+        if id < t.stratified {
+            let stratum = (u64::from(mu) >> (32 - t.stratum_bits)) as usize;
+            let place = ((mu << t.stratum_bits) >> 8) as f32 * 5.9604645e-8;
+            let at = ((stratum * t.stratified + id) * (t.channels_padded / 4) + k / 4) * 8 + k % 4;
+            t.strata[at] + place * t.strata[at + 4]
+        } else {
+            let first = t.knot_starts[(id - t.stratified) * t.channels_padded + k] as usize;
+            let last = t.knot_starts[(id - t.stratified) * t.channels_padded + k + 1] as usize - 1;
+            let mu = (mu >> 8) as f32 * 5.9604645e-8;
+            let i = first + t.knots[first..last].partition_point(|n| n[0] <= mu).max(1) - 1;
+            let [a, b] = [t.knots[i], t.knots[i + 1]];
+            a[1] + ((mu - a[0]) / (b[0] - a[0]).max(1e-30)).clamp(0.0, 1.0) * (b[1] - a[1])
+        }
+    }
+
+    /// The mean over a channel of what the device holds, in f64.
+    fn device_mean(t: &SpectralTables, curve: usize, k: usize) -> f64 {
+        let id = t.ids[curve] as usize;
+        if id < t.stratified {
+            let strata = 1usize << t.stratum_bits;
+            let at = |j: usize| ((j * t.stratified + id) * (t.channels_padded / 4) + k / 4) * 8 + k % 4;
+            let sum: f64 = (0..strata).map(|j| f64::from(t.strata[at(j)]) + 0.5 * f64::from(t.strata[at(j) + 4])).sum();
+            return sum / strata as f64;
+        }
+        let start = (id - t.stratified) * t.channels_padded + k;
+        let range = t.knot_starts[start] as usize..t.knot_starts[start + 1] as usize;
+        let area = |w: &[[f32; 2]]| f64::from(w[1][0] - w[0][0]) * 0.5 * (f64::from(w[0][1]) + f64::from(w[1][1]));
+        t.knots[range].windows(2).map(area).sum()
+    }
+
+    fn table(points: &[(f64, f64)], outside: Outside) -> Curve {
+        let (nm, value) = points.iter().copied().unzip();
+        Curve::Linear { nm, value, outside }
+    }
+
+    /// A jagged table of `n` nodes.
+    fn jagged(n: usize, seed: u32) -> Curve {
+        let value = |i: usize| f64::from(crate::render::rng::hash(seed ^ i as u32)) / 4.3e9;
+        let points: Vec<_> = (0..n).map(|i| (380.0 + 400.0 * i as f64 / (n - 1) as f64, value(i))).collect();
+        table(&points, Outside::Zero)
+    }
+
+    fn check(curve: &Curve, channels: &Channels) {
+        let tables = SpectralTables::build(&[&Curve::Constant(1.0), curve], channels);
+        for k in 0..channels.len() {
+            let [from, to] = channels.bounds[k];
+            let peak = curve.max(from, to);
+            for i in 0..4096u32 {
+                let mu = (i << 20) + (1 << 19);
+                let nm = channels.wavelength(k, f64::from(mu) / 4_294_967_296.0);
+                let got = f64::from(lookup(&tables, 1, k, mu));
+                let allowed = (1.01 * POINTWISE_BOUND + 3e-7) * peak + 1e-30;
+                assert!((got - curve.eval(nm)).abs() <= allowed, "channel {k} at {nm}: {got} {}", curve.eval(nm));
+                assert!(got >= 0.0);
+            }
+            let (mean, exact) = (device_mean(&tables, 1, k), curve.mean(from, to));
+            assert!((mean - exact).abs() <= 1e-5 * exact, "channel {k}: mean {mean} instead of {exact}");
+        }
+    }
+
+    #[test]
+    fn every_kind_of_table_keeps_its_bounds() {
+        let smooth = table(&[(380.0, 0.2), (450.0, 0.5), (601.0, 0.3), (780.0, 0.9)], Outside::Hold);
+        let line = table(&[(380.0, 0.0), (500.0, 0.0), (500.005, 1.0), (500.01, 0.0), (780.0, 0.0)], Outside::Zero);
+        for count in [1, 2, 3, 7, 40, 400, 333] {
+            let channels = Channels::equal(380.0, 780.0, count);
+            check(&smooth, &channels);
+            check(&line, &channels);
+            check(&jagged(101, 5), &channels);
+        }
+        check(&jagged(10_000, 6), &Channels::equal(380.0, 780.0, 8));
+        check(&Curve::Blackbody { kelvin: 300.0, scale: 1.0 }, &Channels::equal(3000.0, 20000.0, 3));
+        check(&Curve::Blackbody { kelvin: 5778.0, scale: 1.0 }, &Channels::equal(380.0, 20000.0, 1));
+        // Ends inside a channel.
+        check(&table(&[(412.3, 0.5), (700.1, 0.25)], Outside::Zero), &Channels::equal(380.0, 780.0, 10));
+    }
+
+    #[test]
+    fn constants_are_exact_and_need_one_stratum() {
+        let channels = Channels::equal(380.0, 780.0, 7);
+        let c = 0.123_456_79_f32;
+        let curve = table(&[(380.0, f64::from(c)), (612.7, f64::from(c)), (780.0, f64::from(c))], Outside::Hold);
+        let tables = SpectralTables::build(&[&Curve::Constant(1.0), &curve, &Curve::Constant(f64::from(c))], &channels);
+        assert_eq!(tables.stratum_bits, 0);
+        for mu in [0, 1, 0x1234_5678, u32::MAX] {
+            for k in 0..7 {
+                assert_eq!(lookup(&tables, 1, k, mu).to_bits(), c.to_bits());
+                assert_eq!(lookup(&tables, 2, k, mu).to_bits(), c.to_bits());
+            }
+        }
+    }
+
+    /// Channels that share their edges with the table's nodes need no strata.
+    #[test]
+    fn aligned_tables_are_exact() {
+        let curve = jagged(101, 1);
+        let tables = SpectralTables::build(&[&curve], &Channels::equal(380.0, 780.0, 400));
+        assert_eq!((tables.stratum_bits, tables.stratified), (0, 1));
+        assert!(tables.bounds[0].pointwise < 1e-12, "{:?}", tables.bounds[0]);
+    }
+}
