@@ -1,0 +1,173 @@
+//! Builds `Scene` values directly in Rust, so that a test needs no files and can say everything in a few lines.
+// Each test binary that includes this module uses a part of it.
+#![allow(dead_code)]
+
+use glam::{DVec2, DVec3};
+use spectile::scene::{
+    Bsdf, Camera, Emission, Environment, Film, Filter, Integrator, Material, Mesh, Object, Projection, Sampler, Scene,
+    Shape, Sides, Spectrum, Wavelengths,
+};
+use spectile::spectral::{Channels, Curve};
+
+/// A scene under construction. Starts empty and dark: one pixel that looks along -z from (0, 0, 1), one channel
+/// 500-600 nm, one bounce.
+pub struct Builder(pub Scene);
+
+impl Builder {
+    pub fn new() -> Self {
+        Builder(Scene {
+            file: "built-in-a-test".into(),
+            camera: look(DVec3::Z, DVec3::ZERO, DVec3::Y, narrow()),
+            film: Film { width: 1, height: 1, filter: Filter::Box, crop: [0, 0, 1, 1] },
+            channels: Channels::from_bounds(vec![[500.0, 600.0]], None),
+            integrator: Integrator {
+                max_bounces: 1,
+                russian_roulette_start: 0,
+                sampler: Sampler::Independent,
+                wavelengths: Wavelengths::Uniform,
+                evaluator: "auto".into(),
+                epoch: 64,
+            },
+            spectra: Vec::new(),
+            materials: Vec::new(),
+            objects: Vec::new(),
+            environment: None,
+            warnings: Vec::new(),
+            digest: String::new(),
+        })
+    }
+
+    pub fn camera(mut self, camera: Camera) -> Self {
+        self.0.camera = camera;
+        self
+    }
+
+    /// A film without crop.
+    pub fn film(mut self, width: u32, height: u32, filter: Filter) -> Self {
+        self.0.film = Film { width, height, filter, crop: [0, 0, width, height] };
+        self
+    }
+
+    pub fn channels(mut self, channels: Channels) -> Self {
+        self.0.channels = channels;
+        self
+    }
+
+    pub fn bounces(mut self, max_bounces: u32) -> Self {
+        self.0.integrator.max_bounces = max_bounces;
+        self
+    }
+
+    pub fn roulette(mut self, start: u32) -> Self {
+        self.0.integrator.russian_roulette_start = start;
+        self
+    }
+
+    pub fn sky(mut self, radiance: impl IntoCurve) -> Self {
+        let radiance = self.spectrum(radiance);
+        self.0.environment = Some(Environment { radiance });
+        self
+    }
+
+    /// A shape that reflects and does not emit, on both sides.
+    pub fn diffuse(mut self, shape: Shape, reflectance: impl IntoCurve) -> Self {
+        let reflectance = self.spectrum(reflectance);
+        self.object(shape, Bsdf::Diffuse { reflectance }, true, None)
+    }
+
+    pub fn one_sided(mut self, shape: Shape, reflectance: impl IntoCurve) -> Self {
+        let reflectance = self.spectrum(reflectance);
+        self.object(shape, Bsdf::Diffuse { reflectance }, false, None)
+    }
+
+    /// A shape that reflects and emits.
+    pub fn glowing(
+        mut self,
+        shape: Shape,
+        reflectance: impl IntoCurve,
+        radiance: impl IntoCurve,
+        sides: Sides,
+    ) -> Self {
+        let (reflectance, radiance) = (self.spectrum(reflectance), self.spectrum(radiance));
+        self.object(shape, Bsdf::Diffuse { reflectance }, true, Some(Emission { radiance, sides }))
+    }
+
+    /// A shape that emits and reflects nothing.
+    pub fn lamp(mut self, shape: Shape, radiance: impl IntoCurve, sides: Sides) -> Self {
+        let radiance = self.spectrum(radiance);
+        self.object(shape, Bsdf::Black, true, Some(Emission { radiance, sides }))
+    }
+
+    pub fn black(self, shape: Shape) -> Self {
+        self.object(shape, Bsdf::Black, true, None)
+    }
+
+    pub fn build(self) -> Scene {
+        self.0
+    }
+
+    fn spectrum(&mut self, curve: impl IntoCurve) -> usize {
+        let name = format!("spectrum {}", self.0.spectra.len());
+        self.0.spectra.push(Spectrum { name, curve: curve.into_curve() });
+        self.0.spectra.len() - 1
+    }
+
+    fn object(mut self, shape: Shape, bsdf: Bsdf, two_sided: bool, emission: Option<Emission>) -> Self {
+        let material = self.0.materials.len();
+        self.0.materials.push(Material { name: format!("material {material}"), bsdf, two_sided });
+        let name = format!("objects.{}", self.0.objects.len());
+        self.0.objects.push(Object { name, shape, material, emission });
+        self
+    }
+}
+
+/// A number or a curve.
+pub trait IntoCurve {
+    fn into_curve(self) -> Curve;
+}
+
+impl IntoCurve for f64 {
+    fn into_curve(self) -> Curve {
+        Curve::Constant(self)
+    }
+}
+
+impl IntoCurve for Curve {
+    fn into_curve(self) -> Curve {
+        self
+    }
+}
+
+/// A projection so narrow that all rays of a film go to one point to within 1e-9 of the distance.
+pub fn narrow() -> Projection {
+    Projection::Perspective { tan_half: DVec2::splat(1e-9) }
+}
+
+/// A camera at `position` that looks at `target`; `up` must not be along the line of sight.
+pub fn look(position: DVec3, target: DVec3, up: DVec3, projection: Projection) -> Camera {
+    let forward = (target - position).normalize();
+    let right = forward.cross(up).normalize();
+    Camera { position, forward, right, up: right.cross(forward), projection }
+}
+
+/// A parallelogram with normal edge_u x edge_v.
+pub fn quad(corner: DVec3, edge_u: DVec3, edge_v: DVec3) -> Shape {
+    let positions = vec![corner, corner + edge_u, corner + edge_u + edge_v, corner + edge_v];
+    Shape::Mesh(Mesh { positions, triangles: vec![[0, 1, 2], [0, 2, 3]] })
+}
+
+/// The six faces of a box whose normals point inwards.
+pub fn room(min: DVec3, max: DVec3) -> Shape {
+    let corner = |i: u32| DVec3::select(glam::BVec3::new(i & 1 != 0, i & 2 != 0, i & 4 != 0), max, min);
+    let faces = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]];
+    let triangles = faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    Shape::Mesh(Mesh { positions: (0..8).map(corner).collect(), triangles })
+}
+
+pub fn disk(center: DVec3, normal: DVec3, radius: f64) -> Shape {
+    Shape::Disk { center, normal, radius }
+}
+
+pub fn sphere(center: DVec3, radius: f64) -> Shape {
+    Shape::Sphere { center, radius }
+}
