@@ -1,0 +1,107 @@
+//! Renders a scene on the first device and keeps the means of every epoch, for tests that compare and count.
+// Each test binary that includes this module uses a part of it.
+#![allow(dead_code)]
+
+use std::sync::{Arc, Mutex, MutexGuard};
+
+use spectile::gpu::adapter::Gpu;
+use spectile::gpu::layout::Counters;
+use spectile::render::prepare::Prepared;
+use spectile::render::worker::{UnitRect, Worker};
+use spectile::scene::Scene;
+
+/// How to render in a test.
+#[derive(Debug, Clone, Copy)]
+pub struct Settings {
+    pub seed: u64,
+    pub tile: [u32; 2],
+    /// Upper bound on paths per wave.
+    pub max_paths: Option<u32>,
+    /// Units submitted together at most.
+    pub units: usize,
+    /// Run the shaders with the translator's bounds checks.
+    pub checked: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Settings { seed: 0, tile: [16, 16], max_paths: None, units: usize::MAX, checked: false }
+    }
+}
+
+/// The means of equal epochs of one image.
+pub struct Epochs {
+    pub width: usize,
+    pub height: usize,
+    pub channels: usize,
+    /// `means[epoch][(y * width + x) * channels + k]`.
+    pub means: Vec<Vec<f32>>,
+    pub counters: Counters,
+}
+
+/// One device at a time: two cores gain nothing from more.
+fn turn() -> MutexGuard<'static, ()> {
+    static TURN: Mutex<()> = Mutex::new(());
+    TURN.lock().unwrap_or_else(|e| e.into_inner())
+}
+
+/// Renders `epochs` epochs of `samples` samples per pixel (a power of two) of the film's crop.
+pub fn render(scene: &Scene, epochs: u32, samples: u32, settings: Settings) -> Epochs {
+    let _turn = turn();
+    let mut gpu = Gpu::open().expect("a device");
+    if settings.checked {
+        gpu.shader_checks = wgpu::ShaderRuntimeChecks::checked();
+    }
+    let prepared = Arc::new(Prepared::new(scene, settings.seed).expect("a scene that fits"));
+    let mut worker = Worker::new(gpu, prepared, settings.tile, settings.max_paths).expect("a worker");
+    let [x0, y0, x1, y1] = scene.film.crop;
+    let [tw, th] = settings.tile;
+    let tiles: Vec<UnitRect> = (y0..y1)
+        .step_by(th as usize)
+        .flat_map(|y| (x0..x1).step_by(tw as usize).map(move |x| [x, y, (x + tw).min(x1), (y + th).min(y1)]))
+        .collect();
+    let (width, height, channels) = ((x1 - x0) as usize, (y1 - y0) as usize, scene.channels.len());
+    let mut counters = Counters::default();
+    let means = (0..epochs)
+        .map(|epoch| {
+            let mut image = vec![f32::NAN; width * height * channels];
+            let mut place = |collected: spectile::render::worker::Collected| {
+                counters.overflow += collected.counters.overflow;
+                counters.non_finite += collected.counters.non_finite;
+                counters.negative += collected.counters.negative;
+                let unit_size = (tw * th) as usize * channels;
+                for (unit, means) in collected.units.iter().zip(collected.means.chunks(unit_size)) {
+                    for y in unit[1]..unit[3] {
+                        for x in unit[0]..unit[2] {
+                            let from = ((y - unit[1]) * tw + x - unit[0]) as usize * channels;
+                            let to = ((y - y0) as usize * width + (x - x0) as usize) * channels;
+                            image[to..to + channels].copy_from_slice(&means[from..from + channels]);
+                        }
+                    }
+                }
+                Ok(())
+            };
+            let at_once = worker.plan.units_at_once(samples).min(settings.units);
+            for units in tiles.chunks(at_once) {
+                worker.submit(units, epoch, samples, &mut place).expect("a submission");
+            }
+            worker.collect(&mut place).expect("results");
+            image
+        })
+        .collect();
+    Epochs { width, height, channels, means, counters }
+}
+
+impl Epochs {
+    /// Mean over epochs and its standard error, of every value.
+    pub fn estimate(&self) -> (Vec<f64>, Vec<f64>) {
+        let n = self.means.len() as f64;
+        (0..self.means[0].len())
+            .map(|i| {
+                let mean = self.means.iter().map(|m| f64::from(m[i])).sum::<f64>() / n;
+                let square = self.means.iter().map(|m| (f64::from(m[i]) - mean).powi(2)).sum::<f64>();
+                (mean, (square / (n - 1.0) / n).sqrt())
+            })
+            .unzip()
+    }
+}
