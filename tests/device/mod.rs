@@ -10,6 +10,8 @@ use spectile::render::prepare::Prepared;
 use spectile::render::worker::{UnitRect, Worker};
 use spectile::scene::Scene;
 
+use crate::statistics::Estimate;
+
 /// How to render in a test.
 #[derive(Debug, Clone, Copy)]
 pub struct Settings {
@@ -21,11 +23,13 @@ pub struct Settings {
     pub units: usize,
     /// Run the shaders with the translator's bounds checks.
     pub checked: bool,
+    /// Pretend that the device binds at most so many bytes.
+    pub binding: Option<u64>,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Settings { seed: 0, tile: [16, 16], max_paths: None, units: usize::MAX, checked: false }
+        Settings { seed: 0, tile: [16, 16], max_paths: None, units: usize::MAX, checked: false, binding: None }
     }
 }
 
@@ -51,6 +55,9 @@ pub fn render(scene: &Scene, epochs: u32, samples: u32, settings: Settings) -> E
     let mut gpu = Gpu::open().expect("a device");
     if settings.checked {
         gpu.shader_checks = wgpu::ShaderRuntimeChecks::checked();
+    }
+    if let Some(binding) = settings.binding {
+        gpu.limits.max_storage_buffer_binding_size = binding;
     }
     let prepared = Arc::new(Prepared::new(scene, settings.seed).expect("a scene that fits"));
     let mut worker = Worker::new(gpu, prepared, settings.tile, settings.max_paths).expect("a worker");
@@ -93,15 +100,28 @@ pub fn render(scene: &Scene, epochs: u32, samples: u32, settings: Settings) -> E
 }
 
 impl Epochs {
-    /// Mean over epochs and its standard error, of every value.
-    pub fn estimate(&self) -> (Vec<f64>, Vec<f64>) {
-        let n = self.means.len() as f64;
-        (0..self.means[0].len())
-            .map(|i| {
-                let mean = self.means.iter().map(|m| f64::from(m[i])).sum::<f64>() / n;
-                let square = self.means.iter().map(|m| (f64::from(m[i]) - mean).powi(2)).sum::<f64>();
-                (mean, (square / (n - 1.0) / n).sqrt())
-            })
-            .unzip()
+    /// Mean of every value over the epochs, [y][x][k].
+    pub fn values(&self) -> Vec<Estimate> {
+        let value = |i: usize| Estimate::of(self.means.iter().map(|m| f64::from(m[i])));
+        (0..self.means[0].len()).map(value).collect()
+    }
+
+    /// Mean of every channel over the image, from the spread of the epochs.
+    pub fn image_means(&self) -> Vec<Estimate> {
+        let pixels = (self.width * self.height) as f64;
+        let mean = |m: &Vec<f32>, k: usize| m.iter().skip(k).step_by(self.channels).map(|v| f64::from(*v)).sum::<f64>() / pixels;
+        (0..self.channels).map(|k| Estimate::of(self.means.iter().map(|m| mean(m, k)))).collect()
+    }
+
+    /// Every channel where all pixels show the same point, so that pixels and epochs are replicas of one another.
+    pub fn replicas(&self) -> Vec<Estimate> {
+        let of_channel = |k: usize| self.means.iter().flat_map(move |m| m.iter().skip(k).step_by(self.channels));
+        (0..self.channels).map(|k| Estimate::of(of_channel(k).map(|v| f64::from(*v)))).collect()
+    }
+
+    /// No sample was lost, negative or not finite.
+    pub fn assert_clean(&self) {
+        let Counters { overflow, non_finite, negative, .. } = self.counters;
+        assert_eq!((overflow, non_finite, negative), (0, 0, 0), "overflow, non-finite, negative");
     }
 }

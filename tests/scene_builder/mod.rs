@@ -171,3 +171,42 @@ pub fn disk(center: DVec3, normal: DVec3, radius: f64) -> Shape {
 pub fn sphere(center: DVec3, radius: f64) -> Shape {
     Shape::Sphere { center, radius }
 }
+
+/// An icosahedron whose triangles are split in four `levels` times, vertices pushed onto the sphere; outward normals.
+pub fn icosphere(center: DVec3, radius: f64, levels: u32) -> Shape {
+    let golden = 0.5 * (1.0 + 5f64.sqrt());
+    let mut positions: Vec<DVec3> = Vec::new();
+    for (a, b) in [(1.0, golden), (-1.0, golden), (1.0, -golden), (-1.0, -golden)] {
+        positions.extend([DVec3::new(0.0, a, b), DVec3::new(a, b, 0.0), DVec3::new(b, 0.0, a)].map(DVec3::normalize));
+    }
+    // Its faces are the triples of vertices at edge distance from one another.
+    let edge = 2.0 / (1.0 + golden * golden).sqrt();
+    let near = |a: usize, b: usize| (positions[a].distance(positions[b]) - edge).abs() < 1e-9;
+    let mut triangles = Vec::new();
+    for a in 0..12 {
+        for b in a + 1..12 {
+            for c in b + 1..12 {
+                if near(a, b) && near(b, c) && near(c, a) {
+                    let outward = (positions[b] - positions[a]).cross(positions[c] - positions[a]).dot(positions[a]) > 0.0;
+                    triangles.push(if outward { [a, b, c] } else { [a, c, b] }.map(|i| i as u32));
+                }
+            }
+        }
+    }
+    for _ in 0..levels {
+        let mut middles = std::collections::HashMap::new();
+        let mut finer = Vec::new();
+        for [a, b, c] in triangles {
+            let mut middle = |i: u32, j: u32| {
+                *middles.entry((i.min(j), i.max(j))).or_insert_with(|| {
+                    positions.push((positions[i as usize] + positions[j as usize]).normalize());
+                    positions.len() as u32 - 1
+                })
+            };
+            let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+            finer.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
+        }
+        triangles = finer;
+    }
+    Shape::Mesh(Mesh { positions: positions.into_iter().map(|p| center + radius * p).collect(), triangles })
+}
