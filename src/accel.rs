@@ -193,18 +193,36 @@ impl Boundable for Primitive {
 /// Deepest tree that the shader's traversal stack can take (`STACK_SIZE` in bvh.wgsl).
 const MAX_DEPTH: usize = 30;
 
+/// Clustering takes quadratic time, and recursion as deep, over boxes that are the same: it merges one pair a round.
+const MAX_COINCIDENT: usize = 256;
+
 /// The nodes, and for each place in the leaves the primitive that stands there.
 fn build_nodes(primitives: &[Primitive]) -> (Vec<[u32; 20]>, Vec<u32>) {
     if primitives.is_empty() {
         return (vec![[0; 20]], Vec::new());
     }
-    let mut bvh = build_cwbvh(primitives, BvhBuildParams::medium_build(), &mut std::time::Duration::default());
-    if depth(&bvh) > MAX_DEPTH {
-        // Many coincident boxes: clustering by surface area then builds chains instead of trees.
-        bvh = bvh2_to_cwbvh(&balanced(primitives), 3, true, false);
-    }
+    let clustered = (most_coincident(primitives) <= MAX_COINCIDENT)
+        .then(|| build_cwbvh(primitives, BvhBuildParams::medium_build(), &mut std::time::Duration::default()))
+        // Nested boxes become chains instead of trees.
+        .filter(|bvh| depth(bvh) <= MAX_DEPTH);
+    let bvh = clustered.unwrap_or_else(|| bvh2_to_cwbvh(&balanced(primitives), 3, true, false));
     let nodes = bvh.nodes.iter().map(|node| bytemuck::cast(*node)).collect();
     (nodes, bvh.primitive_indices)
+}
+
+/// The largest number of primitives that share one bounding box (by hashes: a collision may only overstate it).
+fn most_coincident(primitives: &[Primitive]) -> usize {
+    let mut hashes: Vec<u64> = primitives
+        .iter()
+        .map(|p| {
+            let Aabb { min, max } = p.aabb();
+            let bits = min.to_array().into_iter().chain(max.to_array()).map(|x| u64::from(x.to_bits()));
+            // Fowler, Noll and Vo's prime, a word at a time.
+            bits.fold(0xcbf2_9ce4_8422_2325, |h: u64, b| (h ^ b).wrapping_mul(0x0100_0000_01b3).rotate_left(29))
+        })
+        .collect();
+    hashes.sort_unstable();
+    hashes.chunk_by(|a, b| a == b).map(<[u64]>::len).max().unwrap_or(0)
 }
 
 /// Levels of nodes.
@@ -258,7 +276,8 @@ mod tests {
     #[test]
     fn trees_are_valid_on_odd_input() {
         let one = vec![triangle([0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])];
-        let coincident = vec![one[0]; 5000];
+        let coincident = vec![one[0]; 100_000];
+        let nested: Vec<_> = (1..5000).map(|i| triangle([-i as f32, -i as f32, 0.0], [i as f32, -i as f32, 0.0], [0.0, i as f32, 0.0])).collect();
         let grid: Vec<_> = (0..40_000)
             .map(|i| {
                 let (x, y) = ((i % 200) as f32, (i / 200) as f32);
@@ -266,7 +285,7 @@ mod tests {
             })
             .collect();
         let flat: Vec<_> = (0..100).map(|i| triangle([i as f32, 0.0, 0.0], [i as f32 + 1e-6, 0.0, 0.0], [i as f32, 0.0, 1.0])).collect();
-        for primitives in [one, coincident, grid, flat] {
+        for primitives in [one, coincident, nested, grid, flat] {
             let (nodes, order) = build_nodes(&primitives);
             let mut seen = order.clone();
             seen.sort_unstable();
