@@ -26,7 +26,8 @@ struct RecordList {
 fn append(list: ptr<function, RecordList>, factor: u32, source: u32, weight: f32) {
     records[(*list).path * frame.max_records + (*list).count] = vec2<u32>(factor | (source << 16u), bitcast<u32>(weight));
     (*list).count += 1u;
-    if (weight > 0.0) {
+    // By the bits: a weight that is not a number must reach evaluation, which counts it.
+    if (bitcast<u32>(weight) != 0u) {
         (*list).used = (*list).count;
     }
 }
@@ -128,13 +129,10 @@ fn generate_bounce(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 #endif
 #if EMITTERS
 #if ENVIRONMENT
-    else {
-        let u_emitter = (u_choice.x - frame.environment_pick) / (1.0 - frame.environment_pick);
-#else
-    {
-        let u_emitter = u_choice.x;
+    else
 #endif
-        let emitter = emitters[choose_emitter(u_emitter)];
+    {
+        let emitter = emitters[choose_emitter(u_choice.x)];
         let point = sample_emitter(emitter, origin, u_light);
         let towards = point.position - origin;
         let cosine = dot(normal, towards) / length(towards);
@@ -160,6 +158,9 @@ fn generate_bounce(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     if (step.bounce + 1u >= frame.roulette_start) {
         let survival = clamp(material.albedo, 0.05, 1.0);
         if (u_choice.y >= survival) {
+            if (overflow) {
+                atomicAdd(&counters[COUNTER_OVERFLOW], 1u);
+            }
             end_path(list, 2u * step.bounce + 2u);
             return;
         }

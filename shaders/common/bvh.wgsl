@@ -145,6 +145,13 @@ fn scaled_to_one(v: vec3<f32>) -> vec3<f32> {
     return v / max(max(a.x, a.y), max(a.z, 1.0e-37));
 }
 
+// The geometric normal. The edges of a sliver may round to parallel ones: any direction is as good then, but not NaN.
+fn triangle_normal(a: vec3<f32>, b: vec3<f32>, c: vec3<f32>) -> vec3<f32> {
+    let n = scaled_to_one(cross(scaled_to_one(b - a), scaled_to_one(c - a)));
+    let length2 = dot(n, n);
+    return select(vec3<f32>(0.0, 0.0, 1.0), n * inverseSqrt(max(length2, 1.0e-30)), length2 > 0.0);
+}
+
 fn surface_at(ray: Ray, hit: Hit) -> Surface {
     let w0 = load_primitive(hit.primitive, 0u);
     let w1 = load_primitive(hit.primitive, 1u);
@@ -160,6 +167,5 @@ fn surface_at(ray: Ray, hit: Hit) -> Surface {
 #endif
     // From the vertices: more exact than along the ray.
     let p = (1.0 - hit.u - hit.v) * w0.xyz + hit.u * w1.xyz + hit.v * w2.xyz;
-    let n = normalize(cross(scaled_to_one(w1.xyz - w0.xyz), scaled_to_one(w2.xyz - w0.xyz)));
-    return Surface(p, n, material, emitter);
+    return Surface(p, triangle_normal(w0.xyz, w1.xyz, w2.xyz), material, emitter);
 }

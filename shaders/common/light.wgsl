@@ -112,7 +112,7 @@ fn sample_emitter(emitter: Emitter, origin: vec3<f32>, u: vec2<f32>) -> LightPoi
     let offset = b.y - b.x;
     b += select(vec2<f32>(-offset, 0.0) , vec2<f32>(0.0, offset), offset > 0.0);
     p = (1.0 - b.x - b.y) * w0.xyz + b.x * w1.xyz + b.y * w2.xyz;
-    n = normalize(cross(scaled_to_one(w1.xyz - w0.xyz), scaled_to_one(w2.xyz - w0.xyz)));
+    n = triangle_normal(w0.xyz, w1.xyz, w2.xyz);
 #if SHAPES
     }
 #endif

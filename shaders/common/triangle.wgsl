@@ -35,7 +35,8 @@ fn intersect_triangle(ray: ShearedRay, a_in: vec3<f32>, b_in: vec3<f32>, c_in: v
     if (!(all(left >= right) || all(left <= right))) {
         return vec3<f32>(-1.0, 0.0, 0.0);
     }
-    let edge = left - right;
+    // A tie is exactly 0, also where a compiler fuses the difference: residues of rounding would make up a hit edge-on.
+    let edge = select(left - right, vec3<f32>(0.0), left == right);
     let determinant = edge.x + edge.y + edge.z;
     if (determinant == 0.0) {
         return vec3<f32>(-1.0, 0.0, 0.0);

@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 pub struct LightPicks {
     /// The environment's probability; multiples of 2⁻²⁴, like the random numbers that decide.
     pub environment: f64,
-    /// Upper ends of the emitters' intervals in [0, 1], given that it is not the environment.
+    /// Upper ends of the emitters' intervals, which lie above the environment's.
     pub cdf: Vec<f32>,
     /// Probability of each emitter, exactly what the device's choice amounts to.
     pub emitters: Vec<f64>,
@@ -52,17 +52,24 @@ pub fn light_picks(scene: &Scene, accel: &Accel) -> LightPicks {
     };
     let share_of = |spectrum: usize| groups.iter().position(|g| g.0 == Some(spectrum)).map_or(0.0, |g| shares[g] / groups[g].1);
     let weights: Vec<f64> = accel.emitters.iter().map(|e| share_of(emitted(e.1).radiance) * area_of(e)).collect();
+    let (cdf, emitters) = intervals(environment, &weights);
+    LightPicks { environment, cdf, emitters }
+}
+
+/// Upper ends of the intervals in which a random number chooses each emitter, above the environment's [0, environment),
+/// and their widths. All are multiples of 2⁻²⁴, like the random numbers, so that the widths are the probabilities.
+fn intervals(environment: f64, weights: &[f64]) -> (Vec<f32>, Vec<f64>) {
     let total: f64 = weights.iter().sum();
-    let mut picks = LightPicks { environment, ..LightPicks::default() };
-    let (mut sum, mut last) = (0.0, 0.0);
-    for (i, weight) in weights.iter().enumerate() {
+    let (mut sum, mut last) = (0.0, environment);
+    let end_of = |(i, weight): (usize, &f64)| {
         sum += if total > 0.0 { weight / total } else { 1.0 / weights.len() as f64 };
-        let end = if i + 1 == weights.len() { 1.0 } else { (sum.min(1.0) * STEPS).round() / STEPS };
-        picks.cdf.push(end as f32);
-        picks.emitters.push((end - last) * (1.0 - environment));
+        let end = environment + sum.min(1.0) * (1.0 - environment);
+        let end = if i + 1 == weights.len() { 1.0 } else { (end * STEPS).round() / STEPS };
+        let width = end - last;
         last = end;
-    }
-    picks
+        (end as f32, width)
+    };
+    weights.iter().enumerate().map(end_of).unzip()
 }
 
 /// Random numbers on the device have 24 bits.
@@ -85,7 +92,28 @@ fn probabilities(powers: &[Vec<f64>]) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::probabilities;
+    use super::{intervals, probabilities};
+
+    /// Emitters of all weights beside an environment that leaves them little or nothing: every random number of 24 bits
+    /// is counted.
+    #[test]
+    fn probabilities_are_exactly_what_the_choice_amounts_to() {
+        let steps = 16_777_216u32;
+        let weights: Vec<f64> = (0..300).map(|i| f64::from(i % 7) * 10f64.powi(-(i % 5))).collect();
+        for environment in [0.0, 0.5, 1.0 - 1000.0 / f64::from(steps), 1.0 - 1.0 / f64::from(steps)] {
+            let (cdf, emitters) = intervals(environment, &weights);
+            let mut counts = vec![0u32; weights.len()];
+            for u in (environment * f64::from(steps)) as u32..steps {
+                let u = u as f32 / steps as f32;
+                counts[cdf.partition_point(|&end| end <= u)] += 1;
+            }
+            for (i, probability) in emitters.iter().enumerate() {
+                assert_eq!(*probability, f64::from(counts[i]) / f64::from(steps), "environment {environment}, emitter {i}");
+                let wanted = (1.0 - environment) * weights[i] / weights.iter().sum::<f64>();
+                assert!((probability - wanted).abs() <= 1.0 / f64::from(steps), "environment {environment}, emitter {i}");
+            }
+        }
+    }
 
     #[test]
     fn shares_follow_design_section_6() {
