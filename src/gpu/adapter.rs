@@ -36,8 +36,9 @@ pub struct Gpu {
     _instance: wgpu::Instance,
 }
 
-/// Storage buffers that the largest pass binds at once: 3 of the scene, 4 windows each of nodes and primitives, 8 of the wave.
-const STORAGE_BUFFERS: u32 = 16;
+/// Storage buffers that the largest pass binds at once, generate_bounce under roulette: 3 of the scene, 4 windows each of
+/// nodes and primitives, 6 of the wave.
+pub const STORAGE_BUFFERS: u32 = 17;
 
 fn instance() -> wgpu::Instance {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
