@@ -1,0 +1,201 @@
+//! Every shader that a scene can compose, without a device: parsed and validated by naga, made into a pipeline on wgpu's
+//! `noop` backend, small, and free of what the scene does not need.
+
+mod scene_builder;
+
+use glam::{DVec2, DVec3};
+use naga::valid::{Capabilities, ValidationFlags, Validator};
+use scene_builder::*;
+use spectile::gpu::adapter::STORAGE_BUFFERS;
+use spectile::gpu::shader::{Module, Source, compose};
+use spectile::render::prepare::{EvaluateShape, Features, Prepared, WindowList, Windows};
+use spectile::scene::{Filter, Projection, Sampler, Scene, Sides};
+use spectile::spectral::Channels;
+
+/// Bytes of a kernel's code, comments and indentation apart: of a plain scene's, and of one that needs everything and spreads its
+/// geometry over four windows. More is a sign that something is compiled in twice or without need.
+const MAX_PLAIN_BYTES: usize = 18 << 10;
+const MAX_BYTES: usize = 32 << 10;
+
+fn plain_scene() -> Scene {
+    Builder::new()
+        .channels(Channels::equal(400.0, 700.0, 10))
+        .diffuse(room(DVec3::NEG_ONE, DVec3::ONE), 0.5)
+        .lamp(quad(DVec3::new(-0.3, 0.9, -0.3), 0.6 * DVec3::X, 0.6 * DVec3::Z), 1.0, Sides::Front)
+        .build()
+}
+
+fn windows(nodes: u32, primitives: u32) -> Windows {
+    Windows { nodes: WindowList { count: nodes, size: 1000 }, primitives: WindowList { count: primitives, size: 2000 } }
+}
+
+/// The three passes of `prepared`, as the worker composes them.
+fn passes(prepared: &Prepared, windows: &Windows, shape: EvaluateShape) -> [Source; 3] {
+    let defines = prepared.defines(windows);
+    let generate = |modules: &[Module]| compose(modules, &defines);
+    [
+        generate(&prepared.camera_modules()),
+        generate(&prepared.bounce_modules()),
+        compose(&prepared.evaluate_modules(), &prepared.evaluate_defines(shape)),
+    ]
+}
+
+/// All combinations of the features that change a pass's text; combinations that no scene has are left out.
+fn combinations() -> Vec<Features> {
+    let bit = |i: u32, at: u32| i >> at & 1 == 1;
+    (0..1u32 << 11)
+        .map(|i| Features {
+            thin_lens: bit(i, 0),
+            orthographic: bit(i, 1),
+            gaussian: bit(i, 2),
+            independent: bit(i, 3),
+            emitters: bit(i, 4),
+            environment: bit(i, 5),
+            shapes: bit(i, 6),
+            roulette: bit(i, 7),
+            strata: bit(i, 8),
+            knots: bit(i, 9),
+            registers: bit(i, 10),
+        })
+        .filter(|f| !(f.thin_lens && f.orthographic) && !(f.knots && f.registers))
+        .collect()
+}
+
+/// Every distinct text, with a description of what it was composed for.
+fn all_sources() -> Vec<(String, Source)> {
+    let mut prepared = Prepared::new(&plain_scene(), 0).unwrap();
+    let shapes = [(1, 8), (3, 8), (25, 8), (500, 8), (1250, 32)].map(|(quads, vector)| EvaluateShape::new(quads, vector));
+    let mut found = std::collections::HashMap::new();
+    for (i, features) in combinations().into_iter().enumerate() {
+        prepared.features = features;
+        // Windows and workgroups take turns among the combinations, and all are seen with all features off and on.
+        let windows = windows(1 + i as u32 % 4, 1 + i as u32 / 4 % 4);
+        for source in passes(&prepared, &windows, shapes[i % shapes.len()]) {
+            found.entry(source.text.clone()).or_insert_with(|| (format!("{} for {features:?}, {windows:?}", source.label), source));
+        }
+    }
+    found.into_values().collect()
+}
+
+fn code_bytes(text: &str) -> usize {
+    text.lines().map(|l| l.split("//").next().unwrap_or("").trim()).filter(|l| !l.is_empty()).map(|l| l.len() + 1).sum()
+}
+
+fn validate(what: &str, source: &Source) -> naga::Module {
+    let module = source.parse().unwrap_or_else(|e| panic!("{what}: {e}"));
+    let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
+    validator.validate(&module).unwrap_or_else(|e| panic!("{what}: {}", e.emit_to_string(&source.text)));
+    module
+}
+
+/// Every composed text parses, validates with no capability beyond the core, has one entry point called like its file,
+/// and stays small.
+#[test]
+fn every_permutation_is_valid() {
+    let sources = all_sources();
+    assert!(sources.len() > 200, "{} texts", sources.len());
+    for (what, source) in &sources {
+        let module = validate(what, source);
+        let names: Vec<&str> = module.entry_points.iter().map(|e| e.name.as_str()).collect();
+        assert_eq!(names, [source.label.trim_end_matches(".wgsl")], "{what}");
+        assert!(code_bytes(&source.text) <= MAX_BYTES, "{what}: {} bytes", code_bytes(&source.text));
+    }
+}
+
+/// wgpu makes pipelines of them: a sample of all permutations, each feature on and off in each pass.
+#[test]
+fn pipelines_on_the_noop_backend() {
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+    descriptor.backends = wgpu::Backends::NOOP;
+    descriptor.backend_options.noop.enable = true;
+    let instance = wgpu::Instance::new(descriptor);
+    let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default())).expect("noop");
+    let (device, _queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+        // No more than `gpu::adapter` asks of a device.
+        required_limits: wgpu::Limits { max_storage_buffers_per_shader_stage: STORAGE_BUFFERS, ..wgpu::Limits::default() },
+        ..Default::default()
+    }))
+    .expect("a noop device");
+    for (what, source) in all_sources().iter().step_by(3) {
+        let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(source.label),
+            source: wgpu::ShaderSource::Wgsl(source.text.as_str().into()),
+        });
+        device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(source.label),
+            layout: None,
+            module: &module,
+            entry_point: None,
+            compilation_options: Default::default(),
+            cache: None,
+        });
+        let error = pollster::block_on(scope.pop());
+        assert!(error.is_none(), "{what}: {error:?}");
+    }
+}
+
+// ---- What a scene does not need
+
+fn texts(scene: &Scene) -> [String; 3] {
+    let prepared = Prepared::new(scene, 0).unwrap();
+    passes(&prepared, &windows(1, 1), EvaluateShape::new(3, 8)).map(|s| s.text)
+}
+
+/// Identifiers of the code, comments apart.
+fn words(text: &str) -> std::collections::HashSet<String> {
+    let code: String = text.lines().map(|l| l.split("//").next().unwrap_or("").to_lowercase() + "\n").collect();
+    code.split(|c: char| !c.is_alphanumeric() && c != '_').map(str::to_owned).collect()
+}
+
+/// A room of triangles and one lamp has no word of what it does not use in any shader.
+#[test]
+fn a_plain_scene_pays_for_nothing_else() {
+    let texts = texts(&plain_scene());
+    for text in &texts {
+        let words = words(text);
+        // Words of other features, but for the fields of structures that are the same for every scene, and hemispheres.
+        let foreign = ["sphere", "disk", "cylinder", "shape", "gaussian", "inverse_erf", "lens", "orthographic", "roulette", "survival", "knot", "window", "reversebits"];
+        let allowed = ["roulette_start", "cosine_hemisphere", "concentric_disk", "dimension_lens"];
+        for part in foreign {
+            let found: Vec<_> = words.iter().filter(|w| w.contains(part) && !allowed.contains(&w.as_str())).collect();
+            assert!(found.is_empty(), "`{part}`: {found:?}");
+        }
+        assert!(code_bytes(text) <= MAX_PLAIN_BYTES, "{} bytes", code_bytes(text));
+        assert!(!text.contains("$"), "an unfilled placeholder");
+        assert!(text.lines().all(|l| !l.trim_start().starts_with('#')), "a directive was left");
+    }
+    let bounce = words(&texts[1]);
+    assert!(!bounce.contains("switch") && !bounce.contains("throughputs") && !bounce.contains("environment_spectrum_"));
+}
+
+/// Switching one feature on changes the passes that it concerns, and no other.
+#[test]
+fn a_feature_changes_only_the_passes_it_concerns() {
+    let plain = texts(&plain_scene());
+    let changed = |scene: Scene| -> Vec<usize> {
+        let texts = texts(&scene);
+        (0..3).filter(|&i| texts[i] != plain[i]).collect()
+    };
+    let (camera, bounce, evaluate) = (0, 1, 2);
+    let with = |change: &dyn Fn(&mut Scene)| {
+        let mut scene = plain_scene();
+        change(&mut scene);
+        changed(scene)
+    };
+    let none: Vec<usize> = Vec::new();
+    assert_eq!(with(&|_| ()), none);
+    assert_eq!(with(&|s| s.film.filter = Filter::Gaussian), [camera]);
+    assert_eq!(with(&|s| s.camera.projection = Projection::Orthographic { half_size: DVec2::ONE }), [camera]);
+    let lens = Projection::ThinLens { tan_half: DVec2::ONE, aperture_radius: 0.1, focus_distance: 1.0 };
+    assert_eq!(with(&|s| s.camera.projection = lens.clone()), [camera]);
+    assert_eq!(with(&|s| s.integrator.sampler = Sampler::Sobol), [camera, bounce]);
+    assert_eq!(with(&|s| s.integrator.russian_roulette_start = 3), [camera, bounce]);
+    // Numbers are data, not text.
+    assert_eq!(with(&|s| s.integrator.max_bounces = 7), none);
+    assert_eq!(with(&|s| s.camera.position.x += 0.1), none);
+    assert_eq!(changed(Builder(plain_scene()).black(sphere(DVec3::ZERO, 0.1)).build()), [bounce]);
+    assert_eq!(changed(Builder(plain_scene()).diffuse(quad(DVec3::ZERO, DVec3::X, DVec3::Y), 0.1).build()), [evaluate]);
+    assert_eq!(changed(Builder(plain_scene()).sky(0.1).build()), [bounce, evaluate]);
+    assert_eq!(with(&|s| s.channels = Channels::equal(400.0, 700.0, 12)), [evaluate]);
+}
