@@ -6,6 +6,7 @@
 pub mod cli;
 pub mod cube;
 pub mod error;
+pub mod files;
 pub mod format;
 pub mod reference;
 pub mod scene;
