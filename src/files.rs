@@ -1,4 +1,5 @@
-//! Files written whole or not at all: first aside under a random name, then renamed over their target.
+//! Files written whole or not at all: first aside under a random name, then renamed over their target. And the space
+//! for them.
 
 use std::ffi::OsString;
 use std::fs;
@@ -61,6 +62,20 @@ pub fn parent(path: &Path) -> &Path {
     }
 }
 
+/// A size for people, in binary units.
+pub fn format_bytes(bytes: u64) -> String {
+    let units = ["KiB", "MiB", "GiB", "TiB", "PiB", "EiB"];
+    let mut value = bytes as f64;
+    let mut unit = "bytes";
+    for next in units {
+        if value < 1024.0 {
+            break;
+        }
+        (value, unit) = (value / 1024.0, next);
+    }
+    if unit == "bytes" { format!("{bytes} bytes") } else { format!("{value:.1} {unit}") }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -77,6 +92,12 @@ mod tests {
         let missing = folder.path().join("no such folder/picture.png");
         assert!(write_atomically(&missing, b"x").unwrap_err().to_string().contains("picture.png: cannot be written"));
         assert!(write_atomically(folder.path(), b"x").unwrap_err().to_string().contains("is a folder"));
+    }
+
+    #[test]
+    fn sizes_for_people() {
+        let shown = [0, 1023, 1024, 1536, 5 << 30, u64::MAX].map(format_bytes);
+        assert_eq!(shown, ["0 bytes", "1023 bytes", "1.0 KiB", "1.5 KiB", "5.0 GiB", "16.0 EiB"]);
     }
 
     #[test]

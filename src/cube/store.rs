@@ -36,7 +36,7 @@ pub struct Progress {
     pub tiles: u32,
     /// Tiles with at least one sample.
     pub tiles_started: u32,
-    /// The least and the most samples per pixel of any tile.
+    /// The least and the most samples per pixel of the tiles with any.
     pub samples: [u32; 2],
 }
 
@@ -144,8 +144,13 @@ impl Cube {
         let mut progress = Progress { tiles, tiles_started: 0, samples: [u32::MAX, 0] };
         for tile in 0..tiles {
             let samples = self.samples(tile)?;
-            progress.tiles_started += u32::from(samples > 0);
-            progress.samples = [progress.samples[0].min(samples), progress.samples[1].max(samples)];
+            if samples > 0 {
+                progress.tiles_started += 1;
+                progress.samples = [progress.samples[0].min(samples), progress.samples[1].max(samples)];
+            }
+        }
+        if progress.tiles_started == 0 {
+            progress.samples = [0, 0];
         }
         Ok(progress)
     }
@@ -367,8 +372,8 @@ fn check_space(path: &Path, header: &Header, freed: u64) -> Result<()> {
         Some(free) if free.saturating_add(freed) < needed => Err(Error::Usage(format!(
             "{}: the cube needs {}, and {} are free there; use fewer channels or pixels, or another disk",
             path.display(),
-            format_bytes(needed),
-            format_bytes(free.saturating_add(freed))
+            files::format_bytes(needed),
+            files::format_bytes(free.saturating_add(freed))
         ))),
         _ => Ok(()),
     }
@@ -384,18 +389,4 @@ fn folder_bytes(folder: &Path) -> u64 {
             Err(_) => 0,
         })
         .sum()
-}
-
-/// A size for people, in binary units.
-pub fn format_bytes(bytes: u64) -> String {
-    let units = ["KiB", "MiB", "GiB", "TiB", "PiB", "EiB"];
-    let mut value = bytes as f64;
-    let mut unit = "bytes";
-    for next in units {
-        if value < 1024.0 {
-            break;
-        }
-        (value, unit) = (value / 1024.0, next);
-    }
-    if unit == "bytes" { format!("{bytes} bytes") } else { format!("{value:.1} {unit}") }
 }
