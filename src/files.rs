@@ -30,9 +30,8 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
         return Err(Error::storage(path, "is a folder, so no file can be written under this name"));
     }
     let aside = sibling(path, "part");
-    let written = fs::File::create_new(&aside)
-        .and_then(|mut file| file.write_all(bytes))
-        .and_then(|()| fs::rename(&aside, path));
+    let written =
+        fs::File::create_new(&aside).and_then(|mut file| file.write_all(bytes)).and_then(|()| fs::rename(&aside, path));
     written.map_err(|error| {
         // The write has failed already; a leftover that cannot be removed either changes nothing about that.
         let _ = fs::remove_file(&aside);

@@ -149,7 +149,7 @@ fn error_estimate_agrees_with_two_passes() {
         }
         epochs.push(values.iter().map(|&v| f64::from(v)).collect());
         let b = epochs.len() as f64;
-        for k in 0..channels {
+        for (k, estimate) in estimate.into_iter().enumerate() {
             let (mut variance, mut square) = (0.0, 0.0);
             for p in (k..pixels * channels).step_by(channels) {
                 let mean = epochs.iter().map(|e| e[p]).sum::<f64>() / b;
@@ -159,10 +159,14 @@ fn error_estimate_agrees_with_two_passes() {
             }
             let expected = if k == 3 { 0.0 } else { (variance / square).sqrt() };
             // The stored means are f32: relative 6e-8 each.
-            assert!((estimate[k] - expected).abs() <= 1e-6 * expected, "merge {i}, channel {k}: {} {expected}", estimate[k]);
+            let error = (estimate - expected).abs();
+            assert!(error <= 1e-6 * expected, "merge {i}, channel {k}: {estimate} {expected}");
         }
     }
-    assert_eq!(cube.error_estimate().expect("estimate"), Cube::open(cube.path()).expect("open").error_estimate().expect("estimate"));
+    assert_eq!(
+        cube.error_estimate().expect("estimate"),
+        Cube::open(cube.path()).expect("open").error_estimate().expect("estimate")
+    );
 }
 
 #[test]
@@ -254,7 +258,8 @@ fn overlapping_disjoint_and_unordered_channels_keep_their_bounds() {
     let folder = tempdir().expect("folder");
     let bounds = vec![[8e3, 12e3], [380.0, 390.1], [385.0, 470.0 / 0.7], [2e4 - 1e-3, 2e4]];
     let channels = Channels::from_bounds(bounds, Some([3, 1, 1]));
-    let cube = patterned(folder.path(), "odd.zarr", Header { channels, origin: [100, 7], ..header([9, 9], [8, 16], 4) });
+    let cube =
+        patterned(folder.path(), "odd.zarr", Header { channels, origin: [100, 7], ..header([9, 9], [8, 16], 4) });
     let opened = Cube::open(cube.path()).expect("opens");
     assert_eq!(opened.header(), cube.header());
     assert_eq!(opened.projection().rgb(&[1.0, 2.0, 3.0, 4.0]), [4.0, 2.0, 2.0]);
@@ -310,7 +315,9 @@ fn a_tile_whose_files_contradict_each_other_is_not_merged() {
     let cube = patterned(folder.path(), "torn.zarr", header([8, 8], [8, 8], 2));
     let unit = unit(&cube, 0, pattern);
     fs::remove_file(cube.path().join("radiance/c/0/0/0")).expect("removed");
-    assert!(cube.merge_unit(0, 1, &unit).unwrap_err().to_string().contains("is missing, although tile 0 has 1 samples"));
+    assert!(
+        cube.merge_unit(0, 1, &unit).unwrap_err().to_string().contains("is missing, although tile 0 has 1 samples")
+    );
     let sums = cube.path().join(".spectile/sums/0");
     let mut bytes = fs::read(&sums).expect("read");
     bytes[20] ^= 1;
@@ -332,7 +339,8 @@ fn overwrite_replaces_cubes_and_nothing_else() {
     fs::write(path.join("thesis.tex"), "years of work").expect("written");
     assert!(refusal(false).contains("--overwrite"));
     assert!(refusal(true).contains("no zarr.json"));
-    fs::write(path.join("zarr.json"), r#"{"zarr_format": 3, "node_type": "group", "attributes": {}}"#).expect("written");
+    fs::write(path.join("zarr.json"), r#"{"zarr_format": 3, "node_type": "group", "attributes": {}}"#)
+        .expect("written");
     assert!(refusal(true).contains("not a Spectile cube"));
     assert_eq!(fs::read_to_string(path.join("thesis.tex")).expect("read"), "years of work");
     fs::remove_dir_all(&path).expect("removed");

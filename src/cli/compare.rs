@@ -32,7 +32,7 @@ pub struct Args {
     /// Fail, with exit code 1, if the largest relMSE of any channel exceeds this
     ///
     /// Cubes that have not rendered every pixel fail as well.
-    #[arg(long, value_name = "RELMSE", value_parser = parse_tolerance)]
+    #[arg(long, value_name = "RELMSE", value_parser = parse_tolerance, allow_negative_numbers = true)]
     pub tolerance: Option<f64>,
 
     /// One JSON object on stdout, instead of a table

@@ -23,9 +23,6 @@ Examples:
   spectile render scene.toml -o cube.zarr --time 10m --preview now.png
   spectile render scene.toml -o quick.zarr --size 128x128 --set channels.equal.count=30")]
 pub struct Args {
-    #[command(flatten)]
-    pub scene: SceneArgs,
-
     /// The cube to make, a folder
     #[arg(short, long, value_name = "OUT.zarr")]
     pub output: PathBuf,
@@ -54,6 +51,9 @@ pub struct Args {
     /// Only a Spectile cube is ever replaced; any other folder or file is refused.
     #[arg(long)]
     pub overwrite: bool,
+
+    #[command(flatten)]
+    pub scene: SceneArgs,
 
     /// Keep a picture of the cube as it grows (PNG, 8-bit sRGB)
     #[arg(long, value_name = "FILE.png")]

@@ -23,9 +23,11 @@ pub struct Args {
     pub cube: PathBuf,
 
     /// Column, from 0 at the left
+    #[arg(allow_negative_numbers = true)]
     pub x: u32,
 
     /// Row, from 0 at the top
+    #[arg(allow_negative_numbers = true)]
     pub y: u32,
 
     /// Draw the spectrum too, as SVG: every channel a level over its own interval

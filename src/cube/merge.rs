@@ -47,7 +47,9 @@ impl Cube {
         let mut batch = Batch::new(self.aside_folder());
         batch.write(self.chunk_path(tile), |file| fold.run(old.as_ref(), unit, weight, file))?;
         if let Some(k) = fold.square.iter().position(|v| !v.is_finite()) {
-            return Err(Error::Internal(format!("a unit of tile {tile} holds a value in channel {k} that is not finite")));
+            return Err(Error::Internal(format!(
+                "a unit of tile {tile} holds a value in channel {k} that is not finite"
+            )));
         }
 
         let sums = fold.sums(old_sums, samples, self.header().epoch);

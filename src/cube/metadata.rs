@@ -29,16 +29,8 @@ pub struct Header {
 }
 
 /// Attributes of the group that the header's own fields make.
-const RESERVED: [&str; 8] = [
-    "Conventions",
-    "title",
-    "spectile_format",
-    "spectile_version",
-    "epoch",
-    "origin",
-    "channel_names",
-    "false_colour",
-];
+const RESERVED: [&str; 8] =
+    ["Conventions", "title", "spectile_format", "spectile_version", "epoch", "origin", "channel_names", "false_colour"];
 
 impl Header {
     pub fn grid(&self) -> Grid {
@@ -70,7 +62,10 @@ impl Header {
         for (axis, name) in ["width", "height"].into_iter().enumerate() {
             let (tile, size) = (self.tile[axis], self.size[axis]);
             if tile == 0 || (tile < size && tile % super::BLOCK != 0) {
-                return Err(format!("tile {name} {tile} is neither a multiple of {} nor the whole {size}", super::BLOCK));
+                return Err(format!(
+                    "tile {name} {tile} is neither a multiple of {} nor the whole {size}",
+                    super::BLOCK
+                ));
             }
         }
         let tiles = self.grid().tiles().map(u64::from);
@@ -154,7 +149,8 @@ impl Header {
         let mut attributes = group["attributes"].as_object().cloned().unwrap_or_default();
         let mut take = |name: &str| attributes.remove(name).unwrap_or_default();
         let names = serde_json::from_value(take("channel_names")).map_err(|_| damaged("has no `channel_names`"))?;
-        let false_colour = serde_json::from_value(take("false_colour")).map_err(|_| damaged("has no `false_colour`"))?;
+        let false_colour =
+            serde_json::from_value(take("false_colour")).map_err(|_| damaged("has no `false_colour`"))?;
         let epoch = serde_json::from_value(take("epoch")).map_err(|_| damaged("has no `epoch`"))?;
         let origin = serde_json::from_value(take("origin")).map_err(|_| damaged("has no `origin`"))?;
         for name in RESERVED {

@@ -193,12 +193,8 @@ impl Picture {
     /// The exposure in EV (a factor of 2^EV) that brings the 99th percentile of the largest component, over the
     /// pixels with any light, to 1. A picture without light has exposure 0.
     pub fn auto_exposure(&self) -> f64 {
-        let mut light: Vec<f32> = self
-            .rgb
-            .chunks_exact(3)
-            .map(|p| p[0].max(p[1]).max(p[2]))
-            .filter(|v| v.is_finite() && *v > 0.0)
-            .collect();
+        let mut light: Vec<f32> =
+            self.rgb.chunks_exact(3).map(|p| p[0].max(p[1]).max(p[2])).filter(|v| v.is_finite() && *v > 0.0).collect();
         if light.is_empty() {
             return 0.0;
         }
