@@ -1,6 +1,7 @@
 //! Spectra, channels, Planck's law and colour, in f64 nanometres.
 
 pub mod channels;
+pub mod colour;
 pub mod curve;
 pub mod planck;
 pub mod table;
