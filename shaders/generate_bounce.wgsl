@@ -16,6 +16,11 @@
 @group(1) @binding(7) var<storage, read_write> throughputs: array<f32>;
 #endif
 
+// Paths still under way, compacted from bounce to bounce: two lists that take turns, and how long each became. Their
+// order differs from run to run, the paths do not.
+@group(1) @binding(8) var<storage, read_write> queue: array<u32>;
+@group(1) @binding(9) var<storage, read_write> queue_lengths: array<atomic<u32>>;
+
 // `count` records so far; evaluation may stop after the last one with a weight, `used`.
 struct RecordList {
     path: u32,
@@ -34,14 +39,21 @@ fn append(list: ptr<function, RecordList>, factor: u32, source: u32, weight: f32
 fn end_path(list: RecordList, rays: u32) {
     atomicAdd(&counters[COUNTER_RAYS], rays);
     heads[list.path].y = list.used;
-    states[2u * list.path + 1u].w = bitcast<f32>(ENDED);
 }
 
 @compute @workgroup_size(64)
 fn generate_bounce(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let path = id.x + id.y * groups.x * 64u;
-    if (path >= wave.path_count) {
-        return;
+    let place = id.x + id.y * groups.x * 64u;
+    var path = place;
+    if (step.bounce == 0u) {
+        if (place >= wave.path_count) {
+            return;
+        }
+    } else {
+        if (place >= atomicLoad(&queue_lengths[step.bounce - 1u])) {
+            return;
+        }
+        path = queue[(step.bounce & 1u) * wave.path_count + place];
     }
     let state1 = states[2u * path + 1u];
     let packed = bitcast<u32>(state1.w);
@@ -173,4 +185,6 @@ fn generate_bounce(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     heads[path].y = list.used;
     states[2u * path] = vec4<f32>(origin, dot(normal, direction) * INV_PI);
     states[2u * path + 1u] = vec4<f32>(direction, bitcast<f32>(list.count | (list.used << 16u)));
+    let next = atomicAdd(&queue_lengths[step.bounce], 1u);
+    queue[((step.bounce + 1u) & 1u) * wave.path_count + next] = path;
 }

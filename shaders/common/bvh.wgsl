@@ -1,6 +1,6 @@
-// Traversal of the compressed wide BVH (Ylitie, Karras and Laine, HPG 2017), nodes as obvhs builds them.
+// Traversal of the compressed wide BVH (Ylitie, Karras and Laine, HPG 2017), nodes as obvhs builds them. STACK_SIZE is
+// the depth of this scene's tree: a private array costs a software device by its size.
 
-const STACK_SIZE: u32 = 32u;
 // A driver in use ends loops silently after 65,535 iterations of an invocation: two traversals must stay below half.
 const MAX_STEPS: u32 = 12000u;
 

@@ -107,6 +107,7 @@ impl Prepared {
     pub fn defines(&self, windows: &Windows) -> Defines {
         let f = &self.features;
         let mut d = Defines::default();
+        d.constant("STACK_SIZE", self.accel.depth);
         d.set("CAMERA_THIN_LENS", f.thin_lens).set("CAMERA_ORTHOGRAPHIC", f.orthographic).set("GAUSSIAN", f.gaussian);
         d.set("INDEPENDENT", f.independent).set("ROULETTE", f.roulette).set("SHAPES", f.shapes);
         d.set("EMITTERS", f.emitters).set("ENVIRONMENT", f.environment).set("LIGHTS", f.emitters || f.environment);

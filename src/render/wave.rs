@@ -5,9 +5,11 @@ use crate::gpu::self_test::LOOP_LIMIT;
 use crate::render::prepare::Prepared;
 use crate::{Error, Result};
 
-/// Bytes of a path between the passes: state (32), head (8), throughput under roulette (4), and 8 a record.
+/// Bytes of a path between the passes: state (32), head (8), its places in the queues (8), throughput under roulette
+/// (4), and 8 a record.
 const STATE_BYTES: u64 = 32;
 const HEAD_BYTES: u64 = 8;
+const QUEUE_BYTES: u64 = 8;
 const THROUGHPUT_BYTES: u64 = 4;
 const RECORD_BYTES: u64 = 8;
 
@@ -92,6 +94,11 @@ impl WavePlan {
         u64::from(self.paths) * HEAD_BYTES
     }
 
+    /// Two lists of the paths still under way.
+    pub fn queue_bytes(&self) -> u64 {
+        u64::from(self.paths) * QUEUE_BYTES
+    }
+
     pub fn throughput_bytes(&self) -> u64 {
         if self.roulette { u64::from(self.paths) * THROUGHPUT_BYTES } else { 0 }
     }
@@ -107,12 +114,12 @@ impl WavePlan {
 
     /// Everything but the scene that a device holds: path buffers, means, and two staging buffers of that size.
     pub fn device_bytes(&self) -> u64 {
-        self.state_bytes() + self.head_bytes() + self.throughput_bytes() + self.record_bytes() + 3 * self.mean_bytes()
+        u64::from(self.paths) * self.path_bytes() + 3 * self.mean_bytes()
     }
 
     /// Bytes of one saved path, all its records included.
     pub fn path_bytes(&self) -> u64 {
-        STATE_BYTES + HEAD_BYTES + RECORD_BYTES * u64::from(self.max_records) + self.throughput_bytes().min(THROUGHPUT_BYTES)
+        STATE_BYTES + HEAD_BYTES + QUEUE_BYTES + RECORD_BYTES * u64::from(self.max_records) + self.throughput_bytes().min(THROUGHPUT_BYTES)
     }
 
     /// How many units to submit together in an epoch of `samples` samples per pixel.

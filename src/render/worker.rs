@@ -57,6 +57,8 @@ struct PathBuffers {
     heads: wgpu::Buffer,
     records: wgpu::Buffer,
     throughputs: Option<wgpu::Buffer>,
+    queue: wgpu::Buffer,
+    queue_lengths: wgpu::Buffer,
     counters: wgpu::Buffer,
     means: wgpu::Buffer,
 }
@@ -195,6 +197,7 @@ impl Worker {
     fn submit_wave(&mut self, wave: &Wave) -> Result<()> {
         self.gpu.queue.write_buffer(&self.path_buffers.wave, 0, bytemuck::bytes_of(wave));
         let mut encoder = self.encoder("wave");
+        encoder.clear_buffer(&self.path_buffers.queue_lengths, 0, None);
         {
             let mut pass = self.begin(&mut encoder, "generate", 0);
             let [x, y] = fold(wave.path_count.div_ceil(64));
@@ -277,6 +280,8 @@ impl PathBuffers {
             heads: buffer::empty(gpu, "heads", plan.head_bytes(), storage),
             records: buffer::empty(gpu, "records", plan.record_bytes(), storage),
             throughputs: plan.roulette.then(|| buffer::empty(gpu, "throughputs", plan.throughput_bytes(), storage)),
+            queue: buffer::empty(gpu, "queue", plan.queue_bytes(), storage),
+            queue_lengths: buffer::empty(gpu, "queue_lengths", 4 * wave::steps(prepared.frame.max_bounces).len() as u64, storage),
             counters: buffer::empty(gpu, "counters", size_of::<Counters>() as u64, storage),
             means: buffer::empty(gpu, "means", plan.mean_bytes(), storage),
         }
@@ -294,6 +299,8 @@ impl PathBuffers {
             "heads" => &self.heads,
             "records" => &self.records,
             "throughputs" => self.throughputs.as_ref()?,
+            "queue" => &self.queue,
+            "queue_lengths" => &self.queue_lengths,
             "counters" => &self.counters,
             "means" => &self.means,
             _ => return None,
