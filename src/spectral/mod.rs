@@ -3,6 +3,7 @@
 pub mod channels;
 pub mod curve;
 pub mod planck;
+pub mod upsample;
 
 pub use channels::Channels;
 pub use curve::{Curve, Outside};
