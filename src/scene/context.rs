@@ -68,11 +68,6 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// Whether nothing wrong was found yet.
-    pub fn is_clean(&self) -> bool {
-        self.problems.borrow().is_empty()
-    }
-
     /// All mistakes, those of the scene file first and in its order; and all warnings.
     pub fn finish(self) -> (Vec<Problem>, Vec<String>) {
         let mut problems = self.problems.into_inner();

@@ -27,6 +27,8 @@ pub struct Fields<'a> {
     /// Where to point when something is missing from the table.
     pub at: &'a Origin,
     entries: &'a [Entry],
+    /// For every unknown key the known one that was probably meant, or "".
+    misspelt: Vec<&'static str>,
 }
 
 /// The keys of a table: those understood, and those of the contract that a later version brings.
@@ -193,7 +195,7 @@ impl<'a> Item<'a> {
         let Value::Table(entries) = &self.node.value else {
             return self.wrong_kind("a table");
         };
-        let fields = Fields { cx: self.cx, path: self.path.clone(), at: self.at, entries };
+        let mut fields = Fields { cx: self.cx, path: self.path.clone(), at: self.at, entries, misspelt: Vec::new() };
         fields.check(keys);
         Some(fields)
     }
@@ -215,12 +217,12 @@ impl<'a> Item<'a> {
 impl<'a> Fields<'a> {
     /// The tables of the whole file.
     pub fn root(cx: &'a Context<'a>, entries: &'a [Entry], keys: Keys) -> Self {
-        let fields = Fields { cx, path: String::new(), at: &Origin::Whole, entries };
+        let mut fields = Fields { cx, path: String::new(), at: &Origin::Whole, entries, misspelt: Vec::new() };
         fields.check(keys);
         fields
     }
 
-    fn check(&self, keys: Keys) {
+    fn check(&mut self, keys: Keys) {
         for entry in self.entries {
             let key = entry.key.as_str();
             if keys.known.contains(&key) {
@@ -233,14 +235,10 @@ impl<'a> Fields<'a> {
                 continue;
             }
             let all = keys.known.iter().chain(keys.later).copied();
-            let help = did_you_mean(key, all.clone()).unwrap_or_else(|| {
-                if all.clone().next().is_none() {
-                    "it takes no keys".to_owned()
-                } else {
-                    format!("known keys: {}", list(all))
-                }
-            });
+            let meant = nearest(key, all.clone());
+            let help = meant.map_or_else(|| format!("known keys: {}", list(all)), suggestion);
             self.cx.error(&entry.key_origin, &path, format!("unknown key `{key}`"), Some(help));
+            self.misspelt.push(meant.unwrap_or(""));
         }
     }
 
@@ -255,7 +253,7 @@ impl<'a> Fields<'a> {
     /// The value of `key`, whose absence is an error; `help` shows how to write it.
     pub fn require(&self, key: &str, help: &str) -> Option<Item<'a>> {
         let item = self.get(key);
-        if item.is_none() {
+        if item.is_none() && !self.misspelt.contains(&key) {
             self.cx.error(self.at, &join(&self.path, key), format!("`{key}` is missing"), Some(format!("add {help}")));
         }
         item
@@ -266,6 +264,8 @@ impl<'a> Fields<'a> {
         let present: Vec<&Entry> = self.entries.iter().filter(|e| names.contains(&e.key.as_str())).collect();
         match present[..] {
             [entry] => Some(child(self.cx, &self.path, entry)),
+            // An unknown key was probably meant to be one.
+            [] if !self.misspelt.is_empty() => None,
             [] => {
                 self.error_help(
                     format!("has no {what}"),
@@ -316,12 +316,20 @@ pub fn quoted<T: Display>(names: impl IntoIterator<Item = T>) -> String {
     list(names.into_iter().map(|n| format!("\"{n}\"")))
 }
 
+/// The nearest of `names`, where one is near enough to be meant.
+fn nearest<'n>(written: &str, names: impl IntoIterator<Item = &'n str>) -> Option<&'n str> {
+    let best = names.into_iter().min_by_key(|name| edit_distance(written, name))?;
+    let allowed = 1 + written.chars().count().min(best.chars().count()) / 3;
+    (edit_distance(written, best) <= allowed).then_some(best)
+}
+
+fn suggestion(name: &str) -> String {
+    format!("did you mean `{name}`?")
+}
+
 /// A hint at the nearest of `names`, where one is near enough to be meant.
 pub fn did_you_mean<'n>(written: &str, names: impl IntoIterator<Item = &'n str>) -> Option<String> {
-    let near = |name: &str| edit_distance(written, name);
-    let best = names.into_iter().min_by_key(|name| near(name))?;
-    let allowed = 1 + written.chars().count().min(best.chars().count()) / 3;
-    (near(best) <= allowed).then(|| format!("did you mean `{best}`?"))
+    nearest(written, names).map(suggestion)
 }
 
 /// Levenshtein distance in characters, of the first 64 of each.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::camera;
 use super::channels;
-use super::context::Context;
+use super::context::{Context, position};
 use super::decode::{Fields, Item, Keys};
 use super::digest::digest;
 use super::material::Materials;
@@ -62,8 +62,15 @@ pub fn parse(text: &str, file: &Path, overrides: &[(String, String)]) -> Result<
     let mut root = match tree::parse_document(text) {
         Ok(root) => root,
         Err(errors) => {
+            let mut last_line = None;
             for (span, message) in errors {
-                cx.error(&span.map_or(Origin::Whole, Origin::File), "", format!("is not valid TOML: {message}"), None);
+                let line = span.as_ref().map(|span| position(text, span.start).0);
+                // What follows on the same line is mostly an echo of the first mistake.
+                if line.is_none() || line != last_line {
+                    let origin = span.map_or(Origin::Whole, Origin::File);
+                    cx.error(&origin, "", format!("is not valid TOML: {message}"), None);
+                }
+                last_line = line;
             }
             return Err(Error::Input(cx.finish().0));
         }

@@ -43,7 +43,7 @@ struct Source<'a> {
     data: Data,
     scale: f64,
     outside: Option<Outside>,
-    /// The key and place of the definition.
+    /// The key and place of what `data` was made from.
     path: String,
     at: &'a Origin,
 }
@@ -173,7 +173,8 @@ impl<'a> Spectra<'a> {
     }
 
     fn check(&mut self, source: &Source<'a>, name: &str, user: &Item<'a>, quantity: Quantity) -> Option<Handle> {
-        let used_by = if source.path == user.path { String::new() } else { format!("; used by `{}`", user.path) };
+        let used_by =
+            if source.path.starts_with(&user.path) { String::new() } else { format!("; used by `{}`", user.path) };
         let refuse = |value: String| {
             let message = format!("{}, but is {value}{used_by}", quantity.range());
             self.cx.error(source.at, &source.path, message, None);
@@ -283,7 +284,6 @@ impl<'a> Spectra<'a> {
 
 /// A spectrum written as a number or a table.
 fn source<'a>(item: &Item<'a>) -> Option<Source<'a>> {
-    let made = |data, scale, outside| Source { data, scale, outside, path: item.path.clone(), at: item.at };
     let Value::Table(entries) = &item.node.value else {
         if !matches!(item.node.value, Value::Integer(_) | Value::Float(_)) {
             item.error_help(
@@ -292,7 +292,8 @@ fn source<'a>(item: &Item<'a>) -> Option<Source<'a>> {
             );
             return None;
         }
-        return Some(made(Data::Constant(item.number()?), 1.0, None));
+        let data = Data::Constant(item.number()?);
+        return Some(Source { data, scale: 1.0, outside: None, path: item.path.clone(), at: item.at });
     };
     let fields = item.table(KEYS)?;
     if entries.iter().any(|e| KEYS.later.contains(&e.key.as_str())) {
@@ -323,7 +324,7 @@ fn source<'a>(item: &Item<'a>) -> Option<Source<'a>> {
     if outside.is_some() && matches!(data, Data::Constant(_) | Data::Blackbody(_)) {
         item.cx.warn(format!("`{}.outside` has no effect: the spectrum is not a table", item.path));
     }
-    Some(made(data, scale?, outside))
+    Some(Source { data, scale: scale?, outside, path: kind.path, at: kind.at })
 }
 
 fn file(item: &Item, column: Option<Item>) -> Option<Data> {
