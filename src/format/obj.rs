@@ -46,22 +46,17 @@ pub struct Obj {
 }
 
 /// Reads the file at `path`. Errors name the line; without one, the file as a whole could not be read.
-pub fn read(path: &Path) -> Result<Obj, Problem> {
-    let bytes = std::fs::read(path).map_err(|e| Problem {
-        file: path.to_owned(),
-        message: format!("cannot be read: {e}"),
-        ..Problem::default()
+pub fn read(path: &Path) -> Result<Obj, Box<Problem>> {
+    let bytes = std::fs::read(path).map_err(|e| {
+        Box::new(Problem { file: path.to_owned(), message: format!("cannot be read: {e}"), ..Problem::default() })
     })?;
     parse(&bytes, path)
 }
 
 /// [`read`] on the content of the file; `path` stands in messages.
-pub fn parse(bytes: &[u8], path: &Path) -> Result<Obj, Problem> {
-    let problem = |line: Option<usize>, message: &str| Problem {
-        file: path.to_owned(),
-        line,
-        message: message.to_owned(),
-        ..Problem::default()
+pub fn parse(bytes: &[u8], path: &Path) -> Result<Obj, Box<Problem>> {
+    let problem = |line: Option<usize>, message: &str| {
+        Box::new(Problem { file: path.to_owned(), line, message: message.to_owned(), ..Problem::default() })
     };
     let mut feeder = Feeder::new(bytes);
     // Without single_index a vertex is its position alone, so triangles share vertices across texture seams.
@@ -100,7 +95,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Obj, Problem> {
 }
 
 /// Finds the first face that names a vertex the file does not have (tobj notices it only at the end of a part).
-fn bad_index(bytes: &[u8], problem: impl Fn(Option<usize>, &str) -> Problem) -> Problem {
+fn bad_index(bytes: &[u8], problem: impl Fn(Option<usize>, &str) -> Box<Problem>) -> Box<Problem> {
     let vertices = Lines::new(bytes).filter(|(_, line)| keyword(line).0 == "v").count() as i128;
     let mut before = 0;
     for (number, line) in Lines::new(bytes) {
@@ -126,7 +121,7 @@ fn bad_index(bytes: &[u8], problem: impl Fn(Option<usize>, &str) -> Problem) -> 
     problem(None, "a face names a vertex that does not exist")
 }
 
-fn not_finite(bytes: &[u8], problem: impl Fn(Option<usize>, &str) -> Problem) -> Problem {
+fn not_finite(bytes: &[u8], problem: impl Fn(Option<usize>, &str) -> Box<Problem>) -> Box<Problem> {
     let is_bad = |rest: &str| {
         let numbers: Vec<f64> = rest.split_whitespace().take(4).filter_map(|word| word.parse().ok()).collect();
         // A fourth number divides the first three.
@@ -351,7 +346,7 @@ impl Read for Feeder<'_> {
 mod tests {
     use super::*;
 
-    fn obj(text: &str) -> Result<Obj, Problem> {
+    fn obj(text: &str) -> Result<Obj, Box<Problem>> {
         parse(text.as_bytes(), Path::new("m.obj"))
     }
 
@@ -403,9 +398,8 @@ mod tests {
 
     #[test]
     fn vertices_keep_their_f64_bits_and_extras_are_understood() {
-        let mesh =
-            obj("v 0.1 1e-9 123456789.123456789\nv 2 4 6 2\nv 1 1 1 0.5 0.5 0.5\nf 1 \\\n 2 3\nl 1 2\n").unwrap();
-        assert_eq!(mesh.parts[0].positions, [[0.1, 1e-9, 123456789.123456789], [1., 2., 3.], [1., 1., 1.]]);
+        let mesh = obj("v 0.1 1e-9 1234567.1234567\nv 2 4 6 2\nv 1 1 1 0.5 0.5 0.5\nf 1 \\\n 2 3\nl 1 2\n").unwrap();
+        assert_eq!(mesh.parts[0].positions, [[0.1, 1e-9, 1234567.1234567], [1., 2., 3.], [1., 1., 1.]]);
         assert_eq!(mesh.without_surface, 1);
     }
 

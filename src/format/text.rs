@@ -16,14 +16,14 @@ pub struct SpectrumTable {
 /// Reads the spectrum of `column` (by name; absent: the only value column) of the file at `path`.
 ///
 /// Errors name the line; without one, the file as a whole could not be read.
-pub fn read_spectrum(path: &Path, column: Option<&str>) -> Result<SpectrumTable, Problem> {
-    let whole = |message: String| Problem { file: path.to_owned(), message, ..Problem::default() };
-    let bytes = std::fs::read(path).map_err(|e| whole(format!("cannot be read: {e}")))?;
+pub fn read_spectrum(path: &Path, column: Option<&str>) -> Result<SpectrumTable, Box<Problem>> {
+    let reader = Reader { path, column };
+    let bytes = std::fs::read(path).map_err(|e| reader.at(None, format!("cannot be read: {e}"), ""))?;
     parse_spectrum(&bytes, path, column)
 }
 
 /// [`read_spectrum`] on the content of the file; `path` tells `.spd` from CSV and stands in messages.
-pub fn parse_spectrum(bytes: &[u8], path: &Path, column: Option<&str>) -> Result<SpectrumTable, Problem> {
+pub fn parse_spectrum(bytes: &[u8], path: &Path, column: Option<&str>) -> Result<SpectrumTable, Box<Problem>> {
     // Only comments and names can hold anything but ASCII, so old encodings do no harm.
     let text = String::from_utf8_lossy(bytes);
     let text = text.trim_start_matches('\u{feff}');
@@ -129,12 +129,12 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn at(&self, line: Option<usize>, message: String, help: &str) -> Problem {
+    fn at(&self, line: Option<usize>, message: String, help: &str) -> Box<Problem> {
         let help = (!help.is_empty()).then(|| help.to_owned());
-        Problem { file: self.path.to_owned(), line, message, help, ..Problem::default() }
+        Box::new(Problem { file: self.path.to_owned(), line, message, help, ..Problem::default() })
     }
 
-    fn layout(&self, line: usize, cells: &[&str], header: bool) -> Result<Layout, Problem> {
+    fn layout(&self, line: usize, cells: &[&str], header: bool) -> Result<Layout, Box<Problem>> {
         let names = || cells[1..].join(", ");
         if cells.len() < 2 {
             return Err(self.at(Some(line), "has one column only".to_owned(), "write lines of `nm,value`"));
@@ -176,7 +176,7 @@ impl Reader<'_> {
     }
 
     /// The two numbers of a line; `None` where a file of several columns leaves the value empty: not given there.
-    fn row(&self, line: usize, cells: &[&str], layout: &Layout) -> Result<Option<(f64, f64)>, Problem> {
+    fn row(&self, line: usize, cells: &[&str], layout: &Layout) -> Result<Option<(f64, f64)>, Box<Problem>> {
         if cells.len() != layout.cells {
             let message = format!("has {} cells where {} are expected", cells.len(), layout.cells);
             return Err(self.at(Some(line), message, "give every line the same number of cells"));
@@ -198,7 +198,7 @@ impl Reader<'_> {
     }
 
     /// The table in ascending order, which its lines must have one way or the other.
-    fn ascending(&self, mut table: SpectrumTable) -> Result<SpectrumTable, Problem> {
+    fn ascending(&self, mut table: SpectrumTable) -> Result<SpectrumTable, Box<Problem>> {
         if table.nm.len() < 2 {
             return Err(self.at(None, format!("has {} values", table.nm.len()), "give at least two wavelengths"));
         }
@@ -233,7 +233,7 @@ impl Reader<'_> {
 mod tests {
     use super::*;
 
-    fn csv(text: &str, column: Option<&str>) -> Result<SpectrumTable, Problem> {
+    fn csv(text: &str, column: Option<&str>) -> Result<SpectrumTable, Box<Problem>> {
         parse_spectrum(text.as_bytes(), Path::new("t.csv"), column)
     }
 

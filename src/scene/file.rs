@@ -115,11 +115,10 @@ fn decode<'a>(cx: &'a Context<'a>, root: &'a [Entry]) -> Option<Scene> {
         items.iter().for_each(|item| objects.add(item));
     }
     let objects = objects.finish();
-    let environment = match top.get("environment") {
-        Some(item) => Some(decode_environment(&item, &mut spectra)),
-        None => None,
-    };
-    let environment = environment.map(|handle| handle.map(|handle| Environment { radiance: spectra.take(handle) }));
+    let environment = top.get("environment").map(|item| {
+        let radiance = decode_environment(&item, &mut spectra)?;
+        Some(Environment { radiance: spectra.take(radiance) })
+    });
     refuse_lights(top.get("lights"));
     refuse_media(top.get("media"));
 
@@ -219,13 +218,16 @@ fn decode_environment<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<
     // A uniform environment looks the same however it is turned; the keys still have to make sense.
     let up = fields.get("up").map(|item| item.direction());
     let turn = fields.get("rotate_degrees").map(|item| item.number());
-    let scale = fields.get("scale").map_or(Some(1.0), |item| item.not_negative());
+    let scale = fields.get("scale");
     let radiance = radiance.filter(|item| item.path == "environment.radiance")?;
     let radiance = spectra.resolve(&radiance, Quantity::Radiance);
     if up == Some(None) || turn == Some(None) {
         return None;
     }
-    Some(spectra.scaled(radiance?, scale?))
+    match scale {
+        Some(scale) => spectra.scaled(radiance?, &scale),
+        None => radiance,
+    }
 }
 
 /// `[[lights]]` come with a later version; what is written is still checked to be one of them.

@@ -40,10 +40,11 @@ pub struct Objects<'s, 'a> {
     scene: Vec<Object>,
 }
 
-/// What all pieces of one object share.
+/// What all pieces of one object share. An outer `None` is a mistake that has been said; the rest of the object is
+/// still looked at.
 struct Common {
     affine: Option<DAffine3>,
-    emission: Option<(Handle, Sides)>,
+    emission: Option<Option<(Handle, Sides)>>,
 }
 
 impl<'s, 'a> Objects<'s, 'a> {
@@ -62,7 +63,7 @@ impl<'s, 'a> Objects<'s, 'a> {
         let common = self.common(&fields);
         let named = fields.get("material");
         let material = named.as_ref().map(|named| self.named_material(named));
-        let (Some(shape), Some(common)) = (shape, common) else { return };
+        let Some(shape) = shape else { return };
 
         if shape.path.ends_with(".mesh") {
             let Some(mesh) = self.read(&shape) else { return };
@@ -90,8 +91,8 @@ impl<'s, 'a> Objects<'s, 'a> {
         self.scene
     }
 
-    fn common(&mut self, fields: &Fields<'a>) -> Option<Common> {
-        let affine = fields.get("transform").map(|item| transform::decode(&item));
+    fn common(&mut self, fields: &Fields<'a>) -> Common {
+        let affine = fields.get("transform").map_or(Some(DAffine3::IDENTITY), |item| transform::decode(&item));
         let emission = fields.get("emission").map(|item| self.spectra.resolve(&item, Quantity::Radiance));
         let sides = match fields.get("emission_sides") {
             Some(item) => {
@@ -102,16 +103,11 @@ impl<'s, 'a> Objects<'s, 'a> {
             }
             None => Some(Sides::Front),
         };
-        // An inner `None` is a mistake that has been said.
-        let affine = match affine {
-            Some(affine) => Some(affine?),
-            None => None,
-        };
         let emission = match emission {
-            Some(radiance) => Some((radiance?, sides?)),
-            None => None,
+            Some(radiance) => radiance.zip(sides).map(Some),
+            None => sides.map(|_| None),
         };
-        Some(Common { affine, emission })
+        Common { affine, emission }
     }
 
     fn named_material(&mut self, item: &Item<'a>) -> Option<MaterialId> {
@@ -134,7 +130,7 @@ impl<'s, 'a> Objects<'s, 'a> {
                 Some(Rc::new(mesh))
             }
             Err(problem) => {
-                report_in_file(item, problem);
+                report_in_file(item, *problem);
                 None
             }
         };
@@ -196,8 +192,8 @@ impl<'s, 'a> Objects<'s, 'a> {
 
     /// Moves `local` into the world and adds it to the scene.
     fn push(&mut self, fields: &Fields<'a>, name: String, local: Shape, material: Option<MaterialId>, common: &Common) {
-        let moved = transform::apply(&common.affine.unwrap_or(DAffine3::IDENTITY), local);
-        let mut shape = match moved {
+        let Some(affine) = common.affine else { return };
+        let mut shape = match transform::apply(&affine, local) {
             Ok(shape) => shape,
             Err(message) => {
                 let item = fields.get("transform");
@@ -216,9 +212,8 @@ impl<'s, 'a> Objects<'s, 'a> {
                 fields.cx.warn(format!("{name}: {dropped} triangles without area were dropped"));
             }
         }
-        let Some(material) = material else { return };
-        let emission =
-            common.emission.map(|(radiance, sides)| Emission { radiance: self.spectra.take(radiance), sides });
+        let (Some(material), Some(emission)) = (material, common.emission) else { return };
+        let emission = emission.map(|(radiance, sides)| Emission { radiance: self.spectra.take(radiance), sides });
         self.scene.push(Object { name, shape, material, emission });
     }
 }

@@ -12,6 +12,12 @@ use crate::error::Problem;
 use crate::format::text;
 use crate::spectral::{Channels, Curve, Outside, upsample};
 
+/// Wavelengths, in nm, far beyond any channel, between which a curve's peak is looked for.
+const SHORTEST: f64 = 1e-3;
+const LONGEST: f64 = 1e15;
+/// Sums and products of a few radiances beyond this leave f32.
+const BRIGHTEST: f64 = 1e35;
+
 /// What a spectrum describes: decides the allowed values, what a table means beyond its ends, and what `rgb` is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Quantity {
@@ -25,14 +31,14 @@ impl Quantity {
     fn allows(self, value: f64) -> bool {
         match self {
             Quantity::Reflectance => (0.0..=1.0).contains(&value),
-            Quantity::Radiance => value >= 0.0 && value.is_finite(),
+            Quantity::Radiance => (0.0..=BRIGHTEST).contains(&value),
         }
     }
 
     fn range(self) -> &'static str {
         match self {
             Quantity::Reflectance => "a reflectance must lie in [0, 1]",
-            Quantity::Radiance => "a radiance must be finite and 0 or greater",
+            Quantity::Radiance => "a radiance must lie in [0, 1e35]",
         }
     }
 }
@@ -151,11 +157,9 @@ impl<'a> Spectra<'a> {
         id
     }
 
-    /// `handle` times `factor`.
-    pub fn scaled(&mut self, handle: Handle, factor: f64) -> Handle {
-        if factor == 1.0 {
-            return handle;
-        }
+    /// `handle`, a radiance, times the number of at least 0 that `item` holds.
+    pub fn scaled(&mut self, handle: Handle, item: &Item) -> Option<Handle> {
+        let factor = item.not_negative()?;
         let Checked { name, curve, warnings, .. } = &self.checked[handle];
         let (name, warnings, mut curve) = (name.clone(), warnings.clone(), curve.clone());
         match &mut curve {
@@ -163,8 +167,13 @@ impl<'a> Spectra<'a> {
             Curve::Blackbody { scale, .. } => *scale *= factor,
             Curve::Linear { value, .. } => value.iter_mut().for_each(|v| *v *= factor),
         }
+        let peak = curve.max(SHORTEST, LONGEST);
+        if !Quantity::Radiance.allows(peak) {
+            item.error(format!("{}, but is {peak:e} after scaling", Quantity::Radiance.range()));
+            return None;
+        }
         self.checked.push(Checked { name, curve, warnings, taken: None });
-        self.checked.len() - 1
+        Some(self.checked.len() - 1)
     }
 
     /// The spectra in use.
@@ -180,7 +189,7 @@ impl<'a> Spectra<'a> {
             self.cx.error(source.at, &source.path, message, None);
         };
         let mut warnings = Vec::new();
-        let hold = |_: &Data| match quantity {
+        let default_outside = match quantity {
             Quantity::Reflectance => Outside::Hold,
             Quantity::Radiance => Outside::Zero,
         };
@@ -200,7 +209,7 @@ impl<'a> Spectra<'a> {
             }
             Data::Blackbody(kelvin) => {
                 let curve = Curve::Blackbody { kelvin: *kelvin, scale: source.scale };
-                let peak = curve.max(1e-3, 1e15);
+                let peak = curve.max(SHORTEST, LONGEST);
                 if !quantity.allows(peak) {
                     refuse(format!("{peak:e} at the peak of the black body"));
                     return None;
@@ -227,7 +236,7 @@ impl<'a> Spectra<'a> {
                         format!("spectrum `{name}` (a reflectance) does not cover {gap}: its end values are held there")
                     }));
                 }
-                let outside = source.outside.unwrap_or_else(|| hold(&source.data));
+                let outside = source.outside.unwrap_or(default_outside);
                 let value = value.iter().map(|v| v * source.scale).collect();
                 Curve::Linear { nm: nm.clone(), value, outside }
             }
@@ -341,7 +350,7 @@ fn file(item: &Item, column: Option<Item>) -> Option<Data> {
     match text::read_spectrum(&path, column) {
         Ok(table) => Some(Data::Table { nm: table.nm, value: table.value, lines: Some((path, table.line)) }),
         Err(problem) => {
-            report_in_file(item, problem);
+            report_in_file(item, *problem);
             None
         }
     }

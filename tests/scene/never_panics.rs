@@ -15,7 +15,7 @@ fn survives(text: &str, files: &[(&str, &str)]) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn random_text_never_panics(text in ".*", bytes in proptest::collection::vec(any::<u8>(), 0..300)) {

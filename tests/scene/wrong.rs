@@ -30,12 +30,10 @@ fn check_wrong(text: &str, files: &[(&str, &str)], name: &str, key: &str, words:
     for word in words {
         assert!(message.contains(word), "{name}: no {word:?} in: {message}");
     }
-    if line.is_some() {
-        assert!(
-            problem.column.is_some() && problem.snippet.as_deref().is_some_and(|s| s.contains('^')),
-            "{name}: {message}"
-        );
-        assert!(message.contains(&format!("scene.toml:{}:", line.unwrap())), "{name}: {message}");
+    if let Some(line) = line {
+        assert!(problem.column.is_some(), "{name}: {message}");
+        assert!(problem.snippet.as_deref().is_some_and(|snippet| snippet.contains('^')), "{name}: {message}");
+        assert!(message.contains(&format!("scene.toml:{line}:")), "{name}: {message}");
     }
 }
 
@@ -261,7 +259,7 @@ fn objects() {
         ("key of a shape", QUAD, "sphere = { centre = [0, 0, 0], center = [0, 0, 0], radius = 1 } #!", "objects.0.sphere.centre", &["did you mean `center`?"]),
         ("group of a quad", "material = \"white\"", "material = \"white\"\ngroup = \"a\" #!", "objects.0.group", &["goes with `mesh` only"]),
         ("unknown material", "material = \"white\"", "material = \"whit\" #!", "objects.0.material", &["no material is named \"whit\"", "did you mean `white`?"]),
-        ("negative emission", "emission = \"lamp\"", "emission = -2 #!", "objects.1.emission", &["0 or greater", "-2"]),
+        ("negative emission", "emission = \"lamp\"", "emission = -2 #!", "objects.1.emission", &["[0, 1e35]", "-2"]),
         ("emission_sides", "emission = \"lamp\"", "emission = 1\nemission_sides = \"back\" #!", "objects.1.emission_sides", &["\"front\", \"both\""]),
         ("interior", "emission = \"lamp\"", "interior = \"plume\" #!", "objects.1.interior", &["not supported yet"]),
         ("missing mesh", MESH, "mesh = \"nowhere.obj\" #!\nmaterial = \"soot\"", "objects.1.mesh", &["nowhere.obj", "cannot be read"]),
@@ -275,7 +273,9 @@ fn objects() {
         ("too far", QUAD, "sphere = { center = [0, 0, 0], radius = 1 }\ntransform = { translate = [1e20, 0, 0] } #!", "objects.0.transform", &["farther than can be represented"]),
         ("up of nothing", "radiance = 0.25", "radiance = 0.25\nup = [0, 0, 0] #!", "environment.up", &["length is 0"]),
         ("map", "radiance = 0.25", "map = \"sky.exr\" #!", "environment.map", &["not supported yet"]),
-        ("negative sky", "radiance = 0.25", "radiance = -0.25 #!", "environment.radiance", &["0 or greater"]),
+        ("negative sky", "radiance = 0.25", "radiance = -0.25 #!", "environment.radiance", &["[0, 1e35]"]),
+        ("sky scaled too far", "radiance = 0.25", "radiance = 1e30\nscale = 1e10 #!", "environment.scale", &["[0, 1e35]", "after scaling"]),
+        ("sky scaled below 0", "radiance = 0.25", "radiance = 1\nscale = -1 #!", "environment.scale", &["0 or greater"]),
         ("light", "[environment]", "[[lights]]\npoint = { position = [0, 0, 0], intensity = 1 } #!\n[environment]", "lights.0.point", &["not supported yet"]),
         ("medium", "[environment]", "[media.air] #!\nabsorption = 1\n[environment]", "media.air", &["not supported yet"]),
         ("objects no array", "[environment]", "[environment]\nobjects = 3 #!", "environment.objects", &["unknown key"]),
@@ -314,12 +314,15 @@ fn meshes_and_materials() {
     check_wrong(&without, &[("m.obj", flat)], "degenerate", "objects.1", &["no area"]);
 }
 
+/// A scene, one of its files and what that holds; the line there, the key in the scene and the words to be named.
+type WrongFile<'a> = (&'a str, &'a str, &'a str, Option<usize>, &'a str, &'a str);
+
 /// Mistakes in a spectrum or mesh file are shown at their line there.
 #[test]
 fn mistakes_in_other_files_name_those() {
     let with_csv = changed("constant = 0.5", "file = \"s.csv\"");
     let with_obj = changed("tri.obj", "m.obj");
-    let cases: &[(&str, &str, &str, Option<usize>, &str, &str)] = &[
+    let cases: &[WrongFile] = &[
         (&with_csv, "s.csv", "nm,value\n400,0.5\n500,x\n", Some(3), "spectra.grey.file", "`x` is not a finite number"),
         (
             &with_csv,
@@ -393,6 +396,20 @@ fn independent_mistakes_are_reported_together_in_the_order_of_the_file() {
     );
     let lines: Vec<_> = problems.iter().map(|p| p.line).collect();
     assert!(lines.is_sorted() && lines.iter().all(Option::is_some), "{lines:?}");
+}
+
+#[test]
+fn every_part_of_an_object_is_looked_at() {
+    let text = changed(
+        "mesh = \"tri.obj\"\nmaterial = \"soot\"\nemission = \"lamp\"",
+        "mesh = \"nowhere.obj\"\nmaterial = \"sot\"\nemission = -1\nemission_sides = \"up\"\ntransform = { scale = 0 }",
+    );
+    let Err(Error::Input(problems)) = parse_with(&text, &[], &[]) else { panic!("accepted") };
+    let keys: Vec<_> = problems.iter().map(|p| p.key.as_deref().unwrap_or("")).collect();
+    assert_eq!(
+        keys,
+        ["mesh", "material", "emission", "emission_sides", "transform"].map(|key| format!("objects.1.{key}"))
+    );
 }
 
 #[test]
