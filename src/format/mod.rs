@@ -2,3 +2,5 @@
 
 pub mod plot;
 pub mod png;
+pub mod obj;
+pub mod text;

@@ -13,9 +13,6 @@ use crate::{Error, Result};
 const MAX_REGISTER_SPECTRA: usize = 8;
 /// Spectrum ids have 16 bits in a record.
 const MAX_SPECTRA: usize = 1 << 16;
-/// Keeps a path's records countable in 16 bits and a walk over them within the loop limit.
-const MAX_BOUNCES: u32 = 8_192;
-
 /// Parts of the renderer that a scene needs; what is false is left out of shaders and buffers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Features {
@@ -55,12 +52,6 @@ pub struct Prepared {
 impl Prepared {
     /// Flattens `scene`. Errors: more materials, spectra or bounces than ids and counters have bits for.
     pub fn new(scene: &Scene, seed: u64) -> Result<Prepared> {
-        if scene.integrator.max_bounces > MAX_BOUNCES {
-            return Err(Error::input(
-                &scene.file,
-                format!("integrator.max_bounces = {} is more than the {MAX_BOUNCES} supported", scene.integrator.max_bounces),
-            ));
-        }
         let accel = Accel::build(scene);
         if scene.materials.len() > MAX_MATERIALS {
             return Err(Error::input(&scene.file, format!("more than {MAX_MATERIALS} materials")));

@@ -5,6 +5,7 @@
 
 use std::sync::OnceLock;
 
+use super::data::{CIE1931, columns};
 use super::{Channels, Curve, Outside};
 
 /// CIE XYZ (D65 white, Y = 1) to linear sRGB, from the primaries and the white point of IEC 61966-2-1.
@@ -21,14 +22,7 @@ const VISIBLE_SHARE: f64 = 0.95;
 pub fn cie1931() -> &'static [Curve; 3] {
     static OBSERVER: OnceLock<[Curve; 3]> = OnceLock::new();
     OBSERVER.get_or_init(|| {
-        let rows: Vec<[f64; 4]> = include_str!("data/cie1931_2deg_1nm.csv")
-            .lines()
-            .filter(|line| line.starts_with(|c: char| c.is_ascii_digit()))
-            .map(|line| {
-                let mut cells = line.split(',').map(|cell| cell.parse().expect("a number in the built-in table"));
-                std::array::from_fn(|_| cells.next().expect("four columns in the built-in table"))
-            })
-            .collect();
+        let rows: Vec<[f64; 4]> = columns(CIE1931).collect();
         std::array::from_fn(|i| Curve::Linear {
             nm: rows.iter().map(|row| row[0]).collect(),
             value: rows.iter().map(|row| row[i + 1]).collect(),
@@ -297,11 +291,7 @@ mod tests {
     /// VALIDATION section 1.8: D65 has x, y = 0.31271, 0.32902; it is the white of sRGB.
     #[test]
     fn daylight_is_white() {
-        let rows = include_str!("data/d65_5nm.csv").lines().filter(|line| line.starts_with(char::is_numeric));
-        let (nm, value) = rows
-            .map(|line| line.split_once(',').expect("two columns"))
-            .map(|(nm, value)| (nm.parse::<f64>().expect("nm"), value.parse::<f64>().expect("value")))
-            .unzip();
+        let (nm, value) = columns::<2>(super::super::data::D65).map(|[nm, value]| (nm, value)).unzip();
         let curve = Curve::Linear { nm, value, outside: Outside::Zero };
         let channels = Channels::equal(360.0, 780.0, 420);
         let spectrum: Vec<f32> = (0..420).map(|k| curve.mean(360.0 + k as f64, 361.0 + k as f64) as f32).collect();

@@ -3,8 +3,10 @@
 pub mod channels;
 pub mod colour;
 pub mod curve;
+mod data;
 pub mod planck;
 pub mod table;
+pub mod upsample;
 
 pub use channels::Channels;
 pub use curve::{Curve, Outside};
