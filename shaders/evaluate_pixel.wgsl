@@ -195,7 +195,9 @@ fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
     if (bad_count + negative_count > 0u) {
         atomicAdd(&counters[COUNTER_NON_FINITE], bad_count);
         atomicAdd(&counters[COUNTER_NEGATIVE], negative_count);
-        atomicMax(&counters[COUNTER_BAD_SLOT], slot);
-        atomicMax(&counters[COUNTER_BAD_SAMPLE], bad_sample);
+        // The first to come says where.
+        if (atomicMax(&counters[COUNTER_BAD_SAMPLE], bad_sample) == 0u) {
+            atomicStore(&counters[COUNTER_BAD_SLOT], slot);
+        }
     }
 }

@@ -100,7 +100,7 @@ struct Material {
 const COUNTER_OVERFLOW: u32 = 0u;
 const COUNTER_NON_FINITE: u32 = 1u;
 const COUNTER_NEGATIVE: u32 = 2u;
-// The first bad sample seen: pixel slot and sample index + 1 of some thread that met one.
+// Where: the pixel slot that reported first, and the largest sample index + 1 reported.
 const COUNTER_BAD_SLOT: u32 = 3u;
 const COUNTER_BAD_SAMPLE: u32 = 4u;
 // Rays traced by the paths that ended.

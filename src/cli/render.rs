@@ -4,8 +4,10 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use super::Output;
+use super::progress::Reporter;
 use super::scene::SceneArgs;
-use crate::{Error, Result};
+use crate::Result;
+use crate::render::schedule::{self, Job, Preview, StopRule};
 
 /// Render a scene into a cube
 ///
@@ -80,8 +82,26 @@ pub struct Args {
     pub quiet: bool,
 }
 
-pub fn run(args: &Args, _output: &Output) -> Result<()> {
-    Err(Error::Internal(format!("{}: `render` is not connected to a device yet", args.scene.scene.display())))
+pub fn run(args: &Args, output: &Output) -> Result<()> {
+    let interrupt = super::interrupt::watch()?;
+    let scene = args.scene.load()?;
+    let mut reporter = Reporter::new(args, output);
+    for warning in &scene.warnings {
+        reporter.warn(warning)?;
+    }
+    let job = Job {
+        output: args.output.clone(),
+        overwrite: args.overwrite,
+        seed: args.seed,
+        tile: args.scene.tile,
+        stop: StopRule { samples: args.spp, time: args.time },
+        preview: args.preview.clone().map(|file| Preview { file, exposure: args.exposure }),
+        profile: args.profile,
+        scene,
+    };
+    reporter.start(&job)?;
+    let summary = schedule::run(&job, &interrupt, &mut |event| reporter.event(event));
+    reporter.finish(&job, summary)
 }
 
 /// A duration as a number of seconds, or with a unit s, m or h.

@@ -2,6 +2,9 @@
 
 use std::path::PathBuf;
 
+use crate::Result;
+use crate::scene::{self, Scene};
+
 /// Arguments of every command that reads a scene.
 #[derive(Debug, clap::Args)]
 pub struct SceneArgs {
@@ -32,21 +35,33 @@ pub struct SceneArgs {
     pub tile: Option<u32>,
 }
 
-fn parse_override(text: &str) -> Result<(String, String), String> {
+impl SceneArgs {
+    /// Reads the scene, with what the arguments change.
+    pub fn load(&self) -> Result<Scene> {
+        let mut overrides = self.overrides.clone();
+        if let Some([width, height]) = self.size {
+            overrides.push(("film.width".into(), width.to_string()));
+            overrides.push(("film.height".into(), height.to_string()));
+        }
+        scene::load(&self.scene, &overrides)
+    }
+}
+
+fn parse_override(text: &str) -> std::result::Result<(String, String), String> {
     match text.split_once('=') {
         Some((key, value)) if !key.trim().is_empty() => Ok((key.trim().to_owned(), value.trim().to_owned())),
         _ => Err("an override is KEY=VALUE, such as film.width=256".into()),
     }
 }
 
-fn parse_size(text: &str) -> Result<[u32; 2], String> {
+fn parse_size(text: &str) -> std::result::Result<[u32; 2], String> {
     let side = |text: &str| text.parse::<u32>().ok().filter(|&side| side > 0);
     text.split_once(['x', 'X'])
         .and_then(|(width, height)| Some([side(width)?, side(height)?]))
         .ok_or_else(|| "a size is WIDTHxHEIGHT in whole pixels from 1, such as 640x480".into())
 }
 
-fn parse_tile(text: &str) -> Result<u32, String> {
+fn parse_tile(text: &str) -> std::result::Result<u32, String> {
     match text.parse::<u32>() {
         Ok(tile) if tile > 0 && tile % crate::cube::BLOCK == 0 => Ok(tile),
         _ => Err("a tile is a multiple of 8 pixels wide and high, such as 32 or 64".into()),

@@ -38,6 +38,8 @@ pub struct WavePlan {
     pub channels: u32,
     pub max_records: u32,
     pub roulette: bool,
+    /// Largest binding of the device, bytes.
+    pub binding: u64,
 }
 
 impl WavePlan {
@@ -79,6 +81,7 @@ impl WavePlan {
             channels: channels as u32,
             max_records: records as u32,
             roulette: prepared.features.roulette,
+            binding: limits.binding,
         })
     }
 
@@ -164,7 +167,7 @@ mod tests {
     use super::*;
 
     fn plan(paths: u32, samples: u32, tile: [u32; 2]) -> WavePlan {
-        WavePlan { tile, paths, samples, units: 4, channels: 8, max_records: 11, roulette: false }
+        WavePlan { tile, paths, samples, units: 4, channels: 8, max_records: 11, roulette: false, binding: 128 << 20 }
     }
 
     /// Every (pixel, sample) once, a pixel's samples in order.

@@ -1,6 +1,7 @@
 //! One device at work: generate, evaluate, transfer. The names are the method's own.
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use crate::gpu::adapter::Gpu;
 use crate::gpu::buffer;
@@ -39,6 +40,9 @@ pub struct Worker {
     timestamps: Option<Timestamps>,
     slots: Vec<Slot>,
     next_slot: usize,
+    idle_since: Instant,
+    /// Seconds in which nothing was submitted.
+    pub idle_s: f64,
 }
 
 /// A pass with its bind groups.
@@ -117,7 +121,22 @@ impl Worker {
         gpu.check()?;
         let profile = Profile::default();
         let timestamps = None;
-        Ok(Worker { gpu, plan, profile, prepared, camera, bounce, evaluate, shape, path_buffers, timestamps, slots, next_slot: 0 })
+        Ok(Worker {
+            gpu,
+            plan,
+            profile,
+            prepared,
+            camera,
+            bounce,
+            evaluate,
+            shape,
+            path_buffers,
+            timestamps,
+            slots,
+            next_slot: 0,
+            idle_since: Instant::now(),
+            idle_s: 0.0,
+        })
     }
 
     /// Measures the passes from now on, at the price of waiting for every wave.
@@ -137,6 +156,9 @@ impl Worker {
         let slot = self.next_slot;
         self.next_slot = (slot + 1) % SLOTS;
         self.collect_slot(slot, collected)?;
+        if self.is_idle() {
+            self.idle_s += self.idle_since.elapsed().as_secs_f64();
+        }
 
         let buffers = &self.path_buffers;
         self.gpu.queue.write_buffer(&buffers.units, 0, bytemuck::cast_slice(units));
@@ -168,6 +190,9 @@ impl Worker {
     fn collect_slot(&mut self, slot: usize, collected: &mut dyn FnMut(Collected) -> Result<()>) -> Result<()> {
         let Some(pending) = self.slots[slot].pending.take() else { return Ok(()) };
         buffer::wait(&self.gpu, pending.submission)?;
+        if self.is_idle() {
+            self.idle_since = Instant::now();
+        }
         let size = self.unit_bytes() * pending.units.len() as u64;
         let staging = &self.slots[slot].staging;
         {
@@ -183,6 +208,10 @@ impl Worker {
         }
         staging.unmap();
         Ok(())
+    }
+
+    fn is_idle(&self) -> bool {
+        self.slots.iter().all(|slot| slot.pending.is_none())
     }
 
     fn unit_bytes(&self) -> u64 {
