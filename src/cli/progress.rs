@@ -183,7 +183,7 @@ fn fields(status: &Status) -> Value {
 }
 
 /// A duration as people say it.
-fn short(d: Duration) -> String {
+pub fn short(d: Duration) -> String {
     let s = d.as_secs_f64();
     match s {
         s if s < 60.0 => format!("{s:.1} s"),

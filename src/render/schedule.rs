@@ -85,6 +85,8 @@ pub struct Summary {
     /// Seconds until the device was ready, and seconds spent merging.
     pub setup_s: f64,
     pub merge_s: f64,
+    /// Scene and buffers on the device, bytes.
+    pub device_bytes: u64,
     /// EV of the last preview written.
     pub exposure: Option<f64>,
     pub counters: Counters,
@@ -131,6 +133,7 @@ pub fn run(job: &Job, interrupt: &Interrupt, observe: &mut dyn FnMut(Event) -> R
         profile: job.profile.then_some(worker.profile),
         setup_s: render.setup_s,
         merge_s: render.merge_s,
+        device_bytes: worker.device_bytes(),
         exposure,
         counters: render.counters,
         status: render.status,

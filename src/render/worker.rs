@@ -37,6 +37,7 @@ pub struct Worker {
     evaluate: Stage,
     shape: EvaluateShape,
     path_buffers: PathBuffers,
+    scene_bytes: u64,
     timestamps: Option<Timestamps>,
     slots: Vec<Slot>,
     next_slot: usize,
@@ -131,6 +132,7 @@ impl Worker {
             evaluate,
             shape,
             path_buffers,
+            scene_bytes: scene.bytes,
             timestamps,
             slots,
             next_slot: 0,
@@ -208,6 +210,11 @@ impl Worker {
         }
         staging.unmap();
         Ok(())
+    }
+
+    /// Scene and buffers on the device, bytes.
+    pub fn device_bytes(&self) -> u64 {
+        self.scene_bytes + self.plan.device_bytes()
     }
 
     fn is_idle(&self) -> bool {
