@@ -7,7 +7,7 @@
 
 @group(1) @binding(0) var<uniform> wave: Wave;
 @group(1) @binding(1) var<storage, read> units: array<vec4<u32>>;
-@group(1) @binding(2) var<storage, read_write> states: array<vec4<f32>>;
+@group(1) @binding(2) var<storage, read_write> states: array<vec4<u32>>;
 @group(1) @binding(3) var<storage, read_write> heads: array<vec2<u32>>;
 @group(1) @binding(4) var<storage, read_write> records: array<vec2<u32>>;
 @group(1) @binding(5) var<storage, read_write> counters: array<atomic<u32>>;
@@ -56,12 +56,12 @@ fn generate_bounce(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
         path = queue[(step.bounce & 1u) * wave.path_count + place];
     }
     let state1 = states[2u * path + 1u];
-    let packed = bitcast<u32>(state1.w);
+    let packed = state1.w;
     if (packed == ENDED) {
         return;
     }
-    let state0 = states[2u * path];
-    let ray = Ray(state0.xyz, state1.xyz);
+    let state0 = bitcast<vec4<f32>>(states[2u * path]);
+    let ray = Ray(state0.xyz, bitcast<vec3<f32>>(state1.xyz));
     // Density of `direction`, for MIS; the camera's own rays compete with nothing.
     let density = state0.w;
     var list = RecordList(path, packed & 0xffffu, packed >> 16u);
@@ -183,8 +183,8 @@ fn generate_bounce(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
         atomicAdd(&counters[COUNTER_OVERFLOW], 1u);
     }
     heads[path].y = list.used;
-    states[2u * path] = vec4<f32>(origin, dot(normal, direction) * INV_PI);
-    states[2u * path + 1u] = vec4<f32>(direction, bitcast<f32>(list.count | (list.used << 16u)));
+    states[2u * path] = bitcast<vec4<u32>>(vec4<f32>(origin, dot(normal, direction) * INV_PI));
+    states[2u * path + 1u] = vec4<u32>(bitcast<vec3<u32>>(direction), list.count | (list.used << 16u));
     let next = atomicAdd(&queue_lengths[step.bounce], 1u);
     queue[((step.bounce + 1u) & 1u) * wave.path_count + next] = path;
 }

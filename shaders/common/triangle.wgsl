@@ -44,3 +44,13 @@ fn intersect_triangle(ray: ShearedRay, a_in: vec3<f32>, b_in: vec3<f32>, c_in: v
     let inverse = 1.0 / determinant;
     return vec3<f32>(dot(edge, z) * inverse, edge.y * inverse, edge.z * inverse);
 }
+
+// Counter-clockwise vertices face the front. Edges are scaled first: tiny triangles would leave only subnormals.
+fn triangle_normal(p: Primitive) -> vec3<f32> {
+    return normalize(cross(scaled_to_one(p.b - p.a), scaled_to_one(p.c - p.a)));
+}
+
+fn scaled_to_one(v: vec3<f32>) -> vec3<f32> {
+    let a = abs(v);
+    return v / max(max(a.x, a.y), max(a.z, 1.0e-37));
+}

@@ -68,6 +68,17 @@ struct Hit {
     v: f32,
 }
 
+// What a ray can meet: three vertices, or a shape as shapes.wgsl has it.
+struct Primitive {
+    a: vec3<f32>,
+    // Material in the low 24 bits, kind in the high 8; kind 0 is a triangle.
+    tag: u32,
+    b: vec3<f32>,
+    // NONE where nothing is emitted.
+    emitter: u32,
+    c: vec3<f32>,
+}
+
 // A surface point; the normal is the geometric one, not turned towards the ray.
 struct Surface {
     position: vec3<f32>,

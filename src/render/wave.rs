@@ -71,7 +71,7 @@ impl WavePlan {
         }
         // One invocation of `evaluate` walks all samples of a pixel.
         let samples = (u64::from(LOOP_LIMIT) / (records + 1)).clamp(1, 64).min(paths);
-        let by_memory = (if limits.software { 32 << 20 } else { limits.binding.min(512 << 20) }) / tile_bytes;
+        let by_memory = (if limits.software { 32 << 20 } else { 128 << 20 }) / tile_bytes;
         let units = (paths / tile_pixels).min(by_memory).max(1);
         Ok(WavePlan {
             tile,
