@@ -5,10 +5,10 @@
 @group(0) @binding(2) var<storage, read> emitters: array<Emitter>;
 // Upper ends of the emitters' intervals in [0, 1].
 @group(0) @binding(3) var<storage, read> emitter_cdf: array<f32>;
-#repeat NODE_WINDOWS
+#repeat NODE_WINDOWS i
 @group(0) @binding($(4+i)) var<storage, read> nodes_$i: array<vec4<u32>>;
 #end
-#repeat PRIMITIVE_WINDOWS
+#repeat PRIMITIVE_WINDOWS i
 @group(0) @binding($(8+i)) var<storage, read> primitives_$i: array<vec4<u32>>;
 #end
 
@@ -18,7 +18,7 @@ fn load_node(node: u32, part: u32) -> vec4<u32> {
     let window = node / NODE_WINDOW;
     let at = (node % NODE_WINDOW) * 5u + part;
     switch (window) {
-#repeat NODE_WINDOWS
+#repeat NODE_WINDOWS i
         case $iu: { return nodes_$i[at]; }
 #end
         default: { return vec4<u32>(0u); }
@@ -41,7 +41,7 @@ fn load_primitive_part(primitive: u32, part: u32) -> vec4<u32> {
     let window = primitive / PRIMITIVE_WINDOW;
     let at = (primitive % PRIMITIVE_WINDOW) * 3u + part;
     switch (window) {
-#repeat PRIMITIVE_WINDOWS
+#repeat PRIMITIVE_WINDOWS i
         case $iu: { return primitives_$i[at]; }
 #end
         default: { return vec4<u32>(0u); }

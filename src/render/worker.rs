@@ -96,7 +96,7 @@ impl Worker {
         let scene = SceneBuffers::new(&gpu, &prepared, &windows)?;
         let path_buffers = PathBuffers::new(&gpu, &prepared, &plan);
 
-        let shape = EvaluateShape::new(prepared.tables.channels_padded as u32 / 4, if gpu.is_software { 8 } else { 32 });
+        let shape = EvaluateShape::new(prepared.tables.channels_padded as u32 / 4, gpu.is_software);
         let defines = prepared.defines(&windows);
         let stage = |modules: &[shader::Module], defines: &shader::Defines| {
             let pass = Pass::new(&gpu, &shader::compose(modules, defines))?;
