@@ -12,9 +12,10 @@
 // [pixel slot of the wave's units][channel].
 @group(1) @binding(9) var<storage, read_write> means: array<f32>;
 #if KNOTS
-// Spectra that no affordable number of strata resolves, exact: first knot of (spectrum, channel), and (mu, value).
+// Spectra that no affordable number of strata resolves, exact: first knot of (spectrum, channel), and (mu as it stands in
+// the head, value).
 @group(1) @binding(10) var<storage, read> knot_starts: array<u32>;
-@group(1) @binding(11) var<storage, read> knots: array<vec2<f32>>;
+@group(1) @binding(11) var<storage, read> knots: array<vec2<u32>>;
 #endif
 
 // Where the path's wavelength sample stands: its stratum, and the place within.
@@ -22,7 +23,7 @@ struct SpectralSample {
     stratum: u32,
     place: f32,
 #if KNOTS
-    mu: f32,
+    mu: u32,
 #endif
 }
 
@@ -33,7 +34,7 @@ fn spectral_sample(mu: u32) -> SpectralSample {
     s.stratum = mu >> (32u - frame.stratum_bits);
 #endif
 #if KNOTS
-    s.mu = f32(mu >> 8u) * 5.9604645e-8;
+    s.mu = mu;
 #endif
     return s;
 }
@@ -51,7 +52,7 @@ fn table_value(spectrum: u32, quad: u32, s: SpectralSample) -> vec4<f32> {
 
 #if KNOTS
 // Binary search without a loop: loop iterations are scarce (KERNELS), and its length is known.
-fn knot_value(spectrum: u32, channel: u32, mu: f32) -> f32 {
+fn knot_value(spectrum: u32, channel: u32, mu: u32) -> f32 {
     let first = knot_starts[spectrum * CHANNELS_PADDED + channel];
     var low = first;
     // Segments still in question, from `low` on.
@@ -66,7 +67,8 @@ fn knot_value(spectrum: u32, channel: u32, mu: f32) -> f32 {
 #end
     let a = knots[low];
     let b = knots[low + 1u];
-    return a.y + clamp((mu - a.x) / max(b.x - a.x, 1.0e-30), 0.0, 1.0) * (b.y - a.y);
+    let place = min(f32(mu - a.x) / max(f32(b.x - a.x), 1.0), 1.0);
+    return bitcast<f32>(a.y) + place * (bitcast<f32>(b.y) - bitcast<f32>(a.y));
 }
 
 fn spectrum_value(spectrum: u32, quad: u32, s: SpectralSample) -> vec4<f32> {
