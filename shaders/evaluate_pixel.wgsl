@@ -1,5 +1,5 @@
 // Evaluate, pixel-major: a workgroup owns one pixel (several, when there are few channels) and a block of channels,
-// four channels a thread. It walks the pixel's saved paths in sample order, evaluates every channel along each, and
+// VECTORS x 4 channels a thread. It walks the pixel's saved paths in sample order, evaluates every channel along each, and
 // folds them into the running mean in registers; no atomics, one write at the end (Algorithm 1 of the method, with the
 // loops over paths and channels exchanged).
 
@@ -12,9 +12,10 @@
 // [pixel slot of the wave's units][channel].
 @group(1) @binding(9) var<storage, read_write> means: array<f32>;
 #if KNOTS
-// Spectra that no affordable number of strata resolves, exact: first knot of (spectrum, channel), and (mu, value).
+// Spectra that no affordable number of strata resolves, exact: first knot of (spectrum, channel), and (mu as it stands in
+// the head, value).
 @group(1) @binding(10) var<storage, read> knot_starts: array<u32>;
-@group(1) @binding(11) var<storage, read> knots: array<vec2<f32>>;
+@group(1) @binding(11) var<storage, read> knots: array<vec2<u32>>;
 #endif
 
 // Where the path's wavelength sample stands: its stratum, and the place within.
@@ -22,7 +23,7 @@ struct SpectralSample {
     stratum: u32,
     place: f32,
 #if KNOTS
-    mu: f32,
+    mu: u32,
 #endif
 }
 
@@ -33,7 +34,7 @@ fn spectral_sample(mu: u32) -> SpectralSample {
     s.stratum = mu >> (32u - frame.stratum_bits);
 #endif
 #if KNOTS
-    s.mu = f32(mu >> 8u) * 5.9604645e-8;
+    s.mu = mu;
 #endif
     return s;
 }
@@ -51,14 +52,14 @@ fn table_value(spectrum: u32, quad: u32, s: SpectralSample) -> vec4<f32> {
 
 #if KNOTS
 // Binary search without a loop: loop iterations are scarce (KERNELS), and its length is known.
-fn knot_value(spectrum: u32, channel: u32, mu: f32) -> f32 {
+fn knot_value(spectrum: u32, channel: u32, mu: u32) -> f32 {
     let first = knot_starts[spectrum * CHANNELS_PADDED + channel];
     var low = first;
     // Segments still in question, from `low` on.
     var left = knot_starts[spectrum * CHANNELS_PADDED + channel + 1u] - 1u - first;
     var half = 0u;
     var above = false;
-#repeat KNOT_STEPS
+#repeat KNOT_STEPS i
     half = left / 2u;
     above = knots[low + half].x <= mu;
     low = select(low, low + half, above);
@@ -66,7 +67,8 @@ fn knot_value(spectrum: u32, channel: u32, mu: f32) -> f32 {
 #end
     let a = knots[low];
     let b = knots[low + 1u];
-    return a.y + clamp((mu - a.x) / max(b.x - a.x, 1.0e-30), 0.0, 1.0) * (b.y - a.y);
+    let place = min(f32(mu - a.x) / max(f32(b.x - a.x), 1.0), 1.0);
+    return bitcast<f32>(a.y) + place * (bitcast<f32>(b.y) - bitcast<f32>(a.y));
 }
 
 fn spectrum_value(spectrum: u32, quad: u32, s: SpectralSample) -> vec4<f32> {
@@ -88,114 +90,156 @@ fn spectrum_value(spectrum: u32, quad: u32, s: SpectralSample) -> vec4<f32> {
 #endif
 #endif
 
+fn load_mean(at: u32, channels: u32) -> vec4<f32> {
+    var m = vec4<f32>(0.0);
+    if (channels > 0u) { m.x = means[at]; }
+    if (channels > 1u) { m.y = means[at + 1u]; }
+    if (channels > 2u) { m.z = means[at + 2u]; }
+    if (channels > 3u) { m.w = means[at + 3u]; }
+    return m;
+}
+
+fn store_mean(at: u32, channels: u32, m: vec4<f32>) {
+    if (channels > 0u) { means[at] = m.x; }
+    if (channels > 1u) { means[at + 1u] = m.y; }
+    if (channels > 2u) { means[at + 2u] = m.z; }
+    if (channels > 3u) { means[at + 3u] = m.w; }
+}
+
+// Samples of a channel that must not occur; `sample` is the index + 1 of the first path that had one.
+struct BadSamples {
+    non_finite: u32,
+    negative: u32,
+    sample: u32,
+}
+
+fn count_true(b: vec4<bool>) -> u32 {
+    return dot(select(vec4<u32>(0u), vec4<u32>(1u), b), vec4<u32>(1u));
+}
+
+// A path's radiance with what is not finite counted and replaced by 0, what is negative counted. Told by the bits, since
+// compilers may assume that NaN and infinity do not occur.
+fn checked(radiance: vec4<f32>, sample: u32, bad: ptr<function, BadSamples>) -> vec4<f32> {
+    let bits = bitcast<vec4<u32>>(radiance);
+    let non_finite = (bits & vec4<u32>(0x7f800000u)) == vec4<u32>(0x7f800000u);
+    if (any(bits > vec4<u32>(0x7f7fffffu))) {
+        (*bad).non_finite += count_true(non_finite);
+        (*bad).negative += count_true((bits > vec4<u32>(0x80000000u)) & !non_finite);
+        (*bad).sample = select((*bad).sample, sample, (*bad).sample == 0u);
+    }
+    return select(radiance, vec4<f32>(0.0), non_finite);
+}
+
 @compute @workgroup_size($WORKGROUP)
 fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                   @builtin(local_invocation_index) thread: u32) {
     let local_slot = (group.x + group.y * groups.x) * PIXELS_PER_GROUP + thread / LANES;
-    let quad = group.z * LANES + thread % LANES;
-    if (local_slot >= wave.pixel_count || quad >= QUADS) {
+    let lane = group.z * LANES + thread % LANES;
+    let first_quad = lane * VECTORS;
+    if (local_slot >= wave.pixel_count || first_quad >= QUADS) {
         return;
     }
     let slot = wave.pixel_begin + local_slot;
-    let first_channel = 4u * quad;
-    let out = slot * CHANNELS + first_channel;
 
+    // This thread's quads of channels. Past the last one they repeat it, and are not written.
+#repeat VECTORS v
+    let quad_$v = min(first_quad + $vu, QUADS - 1u);
+    let out_$v = slot * CHANNELS + 4u * quad_$v;
+    let channels_$v = select(0u, min(4u, CHANNELS - 4u * quad_$v), first_quad + $vu < QUADS);
     // Waves of one unit take turns: each goes on from the mean that the last one left.
-    var mean = vec4<f32>(0.0);
+    var mean_$v = vec4<f32>(0.0);
     if (wave.sample_begin > 0u) {
-        mean.x = means[out];
-        if (first_channel + 1u < CHANNELS) { mean.y = means[out + 1u]; }
-        if (first_channel + 2u < CHANNELS) { mean.z = means[out + 2u]; }
-        if (first_channel + 3u < CHANNELS) { mean.w = means[out + 3u]; }
+        mean_$v = load_mean(out_$v, channels_$v);
     }
+#end
 
 #if REGISTERS
 #if STRATA
 #else
     // One stratum: every spectrum of these channels stays in registers.
-#repeat FACTORS
-    let factor_value_$i = spectra[table_index(0u, $(1+i)u, quad)];
-    let factor_slope_$i = spectra[table_index(0u, $(1+i)u, quad) + 1u];
+#repeat VECTORS v
+#repeat FACTORS i
+    let factor_value_$i_$v = spectra[table_index(0u, $(1+i)u, quad_$v)];
+    let factor_slope_$i_$v = spectra[table_index(0u, $(1+i)u, quad_$v) + 1u];
 #end
-#repeat SOURCES
-    let source_value_$i = spectra[table_index(0u, FIRST_SOURCE + $iu, quad)];
-    let source_slope_$i = spectra[table_index(0u, FIRST_SOURCE + $iu, quad) + 1u];
+#repeat SOURCES i
+    let source_value_$i_$v = spectra[table_index(0u, FIRST_SOURCE + $iu, quad_$v)];
+    let source_slope_$i_$v = spectra[table_index(0u, FIRST_SOURCE + $iu, quad_$v) + 1u];
+#end
 #end
 #endif
 #endif
 
-    var bad_count = 0u;
-    var negative_count = 0u;
-    var bad_sample = 0u;
+    var bad = BadSamples(0u, 0u, 0u);
     for (var i = 0u; i < wave.samples; i += 1u) {
         let path = local_slot * wave.samples + i;
         let head = heads[path];
         let s = spectral_sample(head.x);
 #if REGISTERS
-#repeat FACTORS
+#repeat VECTORS v
+#repeat FACTORS i
 #if STRATA
-        let factor_at_$i = table_index(s.stratum, $(1+i)u, quad);
-        let factor_$i = spectra[factor_at_$i] + s.place * spectra[factor_at_$i + 1u];
+        let factor_at_$i_$v = table_index(s.stratum, $(1+i)u, quad_$v);
+        let factor_$i_$v = spectra[factor_at_$i_$v] + s.place * spectra[factor_at_$i_$v + 1u];
 #else
-        let factor_$i = factor_value_$i + s.place * factor_slope_$i;
+        let factor_$i_$v = factor_value_$i_$v + s.place * factor_slope_$i_$v;
 #endif
 #end
-#repeat SOURCES
+#repeat SOURCES i
 #if STRATA
-        let source_at_$i = table_index(s.stratum, FIRST_SOURCE + $iu, quad);
-        let source_$i = spectra[source_at_$i] + s.place * spectra[source_at_$i + 1u];
+        let source_at_$i_$v = table_index(s.stratum, FIRST_SOURCE + $iu, quad_$v);
+        let source_$i_$v = spectra[source_at_$i_$v] + s.place * spectra[source_at_$i_$v + 1u];
 #else
-        let source_$i = source_value_$i + s.place * source_slope_$i;
+        let source_$i_$v = source_value_$i_$v + s.place * source_slope_$i_$v;
 #endif
+#end
 #end
 #endif
 
-        var throughput = vec4<f32>(1.0);
-        var radiance = vec4<f32>(0.0);
+#repeat VECTORS v
+        var throughput_$v = vec4<f32>(1.0);
+        var radiance_$v = vec4<f32>(0.0);
+#end
         let first_record = path * frame.max_records;
         for (var r = first_record; r < first_record + head.y; r += 1u) {
             let record = records[r];
             let factor_id = record.x & 0xffffu;
             let source_id = record.x >> 16u;
+            let weight = bitcast<f32>(record.y);
+#repeat VECTORS v
 #if REGISTERS
-            var factor = vec4<f32>(1.0);
-            var source = vec4<f32>(0.0);
-#repeat FACTORS
-            factor = select(factor, factor_$i, factor_id == $(1+i)u);
+            var factor_$v = vec4<f32>(1.0);
+            var source_$v = vec4<f32>(0.0);
+#repeat FACTORS i
+            factor_$v = select(factor_$v, factor_$i_$v, factor_id == $(1+i)u);
 #end
-#repeat SOURCES
-            source = select(source, source_$i, source_id == FIRST_SOURCE + $iu);
+#repeat SOURCES i
+            source_$v = select(source_$v, source_$i_$v, source_id == FIRST_SOURCE + $iu);
 #end
 #else
-            let factor = spectrum_value(factor_id, quad, s);
-            let source = spectrum_value(source_id, quad, s);
+            let factor_$v = spectrum_value(factor_id, quad_$v, s);
+            let source_$v = spectrum_value(source_id, quad_$v, s);
 #endif
-            throughput *= factor;
-            radiance += bitcast<f32>(record.y) * throughput * source;
+            throughput_$v *= factor_$v;
+            radiance_$v += weight * throughput_$v * source_$v;
+#end
         }
 
-        // Infinite, NaN or with the sign bit set: told by the bits, since compilers may assume that NaN does not occur.
-        let bits = bitcast<vec4<u32>>(radiance);
-        let non_finite = (bits & vec4<u32>(0x7f800000u)) == vec4<u32>(0x7f800000u);
-        let suspect = bits > vec4<u32>(0x7f7fffffu);
-        if (any(suspect)) {
-            let negative = suspect & !non_finite & (bits != vec4<u32>(0x80000000u));
-            bad_count += dot(select(vec4<u32>(0u), vec4<u32>(1u), non_finite), vec4<u32>(1u));
-            negative_count += dot(select(vec4<u32>(0u), vec4<u32>(1u), negative), vec4<u32>(1u));
-            bad_sample = select(wave.sample_begin + i + 1u, bad_sample, bad_sample != 0u);
-        }
-        radiance = select(radiance, vec4<f32>(0.0), non_finite);
-        mean += (radiance - mean) / f32(wave.sample_begin + i + 1u);
+        let index = wave.sample_begin + i + 1u;
+#repeat VECTORS v
+        mean_$v += (checked(radiance_$v, index, &bad) - mean_$v) / f32(index);
+#end
     }
 
-    means[out] = mean.x;
-    if (first_channel + 1u < CHANNELS) { means[out + 1u] = mean.y; }
-    if (first_channel + 2u < CHANNELS) { means[out + 2u] = mean.z; }
-    if (first_channel + 3u < CHANNELS) { means[out + 3u] = mean.w; }
-    if (bad_count + negative_count > 0u) {
-        atomicAdd(&counters[COUNTER_NON_FINITE], bad_count);
-        atomicAdd(&counters[COUNTER_NEGATIVE], negative_count);
-        atomicMax(&counters[COUNTER_BAD_SLOT], slot);
-        atomicMax(&counters[COUNTER_BAD_SAMPLE], bad_sample);
+#repeat VECTORS v
+    store_mean(out_$v, channels_$v, mean_$v);
+#end
+    if (bad.non_finite + bad.negative > 0u) {
+        atomicAdd(&counters[COUNTER_NON_FINITE], bad.non_finite);
+        atomicAdd(&counters[COUNTER_NEGATIVE], bad.negative);
+        // The first to come says where.
+        if (atomicMax(&counters[COUNTER_BAD_SAMPLE], bad.sample) == 0u) {
+            atomicStore(&counters[COUNTER_BAD_SLOT], slot);
+        }
     }
 }

@@ -7,7 +7,7 @@
 
 @group(1) @binding(0) var<uniform> wave: Wave;
 @group(1) @binding(1) var<storage, read> units: array<vec4<u32>>;
-@group(1) @binding(2) var<storage, read_write> states: array<vec4<f32>>;
+@group(1) @binding(2) var<storage, read_write> states: array<vec4<u32>>;
 @group(1) @binding(3) var<storage, read_write> heads: array<vec2<u32>>;
 @group(1) @binding(4) var<storage, read_write> records: array<vec2<u32>>;
 @group(1) @binding(5) var<storage, read_write> counters: array<atomic<u32>>;
@@ -15,6 +15,11 @@
 #if ROULETTE
 @group(1) @binding(7) var<storage, read_write> throughputs: array<f32>;
 #endif
+
+// Paths still under way, compacted from bounce to bounce: two lists that take turns, and how long each became. Their
+// order differs from run to run, the paths do not.
+@group(1) @binding(8) var<storage, read_write> queue: array<u32>;
+@group(1) @binding(9) var<storage, read_write> queue_lengths: array<atomic<u32>>;
 
 // `count` records so far; evaluation may stop after the last one with a weight, `used`.
 struct RecordList {
@@ -35,22 +40,29 @@ fn append(list: ptr<function, RecordList>, factor: u32, source: u32, weight: f32
 fn end_path(list: RecordList, rays: u32) {
     atomicAdd(&counters[COUNTER_RAYS], rays);
     heads[list.path].y = list.used;
-    states[2u * list.path + 1u].w = bitcast<f32>(ENDED);
 }
 
 @compute @workgroup_size(64)
 fn generate_bounce(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let path = id.x + id.y * groups.x * 64u;
-    if (path >= wave.path_count) {
-        return;
+    let place = id.x + id.y * groups.x * 64u;
+    var path = place;
+    if (step.bounce == 0u) {
+        if (place >= wave.path_count) {
+            return;
+        }
+    } else {
+        if (place >= atomicLoad(&queue_lengths[step.bounce - 1u])) {
+            return;
+        }
+        path = queue[(step.bounce & 1u) * wave.path_count + place];
     }
     let state1 = states[2u * path + 1u];
-    let packed = bitcast<u32>(state1.w);
+    let packed = state1.w;
     if (packed == ENDED) {
         return;
     }
-    let state0 = states[2u * path];
-    let ray = Ray(state0.xyz, state1.xyz);
+    let state0 = bitcast<vec4<f32>>(states[2u * path]);
+    let ray = Ray(state0.xyz, bitcast<vec3<f32>>(state1.xyz));
     // Density of `direction`, for MIS; the camera's own rays compete with nothing.
     let density = state0.w;
     var list = RecordList(path, packed & 0xffffu, packed >> 16u);
@@ -172,6 +184,8 @@ fn generate_bounce(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
         atomicAdd(&counters[COUNTER_OVERFLOW], 1u);
     }
     heads[path].y = list.used;
-    states[2u * path] = vec4<f32>(origin, dot(normal, direction) * INV_PI);
-    states[2u * path + 1u] = vec4<f32>(direction, bitcast<f32>(list.count | (list.used << 16u)));
+    states[2u * path] = bitcast<vec4<u32>>(vec4<f32>(origin, dot(normal, direction) * INV_PI));
+    states[2u * path + 1u] = vec4<u32>(bitcast<vec3<u32>>(direction), list.count | (list.used << 16u));
+    let next = atomicAdd(&queue_lengths[step.bounce], 1u);
+    queue[((step.bounce + 1u) & 1u) * wave.path_count + next] = path;
 }

@@ -2,7 +2,7 @@
 
 @group(1) @binding(0) var<uniform> wave: Wave;
 @group(1) @binding(1) var<storage, read> units: array<vec4<u32>>;
-@group(1) @binding(2) var<storage, read_write> states: array<vec4<f32>>;
+@group(1) @binding(2) var<storage, read_write> states: array<vec4<u32>>;
 @group(1) @binding(3) var<storage, read_write> heads: array<vec2<u32>>;
 #if ROULETTE
 @group(1) @binding(7) var<storage, read_write> throughputs: array<f32>;
@@ -44,7 +44,7 @@ fn generate_camera(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     let pixel = unit.xy + vec2<u32>(in_tile % wave.tile_width, in_tile / wave.tile_width);
     if (any(pixel >= unit.zw)) {
         heads[path] = vec2<u32>(0u, 0u);
-        states[2u * path + 1u] = vec4<f32>(0.0, 0.0, 0.0, bitcast<f32>(ENDED));
+        states[2u * path + 1u].w = ENDED;
         return;
     }
     let key = pixel_key(frame.seed_low, frame.seed_high, pixel.x, pixel.y, wave.epoch);
@@ -77,8 +77,8 @@ fn generate_camera(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 
     let mu = random_pair_bits(key, DIMENSION_WAVELENGTH, index, wave.epoch_mask).x;
     heads[path] = vec2<u32>(mu, 0u);
-    states[2u * path] = vec4<f32>(origin, 0.0);
-    states[2u * path + 1u] = vec4<f32>(direction, bitcast<f32>(0u));
+    states[2u * path] = bitcast<vec4<u32>>(vec4<f32>(origin, 0.0));
+    states[2u * path + 1u] = vec4<u32>(bitcast<vec3<u32>>(direction), 0u);
 #if ROULETTE
     throughputs[path] = 1.0;
 #endif

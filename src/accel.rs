@@ -48,6 +48,8 @@ pub struct Accel {
     pub space: DeviceSpace,
     /// CWBVH nodes, 80 bytes each; the root is the first. At least one.
     pub nodes: Vec<[u32; 20]>,
+    /// Levels of nodes: a traversal never has more of them waiting.
+    pub depth: u32,
     /// In the order of the BVH's leaves.
     pub primitives: Vec<Primitive>,
     /// The emitting primitives: (index into `primitives`, object, area in device units).
@@ -68,7 +70,7 @@ impl Accel {
             collect(&object.shape, object.material as u32, index as u32, &space, &mut loose, &mut degenerate);
         }
         let has_shapes = loose.iter().any(|p| p.tag >> 24 != 0);
-        let (nodes, order) = build_nodes(&loose);
+        let (nodes, order, depth) = build_nodes(&loose);
         let mut primitives: Vec<Primitive> = order.iter().map(|&i| loose[i as usize]).collect();
         let mut emitters = Vec::new();
         for (index, primitive) in primitives.iter_mut().enumerate() {
@@ -80,7 +82,7 @@ impl Accel {
                 emitters.push((index as u32, object, area(primitive)));
             }
         }
-        Accel { space, nodes, primitives, emitters, has_shapes, degenerate }
+        Accel { space, nodes, depth, primitives, emitters, has_shapes, degenerate }
     }
 }
 
@@ -113,7 +115,14 @@ fn device_space(scene: &Scene) -> DeviceSpace {
 }
 
 /// Appends a shape's primitives, the object's index standing in for the emitter.
-fn collect(shape: &Shape, material: u32, object: u32, space: &DeviceSpace, out: &mut Vec<Primitive>, degenerate: &mut usize) {
+fn collect(
+    shape: &Shape,
+    material: u32,
+    object: u32,
+    space: &DeviceSpace,
+    out: &mut Vec<Primitive>,
+    degenerate: &mut usize,
+) {
     let base = Primitive { tag: material, emitter: object, ..Primitive::default() };
     match shape {
         Shape::Mesh(mesh) => {
@@ -190,16 +199,16 @@ impl Boundable for Primitive {
     }
 }
 
-/// Deepest tree that the shader's traversal stack can take (`STACK_SIZE` in bvh.wgsl).
+/// Deeper trees are built anew: the traversal's stack grows with the depth.
 const MAX_DEPTH: usize = 30;
 
 /// Clustering takes quadratic time, and recursion as deep, over boxes that are the same: it merges one pair a round.
 const MAX_COINCIDENT: usize = 256;
 
-/// The nodes, and for each place in the leaves the primitive that stands there.
-fn build_nodes(primitives: &[Primitive]) -> (Vec<[u32; 20]>, Vec<u32>) {
+/// The nodes, for each place in the leaves the primitive that stands there, and the tree's depth.
+fn build_nodes(primitives: &[Primitive]) -> (Vec<[u32; 20]>, Vec<u32>, u32) {
     if primitives.is_empty() {
-        return (vec![[0; 20]], Vec::new());
+        return (vec![[0; 20]], Vec::new(), 1);
     }
     let clustered = (most_coincident(primitives) <= MAX_COINCIDENT)
         .then(|| build_cwbvh(primitives, BvhBuildParams::medium_build(), &mut std::time::Duration::default()))
@@ -207,7 +216,8 @@ fn build_nodes(primitives: &[Primitive]) -> (Vec<[u32; 20]>, Vec<u32>) {
         .filter(|bvh| depth(bvh) <= MAX_DEPTH);
     let bvh = clustered.unwrap_or_else(|| bvh2_to_cwbvh(&balanced(primitives), 3, true, false));
     let nodes = bvh.nodes.iter().map(|node| bytemuck::cast(*node)).collect();
-    (nodes, bvh.primitive_indices)
+    let depth = depth(&bvh) as u32;
+    (nodes, bvh.primitive_indices, depth)
 }
 
 /// The largest number of primitives that share one bounding box (by hashes: a collision may only overstate it).
@@ -277,16 +287,20 @@ mod tests {
     fn trees_are_valid_on_odd_input() {
         let one = vec![triangle([0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])];
         let coincident = vec![one[0]; 100_000];
-        let nested: Vec<_> = (1..5000).map(|i| triangle([-i as f32, -i as f32, 0.0], [i as f32, -i as f32, 0.0], [0.0, i as f32, 0.0])).collect();
+        let nested: Vec<_> = (1..5000)
+            .map(|i| triangle([-i as f32, -i as f32, 0.0], [i as f32, -i as f32, 0.0], [0.0, i as f32, 0.0]))
+            .collect();
         let grid: Vec<_> = (0..40_000)
             .map(|i| {
                 let (x, y) = ((i % 200) as f32, (i / 200) as f32);
                 triangle([x, y, 0.0], [x + 1.0, y, 0.0], [x, y + 1.0, 0.1 * x])
             })
             .collect();
-        let flat: Vec<_> = (0..100).map(|i| triangle([i as f32, 0.0, 0.0], [i as f32 + 1e-6, 0.0, 0.0], [i as f32, 0.0, 1.0])).collect();
+        let flat: Vec<_> = (0..100)
+            .map(|i| triangle([i as f32, 0.0, 0.0], [i as f32 + 1e-6, 0.0, 0.0], [i as f32, 0.0, 1.0]))
+            .collect();
         for primitives in [one, coincident, nested, grid, flat] {
-            let (nodes, order) = build_nodes(&primitives);
+            let (nodes, order, _) = build_nodes(&primitives);
             let mut seen = order.clone();
             seen.sort_unstable();
             assert!(seen.iter().enumerate().all(|(i, &p)| i as u32 == p), "each primitive stands in one leaf");

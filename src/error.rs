@@ -30,6 +30,9 @@ pub enum Error {
     /// Ctrl-C (2) or SIGTERM (15) ended the work in order.
     #[error("interrupted by signal {signal}")]
     Interrupted { signal: i32 },
+    /// Whoever read the standard output has gone (`spectile … | head`): nothing is wrong and nothing is said.
+    #[error("the reader of the output has gone")]
+    BrokenPipe,
     /// A broken promise inside Spectile: a bug worth reporting.
     #[error("internal error: {0} (this is a bug in Spectile, please report it)")]
     Internal(String),
@@ -39,6 +42,7 @@ impl Error {
     /// The exit code of DESIGN section 5.
     pub fn exit_code(&self) -> i32 {
         match self {
+            Error::BrokenPipe => 0,
             Error::Check(_) | Error::Internal(_) => 1,
             Error::Input(_) | Error::Usage(_) => 2,
             Error::NoDevice(_) => 3,

@@ -79,7 +79,11 @@ fn jagged(n: u32, seed: u32, low: f64, high: f64) -> Curve {
 /// Steps inside channels.
 fn stepped(levels: [f64; 3]) -> Curve {
     let [a, b, c] = levels;
-    Curve::Linear { nm: vec![380.0, 487.3, 487.3, 611.9, 611.9, 780.0], value: vec![a, a, b, b, c, c], outside: Outside::Hold }
+    Curve::Linear {
+        nm: vec![380.0, 487.3, 487.3, 611.9, 611.9, 780.0],
+        value: vec![a, a, b, b, c, c],
+        outside: Outside::Hold,
+    }
 }
 
 /// Lines of 0.4 nm on a low continuum: no affordable number of strata resolves them.
@@ -150,7 +154,9 @@ fn lamp_quad(y: f64) -> Shape {
 #[test]
 fn cornell_like_room() {
     for (sampler, count) in [(Sampler::Sobol, 40), (Sampler::Independent, 33), (Sampler::Sobol, 3)] {
-        let mut scene = cornell(Channels::equal(380.0, 780.0, count)).lamp(lamp_quad(0.98), jagged(9, 2, 1.0, 3.0), Sides::Front).build();
+        let mut scene = cornell(Channels::equal(380.0, 780.0, count))
+            .lamp(lamp_quad(0.98), jagged(9, 2, 1.0, 3.0), Sides::Front)
+            .build();
         scene.integrator.sampler = sampler;
         let f = features(&scene);
         assert!(!f.shapes && !f.environment && f.strata && f.registers != f.knots && f.knots == (count == 3), "{f:?}");
@@ -161,8 +167,16 @@ fn cornell_like_room() {
 /// The same with a constant spectrum each: registers without strata; and roulette.
 #[test]
 fn grey_room_with_roulette() {
-    let mut b = Builder::new().camera(look(DVec3::new(0.0, 0.0, 0.95), DVec3::ZERO, DVec3::Y, wide())).film(8, 8, Filter::Box);
-    for (axis, reflectance) in [(DVec3::X, 0.9), (DVec3::NEG_X, 0.3), (DVec3::Y, 0.03), (DVec3::NEG_Y, 0.8), (DVec3::NEG_Z, 0.6), (DVec3::Z, 0.5)] {
+    let mut b =
+        Builder::new().camera(look(DVec3::new(0.0, 0.0, 0.95), DVec3::ZERO, DVec3::Y, wide())).film(8, 8, Filter::Box);
+    for (axis, reflectance) in [
+        (DVec3::X, 0.9),
+        (DVec3::NEG_X, 0.3),
+        (DVec3::Y, 0.03),
+        (DVec3::NEG_Y, 0.8),
+        (DVec3::NEG_Z, 0.6),
+        (DVec3::Z, 0.5),
+    ] {
         b = b.diffuse(wall(axis), reflectance);
     }
     let scene = b.bounces(12).roulette(1).lamp(lamp_quad(0.5), 2.0, Sides::Both).build();
@@ -180,15 +194,27 @@ fn many_spectra_with_lines() {
     ));
     for i in 0..8 {
         let at = DVec3::new(-0.7 + 0.2 * f64::from(i), -0.8, 0.3 - 0.1 * f64::from(i % 3));
-        b = b.diffuse(icosphere(at, 0.09, 1), if i == 0 { stepped([0.9, 0.2, 0.6]) } else { jagged(5 + 3 * i, 30 + i, 0.2, 0.95) });
+        b = b.diffuse(
+            icosphere(at, 0.09, 1),
+            if i == 0 { stepped([0.9, 0.2, 0.6]) } else { jagged(5 + 3 * i, 30 + i, 0.2, 0.95) },
+        );
     }
     let lens = Projection::ThinLens { tan_half: DVec2::new(0.8, 0.7), aperture_radius: 0.05, focus_distance: 1.2 };
     let mut scene = b
         .camera(look(DVec3::new(0.1, 0.1, 0.9), DVec3::new(0.0, -0.3, 0.0), DVec3::Y, lens))
         .film(16, 12, Filter::Gaussian)
         .lamp(lamp_quad(0.98), lines(), Sides::Front)
-        .lamp(quad(DVec3::new(0.5, 0.2, -0.9), 0.3 * DVec3::X, 0.3 * DVec3::Y), Curve::Blackbody { kelvin: 900.0, scale: 0.2 }, Sides::Both)
-        .glowing(icosphere(DVec3::new(-0.5, 0.5, -0.5), 0.2, 1), jagged(40, 3, 0.0, 0.5), Curve::Blackbody { kelvin: 1800.0, scale: 0.01 }, Sides::Front)
+        .lamp(
+            quad(DVec3::new(0.5, 0.2, -0.9), 0.3 * DVec3::X, 0.3 * DVec3::Y),
+            Curve::Blackbody { kelvin: 900.0, scale: 0.2 },
+            Sides::Both,
+        )
+        .glowing(
+            icosphere(DVec3::new(-0.5, 0.5, -0.5), 0.2, 1),
+            jagged(40, 3, 0.0, 0.5),
+            Curve::Blackbody { kelvin: 1800.0, scale: 0.01 },
+            Sides::Front,
+        )
         .build();
     scene.film.crop = [5, 3, 12, 10];
     scene.integrator.sampler = Sampler::Sobol;
@@ -236,8 +262,17 @@ fn lamps_of_every_shape_and_a_sky() {
             .black(sphere(DVec3::new(0.9, -0.8, 0.5), 0.2))
             .lamp(sphere(DVec3::new(-0.8, -0.4, 0.0), 0.3), jagged(6, 6, 1.0, 2.0), sides)
             .glowing(disk(DVec3::new(0.2, 0.9, 0.1), DVec3::new(0.1, -1.0, 0.2), 0.3), 0.5, 3.0, sides)
-            .lamp(Shape::Cylinder { from: DVec3::new(-0.1, -0.9, 0.7), to: DVec3::new(0.3, -0.6, 0.4), radius: 0.1 }, 2.0, sides)
-            .glowing(quad(DVec3::new(0.6, -0.9, -0.4), 0.4 * DVec3::X, 0.4 * DVec3::Y), 0.3, stepped([4.0, 0.0, 2.0]), sides)
+            .lamp(
+                Shape::Cylinder { from: DVec3::new(-0.1, -0.9, 0.7), to: DVec3::new(0.3, -0.6, 0.4), radius: 0.1 },
+                2.0,
+                sides,
+            )
+            .glowing(
+                quad(DVec3::new(0.6, -0.9, -0.4), 0.4 * DVec3::X, 0.4 * DVec3::Y),
+                0.3,
+                stepped([4.0, 0.0, 2.0]),
+                sides,
+            )
             .sky(jagged(5, 7, 0.2, 0.5))
             .build();
         if i == 2 {
@@ -259,7 +294,12 @@ fn inside_a_sphere_lamp() {
             .bounces(5)
             .roulette(roulette)
             .glowing(sphere(DVec3::ZERO, 1.5), jagged(6, 8, 0.2, 0.7), 0.3, Sides::Both)
-            .glowing(Shape::Cylinder { from: DVec3::new(-0.9, -0.6, 0.0), to: DVec3::new(0.9, -0.4, 0.2), radius: 0.35 }, 0.6, jagged(6, 9, 0.5, 2.0), Sides::Both)
+            .glowing(
+                Shape::Cylinder { from: DVec3::new(-0.9, -0.6, 0.0), to: DVec3::new(0.9, -0.4, 0.2), radius: 0.35 },
+                0.6,
+                jagged(6, 9, 0.5, 2.0),
+                Sides::Both,
+            )
             .glowing(sphere(DVec3::new(0.5, 0.3, -0.3), 0.3), 0.5, 1.0, Sides::Front)
             .diffuse(sphere(DVec3::new(-0.5, 0.3, -0.3), 0.3), 0.9)
             .build();

@@ -14,7 +14,12 @@ use statistics::{Estimate, t_limit};
 /// A floor with a ball under a square lamp: soft shadows, interreflection.
 fn scene(sampler: Sampler, channels: Channels, radiance: impl IntoCurve) -> Scene {
     let mut scene = Builder::new()
-        .camera(look(DVec3::new(0.0, 1.0, 2.0), DVec3::ZERO, DVec3::Y, Projection::Perspective { tan_half: DVec2::splat(0.4) }))
+        .camera(look(
+            DVec3::new(0.0, 1.0, 2.0),
+            DVec3::ZERO,
+            DVec3::Y,
+            Projection::Perspective { tan_half: DVec2::splat(0.4) },
+        ))
         .film(16, 16, Filter::Box)
         .channels(channels)
         .bounces(2)
@@ -86,8 +91,11 @@ fn noise_of_a_channel_does_not_grow_with_their_number() {
         Curve::Linear { nm, value, outside: Outside::Hold }
     };
     let rendered = [8, 1000].map(|count| {
-        let lamp = scene(Sampler::Independent, Channels::equal(400.0, 800.0, count), steps(&|i| 10f64.powf(-3.0 * i / 7.0)));
-        let scene = Builder(lamp).lamp(sphere(DVec3::new(-0.8, 0.5, 0.3), 0.1), steps(&|i| 10f64.powf(3.0 * i / 7.0 - 1.0)), Sides::Front).build();
+        let lamp =
+            scene(Sampler::Independent, Channels::equal(400.0, 800.0, count), steps(&|i| 10f64.powf(-3.0 * i / 7.0)));
+        let scene = Builder(lamp)
+            .lamp(sphere(DVec3::new(-0.8, 0.5, 0.3), 0.1), steps(&|i| 10f64.powf(3.0 * i / 7.0 - 1.0)), Sides::Front)
+            .build();
         let e = render(&scene, 100, 16, Settings { seed: count as u64, ..Settings::default() });
         e.assert_clean();
         (count, e)
@@ -95,7 +103,8 @@ fn noise_of_a_channel_does_not_grow_with_their_number() {
     for k in 0..8 {
         let [few, many] = rendered.each_ref().map(|(count, e)| (k * count / 8, e));
         // The same pixels in both: what one group sees differs from what another does.
-        let difference = Estimate::of((0..GROUPS).map(|g| log_variance(many.1, many.0, g) - log_variance(few.1, few.0, g)));
+        let difference =
+            Estimate::of((0..GROUPS).map(|g| log_variance(many.1, many.0, g) - log_variance(few.1, few.0, g)));
         // The limit of t is 6.8: a third more variance would be seen in any channel.
         assert!(difference.error < 0.04, "too little is seen in channel {k}: {difference:?}");
         let limit = t_limit(8, difference.freedom) * difference.error;

@@ -23,12 +23,20 @@ fn table(nm: &[f64], value: &[f64]) -> Curve {
 fn everything(sampler: Sampler) -> Scene {
     let line = table(&[400.0, 549.0, 549.1, 549.2, 700.0], &[0.1, 0.1, 9.0, 0.1, 0.1]);
     let mut scene = Builder::new()
-        .camera(look(DVec3::new(0.2, 0.3, 2.2), DVec3::ZERO, DVec3::Y, Projection::Perspective { tan_half: DVec2::new(0.8, 0.5) }))
+        .camera(look(
+            DVec3::new(0.2, 0.3, 2.2),
+            DVec3::ZERO,
+            DVec3::Y,
+            Projection::Perspective { tan_half: DVec2::new(0.8, 0.5) },
+        ))
         .film(21, 13, Filter::Gaussian)
         .channels(Channels::equal(400.0, 700.0, 6))
         .bounces(4)
         .roulette(2)
-        .diffuse(quad(DVec3::new(-2.0, -1.0, 2.0), 4.0 * DVec3::X, 4.0 * DVec3::NEG_Z), table(&[400.0, 700.0], &[0.2, 0.9]))
+        .diffuse(
+            quad(DVec3::new(-2.0, -1.0, 2.0), 4.0 * DVec3::X, 4.0 * DVec3::NEG_Z),
+            table(&[400.0, 700.0], &[0.2, 0.9]),
+        )
         .diffuse(icosphere(DVec3::new(-0.4, -0.3, 0.0), 0.6, 3), 0.8)
         .diffuse(sphere(DVec3::new(0.7, -0.6, 0.3), 0.3), table(&[400.0, 530.0, 700.0], &[0.9, 0.1, 0.3]))
         .lamp(icosphere(DVec3::new(0.5, 0.8, 0.0), 0.2, 1), line, Sides::Front)
@@ -52,7 +60,8 @@ fn machinery_changes_no_bit() {
         let scene = everything(sampler);
         let base = Settings { seed: 5, ..Settings::default() };
         let expected = bits(&scene, 2, 64, base);
-        let same = |what: &str, settings: Settings| assert!(bits(&scene, 2, 64, settings) == expected, "{sampler:?}: {what}");
+        let same =
+            |what: &str, settings: Settings| assert!(bits(&scene, 2, 64, settings) == expected, "{sampler:?}: {what}");
         same("again", base);
         // Waves of a few samples of a few pixels, and of all pixels at once.
         for max_paths in [300, 1000, 60_000] {
@@ -76,7 +85,12 @@ fn machinery_changes_no_bit_in_short_and_long_epochs() {
     for samples in [1, 2, 8, 256] {
         let base = Settings { seed: 5, ..Settings::default() };
         let expected = bits(&scene, 2, samples, Settings { units: 1, ..base });
-        for settings in [base, Settings { max_paths: Some(500), ..base }, Settings { tile: [4, 8], ..base }, Settings { tile: [7, 1], units: 5, ..base }] {
+        for settings in [
+            base,
+            Settings { max_paths: Some(500), ..base },
+            Settings { tile: [4, 8], ..base },
+            Settings { tile: [7, 1], units: 5, ..base },
+        ] {
             assert!(bits(&scene, 2, samples, settings) == expected, "{samples} samples, {settings:?}");
         }
     }
@@ -92,7 +106,8 @@ fn windows_change_no_bit() {
     tiny.objects.truncate(1);
     tiny.film.crop = [6, 5, 12, 8];
     let mut cloud = Mesh::default();
-    let random = |i: u32| DVec3::from_array([0, 1, 2].map(|axis| f64::from(hash(3 * i + axis)) / 2_147_483_648.0 - 1.0));
+    let random =
+        |i: u32| DVec3::from_array([0, 1, 2].map(|axis| f64::from(hash(3 * i + axis)) / 2_147_483_648.0 - 1.0));
     for i in 0..32 {
         cloud.triangles.push([3 * i, 3 * i + 1, 3 * i + 2]);
         let corner = DVec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2 & 1)) - 0.5;
@@ -100,7 +115,8 @@ fn windows_change_no_bit() {
     }
     tiny.objects[0].shape = Shape::Mesh(cloud);
 
-    for (scene, parts, nodes) in [(everything(Sampler::Sobol), 2, 1), (everything(Sampler::Sobol), 4, 1), (tiny, 4, 2)] {
+    for (scene, parts, nodes) in [(everything(Sampler::Sobol), 2, 1), (everything(Sampler::Sobol), 4, 1), (tiny, 4, 2)]
+    {
         let prepared = Prepared::new(&scene, 0).unwrap();
         let binding = prepared.accel.primitives.len().div_ceil(parts) as u64 * 48;
         let windows = upload::windows(&prepared, binding).unwrap();
@@ -164,19 +180,36 @@ fn visible_constant_is_exact() {
 fn a_channel_is_the_same_among_any_number() {
     let with = |bounds: Vec<[f64; 2]>| {
         let scene = Builder::new()
-            .camera(look(DVec3::new(0.2, 0.3, 2.2), DVec3::ZERO, DVec3::Y, Projection::Perspective { tan_half: DVec2::new(0.8, 0.5) }))
+            .camera(look(
+                DVec3::new(0.2, 0.3, 2.2),
+                DVec3::ZERO,
+                DVec3::Y,
+                Projection::Perspective { tan_half: DVec2::new(0.8, 0.5) },
+            ))
             .film(5, 4, Filter::Box)
             .channels(Channels::from_bounds(bounds, None))
             .bounces(3)
-            .diffuse(quad(DVec3::new(-2.0, -1.0, 2.0), 4.0 * DVec3::X, 4.0 * DVec3::NEG_Z), table(&[400.0, 700.0], &[0.2, 0.9]))
+            .diffuse(
+                quad(DVec3::new(-2.0, -1.0, 2.0), 4.0 * DVec3::X, 4.0 * DVec3::NEG_Z),
+                table(&[400.0, 700.0], &[0.2, 0.9]),
+            )
             .diffuse(sphere(DVec3::new(0.0, -0.6, 0.3), 0.3), 0.7)
             // One light only: with more, what K decides is which of them is asked.
-            .lamp(Shape::Cylinder { from: DVec3::X, to: DVec3::Y, radius: 0.1 }, table(&[400.0, 700.0], &[1.0, 2.0]), Sides::Front)
+            .lamp(
+                Shape::Cylinder { from: DVec3::X, to: DVec3::Y, radius: 0.1 },
+                table(&[400.0, 700.0], &[1.0, 2.0]),
+                Sides::Front,
+            )
             .build();
         let rendered = render(&scene, 1, 16, Settings { tile: [8, 8], ..Settings::default() });
         rendered.assert_clean();
         let first: Vec<u32> = rendered.means[0].iter().step_by(rendered.channels).map(|v| v.to_bits()).collect();
-        let last: Vec<u32> = rendered.means[0].iter().skip(rendered.channels - 1).step_by(rendered.channels).map(|v| v.to_bits()).collect();
+        let last: Vec<u32> = rendered.means[0]
+            .iter()
+            .skip(rendered.channels - 1)
+            .step_by(rendered.channels)
+            .map(|v| v.to_bits())
+            .collect();
         (first, last)
     };
     let (expected, _) = with(vec![[500.0, 512.0]]);

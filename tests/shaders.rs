@@ -64,14 +64,17 @@ fn combinations() -> Vec<Features> {
 /// Every distinct text, with a description of what it was composed for.
 fn all_sources() -> Vec<(String, Source)> {
     let mut prepared = Prepared::new(&plain_scene(), 0).unwrap();
-    let shapes = [(1, 8), (3, 8), (25, 8), (500, 8), (1250, 32)].map(|(quads, vector)| EvaluateShape::new(quads, vector));
+    let shapes = [(1, true), (3, false), (25, true), (500, true), (1250, false)]
+        .map(|(quads, software)| EvaluateShape::new(quads, software));
     let mut found = std::collections::HashMap::new();
     for (i, features) in combinations().into_iter().enumerate() {
         prepared.features = features;
         // Windows and workgroups take turns among the combinations, and all are seen with all features off and on.
         let windows = windows(1 + i as u32 % 4, 1 + i as u32 / 4 % 4);
         for source in passes(&prepared, &windows, shapes[i % shapes.len()]) {
-            found.entry(source.text.clone()).or_insert_with(|| (format!("{} for {features:?}, {windows:?}", source.label), source));
+            found
+                .entry(source.text.clone())
+                .or_insert_with(|| (format!("{} for {features:?}, {windows:?}", source.label), source));
         }
     }
     found.into_values().collect()
@@ -112,7 +115,10 @@ fn pipelines_on_the_noop_backend() {
     let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default())).expect("noop");
     let (device, _queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
         // No more than `gpu::adapter` asks of a device.
-        required_limits: wgpu::Limits { max_storage_buffers_per_shader_stage: STORAGE_BUFFERS, ..wgpu::Limits::default() },
+        required_limits: wgpu::Limits {
+            max_storage_buffers_per_shader_stage: STORAGE_BUFFERS,
+            ..wgpu::Limits::default()
+        },
         ..Default::default()
     }))
     .expect("a noop device");
@@ -122,7 +128,7 @@ fn pipelines_on_the_noop_backend() {
             label: Some(source.label),
             source: wgpu::ShaderSource::Wgsl(source.text.as_str().into()),
         });
-        device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        let _pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some(source.label),
             layout: None,
             module: &module,
@@ -139,7 +145,7 @@ fn pipelines_on_the_noop_backend() {
 
 fn texts(scene: &Scene) -> [String; 3] {
     let prepared = Prepared::new(scene, 0).unwrap();
-    passes(&prepared, &windows(1, 1), EvaluateShape::new(3, 8)).map(|s| s.text)
+    passes(&prepared, &windows(1, 1), EvaluateShape::new(3, true)).map(|s| s.text)
 }
 
 /// Identifiers of the code, comments apart.
@@ -155,7 +161,22 @@ fn a_plain_scene_pays_for_nothing_else() {
     for text in &texts {
         let words = words(text);
         // Words of other features, but for the fields of structures that are the same for every scene, and hemispheres.
-        let foreign = ["sphere", "disk", "cylinder", "shape", "gaussian", "inverse_erf", "lens", "orthographic", "roulette", "survival", "knot", "window", "reversebits"];
+        let foreign = [
+            "sphere",
+            "disk",
+            "cylinder",
+            "shape_",
+            "_shape",
+            "gaussian",
+            "inverse_erf",
+            "lens",
+            "orthographic",
+            "roulette",
+            "survival",
+            "knot",
+            "window",
+            "reversebits",
+        ];
         let allowed = ["roulette_start", "cosine_hemisphere", "concentric_disk", "dimension_lens"];
         for part in foreign {
             let found: Vec<_> = words.iter().filter(|w| w.contains(part) && !allowed.contains(&w.as_str())).collect();

@@ -1,6 +1,6 @@
-// Traversal of the compressed wide BVH (Ylitie, Karras and Laine, HPG 2017), nodes as obvhs builds them.
+// Traversal of the compressed wide BVH (Ylitie, Karras and Laine, HPG 2017), nodes as obvhs builds them. STACK_SIZE is
+// the depth of this scene's tree: a private array costs a software device by its size.
 
-const STACK_SIZE: u32 = 32u;
 // A driver in use ends loops silently after 65,535 iterations of an invocation: two traversals must stay below half.
 const MAX_STEPS: u32 = 12000u;
 
@@ -102,20 +102,17 @@ fn traverse(ray: Ray, limit: f32, any_hit: bool, overflow: ptr<function, bool>) 
             let bit = firstTrailingBit(primitives_left.y);
             primitives_left.y &= primitives_left.y - 1u;
             let primitive = primitives_left.x + bit;
-            let w0 = load_primitive(primitive, 0u);
-            let w1 = load_primitive(primitive, 1u);
-            let w2 = load_primitive(primitive, 2u);
+            let p = load_primitive(primitive);
 #if SHAPES
-            let kind = bitcast<u32>(w0.w) >> 24u;
-            if (kind != 0u) {
-                let t = intersect_shape(ray, kind, w0, w1, w2.x, hit.distance);
+            if ((p.tag >> 24u) != 0u) {
+                let t = intersect_shape(ray, p, hit.distance);
                 if (t > 0.0) {
                     hit = Hit(t, primitive, 0.0, 0.0);
                 }
                 continue;
             }
 #endif
-            let found = intersect_triangle(sheared_ray, w0.xyz, w1.xyz, w2.xyz);
+            let found = intersect_triangle(sheared_ray, p.a, p.b, p.c);
             if (found.x > 0.0 && found.x < hit.distance) {
                 hit = Hit(found.x, primitive, found.y, found.z);
             }
@@ -139,33 +136,16 @@ fn traverse(ray: Ray, limit: f32, any_hit: bool, overflow: ptr<function, bool>) 
     return hit;
 }
 
-// Keeps the normal of tiny triangles out of the subnormals.
-fn scaled_to_one(v: vec3<f32>) -> vec3<f32> {
-    let a = abs(v);
-    return v / max(max(a.x, a.y), max(a.z, 1.0e-37));
-}
-
-// The geometric normal. The edges of a sliver may round to parallel ones: any direction is as good then, but not NaN.
-fn triangle_normal(a: vec3<f32>, b: vec3<f32>, c: vec3<f32>) -> vec3<f32> {
-    let n = scaled_to_one(cross(scaled_to_one(b - a), scaled_to_one(c - a)));
-    let length2 = dot(n, n);
-    return select(vec3<f32>(0.0, 0.0, 1.0), n * inverseSqrt(max(length2, 1.0e-30)), length2 > 0.0);
-}
-
 fn surface_at(ray: Ray, hit: Hit) -> Surface {
-    let w0 = load_primitive(hit.primitive, 0u);
-    let w1 = load_primitive(hit.primitive, 1u);
-    let w2 = load_primitive(hit.primitive, 2u);
-    let tag = bitcast<u32>(w0.w);
-    let material = tag & 0x00ffffffu;
-    let emitter = bitcast<u32>(w1.w);
+    let p = load_primitive(hit.primitive);
+    let material = p.tag & 0x00ffffffu;
 #if SHAPES
-    if ((tag >> 24u) != 0u) {
-        let s = shape_surface(tag >> 24u, w0, w1, w2.x, ray.origin + hit.distance * ray.direction);
-        return Surface(s[0], s[1], material, emitter);
+    if ((p.tag >> 24u) != 0u) {
+        let s = shape_surface(p, ray.origin + hit.distance * ray.direction);
+        return Surface(s[0], s[1], material, p.emitter);
     }
 #endif
     // From the vertices: more exact than along the ray.
-    let p = (1.0 - hit.u - hit.v) * w0.xyz + hit.u * w1.xyz + hit.v * w2.xyz;
-    return Surface(p, triangle_normal(w0.xyz, w1.xyz, w2.xyz), material, emitter);
+    let position = (1.0 - hit.u - hit.v) * p.a + hit.u * p.b + hit.v * p.c;
+    return Surface(position, triangle_normal(p), material, p.emitter);
 }

@@ -47,10 +47,10 @@ fn sphere_cap(center_distance2: f32, radius: f32) -> f32 {
 fn light_density(emitter_index: u32, origin: vec3<f32>, direction: vec3<f32>, distance: f32, normal: vec3<f32>) -> f32 {
     let emitter = emitters[emitter_index];
 #if SHAPES
-    let w0 = load_primitive(emitter.primitive, 0u);
-    if ((bitcast<u32>(w0.w) >> 24u) == KIND_SPHERE) {
-        let to_center = w0.xyz - origin;
-        let cap = sphere_cap(dot(to_center, to_center), load_primitive(emitter.primitive, 1u).x);
+    let shape = load_primitive(emitter.primitive);
+    if ((shape.tag >> 24u) == KIND_SPHERE) {
+        let to_center = shape.a - origin;
+        let cap = sphere_cap(dot(to_center, to_center), shape.b.x);
         if (cap > 0.0) {
             return emitter.pick / (2.0 * PI * cap);
         }
@@ -60,17 +60,15 @@ fn light_density(emitter_index: u32, origin: vec3<f32>, direction: vec3<f32>, di
 }
 
 fn sample_emitter(emitter: Emitter, origin: vec3<f32>, u: vec2<f32>) -> LightPoint {
-    let w0 = load_primitive(emitter.primitive, 0u);
-    let w1 = load_primitive(emitter.primitive, 1u);
-    let w2 = load_primitive(emitter.primitive, 2u);
+    let shape = load_primitive(emitter.primitive);
     var p: vec3<f32>;
     var n: vec3<f32>;
 #if SHAPES
-    let kind = bitcast<u32>(w0.w) >> 24u;
+    let kind = shape.tag >> 24u;
     if (kind == KIND_SPHERE) {
-        let to_center = w0.xyz - origin;
+        let to_center = shape.a - origin;
         let center_distance2 = dot(to_center, to_center);
-        let cap = sphere_cap(center_distance2, w1.x);
+        let cap = sphere_cap(center_distance2, shape.b.x);
         if (cap > 0.0) {
             // Uniform in the cone that the sphere fills.
             let rim = concentric_disk(u);
@@ -84,35 +82,35 @@ fn sample_emitter(emitter: Emitter, origin: vec3<f32>, u: vec2<f32>) -> LightPoi
             // The near intersection; the ray grazes where rounding misses the sphere.
             let along = dot(to_center, d);
             let off = to_center - along * d;
-            let q = origin + (along - sqrt(max(0.0, w1.x * w1.x - dot(off, off)))) * d;
-            n = normalize(q - w0.xyz);
+            let q = origin + (along - sqrt(max(0.0, shape.b.x * shape.b.x - dot(off, off)))) * d;
+            n = normalize(q - shape.a);
             let lit = (emitter.spectrum & EMITS_BOTH_SIDES) != 0u || dot(n, d) < 0.0;
-            return LightPoint(w0.xyz + w1.x * n, n, select(0.0, emitter.pick / (2.0 * PI * cap), lit));
+            return LightPoint(shape.a + shape.b.x * n, n, select(0.0, emitter.pick / (2.0 * PI * cap), lit));
         }
         // From within: uniform over the area.
         let z = 1.0 - 2.0 * u.x;
         let ring = unit_circle(u.y) * sqrt(max(0.0, 1.0 - z * z));
         n = vec3<f32>(ring, z);
-        p = w0.xyz + w1.x * n;
+        p = shape.a + shape.b.x * n;
     } else if (kind == KIND_DISK) {
-        let around = tangents(w1.xyz);
-        let disk = concentric_disk(u) * w2.x;
-        n = w1.xyz;
-        p = w0.xyz + disk.x * around.s + disk.y * around.t;
+        let around = tangents(shape.b);
+        let disk = concentric_disk(u) * shape.c.x;
+        n = shape.b;
+        p = shape.a + disk.x * around.s + disk.y * around.t;
     } else if (kind == KIND_CYLINDER) {
-        let axis = normalize(w1.xyz - w0.xyz);
+        let axis = normalize(shape.b - shape.a);
         let around = tangents(axis);
         let ring = unit_circle(u.y);
         n = ring.x * around.s + ring.y * around.t;
-        p = w0.xyz + u.x * (w1.xyz - w0.xyz) + w2.x * n;
+        p = shape.a + u.x * (shape.b - shape.a) + shape.c.x * n;
     } else {
 #endif
     // Uniform over a triangle, without folding the square (Heitz, "A Low-Distortion Map Between Triangle and Square", 2019).
     var b = 0.5 * u;
     let offset = b.y - b.x;
     b += select(vec2<f32>(-offset, 0.0) , vec2<f32>(0.0, offset), offset > 0.0);
-    p = (1.0 - b.x - b.y) * w0.xyz + b.x * w1.xyz + b.y * w2.xyz;
-    n = triangle_normal(w0.xyz, w1.xyz, w2.xyz);
+    p = (1.0 - b.x - b.y) * shape.a + b.x * shape.b + b.y * shape.c;
+    n = triangle_normal(shape);
 #if SHAPES
     }
 #endif

@@ -5,11 +5,11 @@
 @group(0) @binding(2) var<storage, read> emitters: array<Emitter>;
 // Upper ends of the emitters' intervals in [0, 1], above the environment's.
 @group(0) @binding(3) var<storage, read> emitter_cdf: array<f32>;
-#repeat NODE_WINDOWS
+#repeat NODE_WINDOWS i
 @group(0) @binding($(4+i)) var<storage, read> nodes_$i: array<vec4<u32>>;
 #end
-#repeat PRIMITIVE_WINDOWS
-@group(0) @binding($(8+i)) var<storage, read> primitives_$i: array<vec4<f32>>;
+#repeat PRIMITIVE_WINDOWS i
+@group(0) @binding($(8+i)) var<storage, read> primitives_$i: array<vec4<u32>>;
 #end
 
 // Word `part` (0..5) of an 80-byte CWBVH node.
@@ -18,7 +18,7 @@ fn load_node(node: u32, part: u32) -> vec4<u32> {
     let window = node / NODE_WINDOW;
     let at = (node % NODE_WINDOW) * 5u + part;
     switch (window) {
-#repeat NODE_WINDOWS
+#repeat NODE_WINDOWS i
         case $iu: { return nodes_$i[at]; }
 #end
         default: { return vec4<u32>(0u); }
@@ -28,16 +28,23 @@ fn load_node(node: u32, part: u32) -> vec4<u32> {
 #endif
 }
 
-// Word `part` (0..3) of a 48-byte primitive.
-fn load_primitive(primitive: u32, part: u32) -> vec4<f32> {
+// A 48-byte primitive. Words that are not numbers never pass through a float, which could lose them as subnormal.
+fn load_primitive(primitive: u32) -> Primitive {
+    let w0 = load_primitive_part(primitive, 0u);
+    let w1 = load_primitive_part(primitive, 1u);
+    let w2 = load_primitive_part(primitive, 2u);
+    return Primitive(bitcast<vec3<f32>>(w0.xyz), w0.w, bitcast<vec3<f32>>(w1.xyz), w1.w, bitcast<vec3<f32>>(w2.xyz));
+}
+
+fn load_primitive_part(primitive: u32, part: u32) -> vec4<u32> {
 #if MANY_PRIMITIVE_WINDOWS
     let window = primitive / PRIMITIVE_WINDOW;
     let at = (primitive % PRIMITIVE_WINDOW) * 3u + part;
     switch (window) {
-#repeat PRIMITIVE_WINDOWS
+#repeat PRIMITIVE_WINDOWS i
         case $iu: { return primitives_$i[at]; }
 #end
-        default: { return vec4<f32>(0.0); }
+        default: { return vec4<u32>(0u); }
     }
 #else
     return primitives_0[primitive * 3u + part];

@@ -1,7 +1,6 @@
 // Spheres, disks and cylinders, intersected as they are. Each returns a distance in (0, limit), or a negative one.
-//   sphere:   [center, tag] [radius, -, -, emitter]
-//   disk:     [center, tag] [normal, emitter] [radius]
-//   cylinder: [from, tag]   [to, emitter]     [radius]
+// As primitives: sphere a = center, b.x = radius; disk a = center, b = normal, c.x = radius; cylinder a = from, b = to,
+// c.x = radius.
 
 const KIND_SPHERE: u32 = 1u;
 const KIND_DISK: u32 = 2u;
@@ -78,29 +77,29 @@ fn intersect_cylinder(ray: Ray, base: vec3<f32>, to: vec3<f32>, radius: f32, lim
     return select(select(-1.0, roots.y, valid.y), roots.x, valid.x);
 }
 
-fn intersect_shape(ray: Ray, kind: u32, w0: vec4<f32>, w1: vec4<f32>, radius: f32, limit: f32) -> f32 {
-    switch (kind) {
-        case KIND_SPHERE: { return intersect_sphere(ray, w0.xyz, w1.x, limit); }
-        case KIND_DISK: { return intersect_disk(ray, w0.xyz, w1.xyz, radius, limit); }
-        default: { return intersect_cylinder(ray, w0.xyz, w1.xyz, radius, limit); }
+fn intersect_shape(ray: Ray, p: Primitive, limit: f32) -> f32 {
+    switch (p.tag >> 24u) {
+        case KIND_SPHERE: { return intersect_sphere(ray, p.a, p.b.x, limit); }
+        case KIND_DISK: { return intersect_disk(ray, p.a, p.b, p.c.x, limit); }
+        default: { return intersect_cylinder(ray, p.a, p.b, p.c.x, limit); }
     }
 }
 
-// Where the ray meets the shape, pulled back onto it, and its normal.
-fn shape_surface(kind: u32, w0: vec4<f32>, w1: vec4<f32>, radius: f32, p: vec3<f32>) -> array<vec3<f32>, 2> {
-    switch (kind) {
+// Position and normal where a ray met the shape near `q`, which is pulled back onto it.
+fn shape_surface(p: Primitive, q: vec3<f32>) -> array<vec3<f32>, 2> {
+    switch (p.tag >> 24u) {
         case KIND_SPHERE: {
-            let n = normalize(p - w0.xyz);
-            return array<vec3<f32>, 2>(w0.xyz + w1.x * n, n);
+            let n = normalize(q - p.a);
+            return array<vec3<f32>, 2>(p.a + p.b.x * n, n);
         }
         case KIND_DISK: {
-            return array<vec3<f32>, 2>(p - dot(p - w0.xyz, w1.xyz) * w1.xyz, w1.xyz);
+            return array<vec3<f32>, 2>(q - dot(q - p.a, p.b) * p.b, p.b);
         }
         default: {
-            let axis = normalize(w1.xyz - w0.xyz);
-            let along = dot(p - w0.xyz, axis) * axis;
-            let n = normalize(p - w0.xyz - along);
-            return array<vec3<f32>, 2>(w0.xyz + along + radius * n, n);
+            let axis = normalize(p.b - p.a);
+            let along = dot(q - p.a, axis) * axis;
+            let n = normalize(q - p.a - along);
+            return array<vec3<f32>, 2>(p.a + along + p.c.x * n, n);
         }
     }
 }

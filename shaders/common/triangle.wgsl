@@ -45,3 +45,16 @@ fn intersect_triangle(ray: ShearedRay, a_in: vec3<f32>, b_in: vec3<f32>, c_in: v
     let inverse = 1.0 / determinant;
     return vec3<f32>(dot(edge, z) * inverse, edge.y * inverse, edge.z * inverse);
 }
+
+// Counter-clockwise vertices face the front. Edges are scaled first: tiny triangles would leave only subnormals. The
+// edges of a sliver may round to parallel ones: any direction is as good then, but not NaN.
+fn triangle_normal(p: Primitive) -> vec3<f32> {
+    let n = scaled_to_one(cross(scaled_to_one(p.b - p.a), scaled_to_one(p.c - p.a)));
+    let length2 = dot(n, n);
+    return select(vec3<f32>(0.0, 0.0, 1.0), n * inverseSqrt(max(length2, 0.5)), length2 > 0.0);
+}
+
+fn scaled_to_one(v: vec3<f32>) -> vec3<f32> {
+    let a = abs(v);
+    return v / max(max(a.x, a.y), max(a.z, 1.0e-37));
+}

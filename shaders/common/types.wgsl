@@ -68,6 +68,17 @@ struct Hit {
     v: f32,
 }
 
+// What a ray can meet: three vertices, or a shape as shapes.wgsl has it.
+struct Primitive {
+    a: vec3<f32>,
+    // Material in the low 24 bits, kind in the high 8; kind 0 is a triangle.
+    tag: u32,
+    b: vec3<f32>,
+    // NONE where nothing is emitted.
+    emitter: u32,
+    c: vec3<f32>,
+}
+
 // A surface point; the normal is the geometric one, not turned towards the ray.
 struct Surface {
     position: vec3<f32>,
@@ -100,7 +111,7 @@ struct Material {
 const COUNTER_OVERFLOW: u32 = 0u;
 const COUNTER_NON_FINITE: u32 = 1u;
 const COUNTER_NEGATIVE: u32 = 2u;
-// The first bad sample seen: pixel slot and sample index + 1 of some thread that met one.
+// Where: the pixel slot that reported first, and the largest sample index + 1 reported.
 const COUNTER_BAD_SLOT: u32 = 3u;
 const COUNTER_BAD_SAMPLE: u32 = 4u;
 // Rays traced by the paths that ended.

@@ -1,1 +1,108 @@
 //! Arguments → job → exit code; one file per subcommand.
+
+mod compare;
+mod devices;
+mod export;
+mod info;
+mod interrupt;
+mod output;
+mod plan;
+mod progress;
+mod render;
+mod scene;
+mod spectrum;
+
+use clap::{Parser, Subcommand};
+
+use crate::Result;
+
+pub use output::Output;
+
+/// Spectral image renderer: the radiance of a scene in hundreds or thousands of channels.
+#[derive(Debug, Parser)]
+#[command(
+    name = "spectile",
+    version,
+    max_term_width = 110,
+    arg_required_else_help = true,
+    long_about = "Spectile renders spectral images: for every pixel, the radiance of a scene in K channels of \
+        wavelength, anywhere from 380 to 20,000 nm. The result is a cube: a Zarr v3 store that xarray and zarr open, \
+        also while it is being rendered.",
+    after_help = "`spectile COMMAND --help` explains a command with examples.",
+    after_long_help = "\
+Examples:
+  spectile render scene.toml -o cube.zarr --spp 256     render 256 samples per pixel
+  spectile info cube.zarr                               how far it got, how large the error is
+  spectile spectrum cube.zarr 120 80                    the spectrum of one pixel, as CSV
+  spectile export cube.zarr -o picture.png              a picture of it
+  spectile compare cube.zarr reference.zarr             how it differs from another cube
+
+Radiance is in W m-2 sr-1 nm-1, wavelengths are in nm (vacuum), pixels are counted from 0 at the top left.
+
+Exit codes:
+  0  done                               3  no usable device
+  1  a comparison or check failed       4  all devices were lost
+  2  bad input or arguments             5  storage cannot be read or written"
+)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Render(render::Args),
+    Plan(plan::Args),
+    Devices(devices::Args),
+    Info(info::Args),
+    Spectrum(spectrum::Args),
+    Compare(compare::Args),
+    Export(export::Args),
+}
+
+impl Cli {
+    /// Whether stdout carries JSON.
+    pub fn json(&self) -> bool {
+        match &self.command {
+            Command::Render(args) => args.json,
+            Command::Plan(args) => args.json,
+            Command::Devices(args) => args.json,
+            Command::Info(args) => args.json,
+            Command::Compare(args) => args.json,
+            Command::Export(args) => args.json,
+            Command::Spectrum(_) => false,
+        }
+    }
+
+    /// Does what the arguments ask for.
+    pub fn run(&self, output: &Output) -> Result<()> {
+        match &self.command {
+            Command::Render(args) => render::run(args, output),
+            Command::Plan(args) => plan::run(args, output),
+            Command::Devices(args) => devices::run(args, output),
+            Command::Info(args) => info::run(args, output),
+            Command::Spectrum(args) => spectrum::run(args, output),
+            Command::Compare(args) => compare::run(args, output),
+            Command::Export(args) => export::run(args, output),
+        }
+    }
+}
+
+/// An exposure in EV: any finite number.
+fn parse_exposure(text: &str) -> std::result::Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(ev) if ev.is_finite() => Ok(ev),
+        _ => Err("an exposure is a number of EV, such as 2 or -0.5".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn arguments_are_declared_without_contradiction() {
+        use clap::CommandFactory;
+        Cli::command().debug_assert();
+    }
+}

@@ -37,8 +37,8 @@ pub struct Gpu {
 }
 
 /// Storage buffers that the largest pass binds at once, generate_bounce under roulette: 3 of the scene, 4 windows each of
-/// nodes and primitives, 6 of the wave.
-pub const STORAGE_BUFFERS: u32 = 17;
+/// nodes and primitives, 8 of the wave.
+pub const STORAGE_BUFFERS: u32 = 19;
 
 fn instance() -> wgpu::Instance {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
@@ -64,7 +64,10 @@ fn rank(info: &wgpu::AdapterInfo) -> u32 {
 fn facts(adapter: &wgpu::Adapter) -> AdapterFacts {
     let (info, limits) = (adapter.get_info(), adapter.limits());
     let unusable = if limits.max_storage_buffers_per_shader_stage < STORAGE_BUFFERS {
-        Some(format!("binds {} storage buffers, {STORAGE_BUFFERS} are needed", limits.max_storage_buffers_per_shader_stage))
+        Some(format!(
+            "binds {} storage buffers, {STORAGE_BUFFERS} are needed",
+            limits.max_storage_buffers_per_shader_stage
+        ))
     } else if limits.max_compute_invocations_per_workgroup < 256 {
         Some("its compute workgroups are smaller than 256".to_owned())
     } else {

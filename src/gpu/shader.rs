@@ -2,8 +2,8 @@
 //!
 //! A pass is the ordered concatenation of plain WGSL files. Four line directives leave out what a scene does not need,
 //! so that its text is the same as if the feature did not exist:
-//! `#if NAME`, `#else`, `#endif` (NAME defined and not 0) and `#repeat NAME` … `#end` (as many times as NAME says, with
-//! `$i` and `$(4+i)` counting). `$NAME` stands for a value; constants are declared on top.
+//! `#if NAME`, `#else`, `#endif` (NAME defined and not 0) and `#repeat NAME i` … `#end` (as many times as NAME says, with
+//! `$i` and `$(4+i)` counting; loops nest). `$NAME` stands for a value; constants are declared on top.
 
 use std::collections::BTreeMap;
 
@@ -80,7 +80,7 @@ pub fn compose(modules: &[Module], defines: &Defines) -> Source {
     }
     for module in modules {
         let lines: Vec<(usize, &str)> = module.text.lines().enumerate().map(|(i, l)| (i + 1, l)).collect();
-        emit(&lines, module, defines, None, &mut source);
+        emit(&lines, module, defines, &[], &mut source);
     }
     source
 }
@@ -121,7 +121,10 @@ fn block(lines: &[(usize, &str)], start: usize, module: &Module) -> (usize, Opti
     panic!("shaders/{}:{}: this directive is never closed", module.name, lines[start].0);
 }
 
-fn emit(lines: &[(usize, &str)], module: &Module, defines: &Defines, index: Option<u32>, out: &mut Source) {
+/// Values of the counters of the `#repeat`s around a line.
+type Counts = [(char, u32)];
+
+fn emit(lines: &[(usize, &str)], module: &Module, defines: &Defines, counts: &Counts, out: &mut Source) {
     let mut at = 0;
     while at < lines.len() {
         let (number, line) = lines[at];
@@ -133,35 +136,42 @@ fn emit(lines: &[(usize, &str)], module: &Module, defines: &Defines, index: Opti
                 (false, Some(otherwise)) => otherwise + 1..end,
                 (false, None) => end..end,
             };
-            emit(&lines[chosen], module, defines, index, out);
+            emit(&lines[chosen], module, defines, counts, out);
             at = end + 1;
-        } else if let Some(name) = directive.strip_prefix("#repeat ") {
+        } else if let Some(header) = directive.strip_prefix("#repeat ") {
             let (end, _) = block(lines, at, module);
-            for i in 0..defines.get(name.trim()) {
-                emit(&lines[at + 1..end], module, defines, Some(i), out);
+            let (name, counter) = header.split_once(' ').expect("#repeat NAME counter");
+            let counter = counter.chars().next().expect("a counter of one letter");
+            for i in 0..defines.get(name) {
+                emit(&lines[at + 1..end], module, defines, &[counts, &[(counter, i)]].concat(), out);
             }
             at = end + 1;
         } else {
-            out.push(substitute(line, defines, index), (module.name, number));
+            out.push(substitute(line, defines, counts), (module.name, number));
             at += 1;
         }
     }
 }
 
 /// Replaces `$i`, `$(4+i)` and `$NAME`.
-fn substitute(line: &str, defines: &Defines, index: Option<u32>) -> String {
+fn substitute(line: &str, defines: &Defines, counts: &Counts) -> String {
+    let count = |counter: char| counts.iter().find(|c| c.0 == counter).map(|c| c.1);
     let mut result = String::with_capacity(line.len());
     let mut rest = line;
     while let Some(at) = rest.find('$') {
         result.push_str(&rest[..at]);
         rest = &rest[at + 1..];
-        if let Some((offset, after)) = rest.strip_prefix('(').and_then(|r| r.split_once("+i)")) {
-            let offset: u32 = offset.parse().expect("$(number+i)");
-            result.push_str(&(offset + index.expect("$(…+i) stands in a #repeat")).to_string());
+        let sum = rest.strip_prefix('(').and_then(|r| r.split_once(')')).and_then(|(sum, after)| {
+            let (offset, counter) = sum.split_once('+')?;
+            Some((offset.parse::<u32>().ok()? + count(counter.chars().next()?)?, after))
+        });
+        let first = rest.chars().next().unwrap_or(' ');
+        if let Some((value, after)) = sum {
+            result.push_str(&value.to_string());
             rest = after;
-        } else if let (Some(i), Some(after)) = (index, rest.strip_prefix('i')) {
-            result.push_str(&i.to_string());
-            rest = after;
+        } else if let Some(value) = count(first) {
+            result.push_str(&value.to_string());
+            rest = &rest[first.len_utf8()..];
         } else {
             let end = rest.find(|c: char| !c.is_ascii_uppercase() && c != '_').unwrap_or(rest.len());
             result.push_str(&defines.get(&rest[..end]).to_string());
@@ -177,7 +187,7 @@ mod tests {
 
     #[test]
     fn directives_choose_repeat_and_count() {
-        let text = "a\n#if X\nb\n#repeat N\nc$i $(4+i)\n#if Y\nd\n#else\ne\n#endif\n#end\n#else\nf\n#endif\n$WORKGROUP";
+        let text = "a\n#if X\nb\n#repeat N i\nc$i $(4+i)\n#if Y\nd\n#else\ne\n#endif\n#end\n#else\nf\n#endif\n$WORKGROUP";
         let module = Module { name: "m", text };
         let compose_with = |x: u32, n: u32| {
             let mut defines = Defines::default();
@@ -187,6 +197,9 @@ mod tests {
         assert_eq!(compose_with(1, 2).text, "a\nb\nc0 4\ne\nc1 5\ne\n64\n");
         assert_eq!(compose_with(0, 2).text, "a\nf\n64\n");
         assert_eq!(compose_with(1, 1).origin[2], ("m", 5));
+        let nested = Module { name: "n", text: "#repeat N i\n#repeat N j\n$i$j $(2+j)\n#end\n#end" };
+        let mut defines = Defines::default();
+        assert_eq!(compose(&[nested], defines.set("N", 2u32)).text, "00 2\n01 3\n10 2\n11 3\n");
     }
 
     #[test]

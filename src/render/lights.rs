@@ -22,9 +22,8 @@ pub fn light_picks(scene: &Scene, accel: &Accel) -> LightPicks {
     // Emitters of one spectrum differ by area only, so shares are worked out per spectrum.
     let mut areas = vec![0.0; scene.spectra.len()];
     let emitted = |object: usize| scene.objects[object].emission.as_ref().expect("emitters come from emitting objects");
-    let area_of = |&(_, object, area): &(u32, usize, f64)| {
-        area * if emitted(object).sides == Sides::Both { 2.0 } else { 1.0 }
-    };
+    let area_of =
+        |&(_, object, area): &(u32, usize, f64)| area * if emitted(object).sides == Sides::Both { 2.0 } else { 1.0 };
     for emitter in &accel.emitters {
         areas[emitted(emitter.1).radiance] += area_of(emitter);
     }
@@ -39,10 +38,15 @@ pub fn light_picks(scene: &Scene, accel: &Accel) -> LightPicks {
         (None, Some(environment)) => environment.radiance,
         (None, None) => unreachable!("only an environment adds a group without emitters"),
     };
-    let shares = probabilities(&groups.iter().map(|&(g, area)| {
-        let curve = &scene.spectra[spectrum(g)].curve;
-        scene.channels.bounds.iter().map(|b| area * curve.mean(b[0], b[1])).collect()
-    }).collect::<Vec<Vec<f64>>>());
+    let shares = probabilities(
+        &groups
+            .iter()
+            .map(|&(g, area)| {
+                let curve = &scene.spectra[spectrum(g)].curve;
+                scene.channels.bounds.iter().map(|b| area * curve.mean(b[0], b[1])).collect()
+            })
+            .collect::<Vec<Vec<f64>>>(),
+    );
 
     let environment = match groups.last() {
         Some((None, _)) if accel.emitters.is_empty() => 1.0,
@@ -50,7 +54,8 @@ pub fn light_picks(scene: &Scene, accel: &Accel) -> LightPicks {
         Some((None, _)) => (shares[groups.len() - 1] * STEPS).round().clamp(1.0, STEPS - 1.0) / STEPS,
         _ => 0.0,
     };
-    let share_of = |spectrum: usize| groups.iter().position(|g| g.0 == Some(spectrum)).map_or(0.0, |g| shares[g] / groups[g].1);
+    let share_of =
+        |spectrum: usize| groups.iter().position(|g| g.0 == Some(spectrum)).map_or(0.0, |g| shares[g] / groups[g].1);
     let weights: Vec<f64> = accel.emitters.iter().map(|e| share_of(emitted(e.1).radiance) * area_of(e)).collect();
     let (cdf, emitters) = intervals(environment, &weights);
     LightPicks { environment, cdf, emitters }
@@ -84,7 +89,8 @@ fn probabilities(powers: &[Vec<f64>]) -> Vec<f64> {
         return vec![1.0 / powers.len().max(1) as f64; powers.len()];
     }
     let share = |p: &Vec<f64>, k: usize| p[k] / totals[k];
-    let mean: Vec<f64> = powers.iter().map(|p| lit.iter().map(|&k| share(p, k)).sum::<f64>() / lit.len() as f64).collect();
+    let mean: Vec<f64> =
+        powers.iter().map(|p| lit.iter().map(|&k| share(p, k)).sum::<f64>() / lit.len() as f64).collect();
     let largest: Vec<f64> = powers.iter().map(|p| lit.iter().map(|&k| share(p, k)).fold(0.0, f64::max)).collect();
     let largest_total: f64 = largest.iter().sum();
     mean.iter().zip(&largest).map(|(m, l)| 0.5 * m + 0.5 * l / largest_total).collect()
@@ -108,9 +114,16 @@ mod tests {
                 counts[cdf.partition_point(|&end| end <= u)] += 1;
             }
             for (i, probability) in emitters.iter().enumerate() {
-                assert_eq!(*probability, f64::from(counts[i]) / f64::from(steps), "environment {environment}, emitter {i}");
+                assert_eq!(
+                    *probability,
+                    f64::from(counts[i]) / f64::from(steps),
+                    "environment {environment}, emitter {i}"
+                );
                 let wanted = (1.0 - environment) * weights[i] / weights.iter().sum::<f64>();
-                assert!((probability - wanted).abs() <= 1.0 / f64::from(steps), "environment {environment}, emitter {i}");
+                assert!(
+                    (probability - wanted).abs() <= 1.0 / f64::from(steps),
+                    "environment {environment}, emitter {i}"
+                );
             }
         }
     }

@@ -1,7 +1,9 @@
 //! The render: plan → units → waves on a device → host merge.
 
 pub mod lights;
+pub mod plan;
 pub mod prepare;
 pub mod rng;
+pub mod schedule;
 pub mod wave;
 pub mod worker;

@@ -13,9 +13,6 @@ use crate::{Error, Result};
 const MAX_REGISTER_SPECTRA: usize = 8;
 /// Spectrum ids have 16 bits in a record.
 const MAX_SPECTRA: usize = 1 << 16;
-/// Keeps a path's records countable in 16 bits and a walk over them within the loop limit.
-const MAX_BOUNCES: u32 = 8_192;
-
 /// Parts of the renderer that a scene needs; what is false is left out of shaders and buffers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Features {
@@ -55,12 +52,6 @@ pub struct Prepared {
 impl Prepared {
     /// Flattens `scene`. Errors: more materials, spectra or bounces than ids and counters have bits for.
     pub fn new(scene: &Scene, seed: u64) -> Result<Prepared> {
-        if scene.integrator.max_bounces > MAX_BOUNCES {
-            return Err(Error::input(
-                &scene.file,
-                format!("integrator.max_bounces = {} is more than the {MAX_BOUNCES} supported", scene.integrator.max_bounces),
-            ));
-        }
         let accel = Accel::build(scene);
         if scene.materials.len() > MAX_MATERIALS {
             return Err(Error::input(&scene.file, format!("more than {MAX_MATERIALS} materials")));
@@ -107,6 +98,7 @@ impl Prepared {
     pub fn defines(&self, windows: &Windows) -> Defines {
         let f = &self.features;
         let mut d = Defines::default();
+        d.constant("STACK_SIZE", self.accel.depth);
         d.set("CAMERA_THIN_LENS", f.thin_lens).set("CAMERA_ORTHOGRAPHIC", f.orthographic).set("GAUSSIAN", f.gaussian);
         d.set("INDEPENDENT", f.independent).set("ROULETTE", f.roulette).set("SHAPES", f.shapes);
         d.set("EMITTERS", f.emitters).set("ENVIRONMENT", f.environment).set("LIGHTS", f.emitters || f.environment);
@@ -157,6 +149,7 @@ impl Prepared {
         d.constant("CHANNELS_PADDED", self.tables.channels_padded as u32);
         d.constant("QUADS", self.tables.channels_padded as u32 / 4);
         d.constant("LANES", shape.lanes);
+        d.constant("VECTORS", shape.vectors);
         d.constant("PIXELS_PER_GROUP", shape.pixels);
         d
     }
@@ -176,9 +169,11 @@ pub struct WindowList {
     pub size: u32,
 }
 
-/// Threads of one workgroup of `evaluate_pixel`: `lanes` quads of channels of each of `pixels` pixels.
+/// Threads of one workgroup of `evaluate_pixel`: `lanes` threads for each of `pixels` pixels, `vectors` quads of channels
+/// a thread.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct EvaluateShape {
+    pub vectors: u32,
     pub lanes: u32,
     pub pixels: u32,
     /// Workgroups that share a pixel's channels.
@@ -186,15 +181,25 @@ pub struct EvaluateShape {
 }
 
 impl EvaluateShape {
-    /// For `quads` quads of channels on a device whose vectors are `vector` threads wide: few idle threads, and groups
-    /// of 64 to 256.
-    pub fn new(quads: u32, vector: u32) -> EvaluateShape {
-        if quads < vector {
-            let lanes = quads.next_power_of_two();
-            return EvaluateShape { lanes, pixels: (64 / lanes).max(1), blocks: 1 };
-        }
-        let blocks = quads.div_ceil(256);
-        EvaluateShape { lanes: quads.div_ceil(blocks).next_multiple_of(vector), pixels: 1, blocks }
+    /// For `quads` quads of channels: groups of 64 to 256 threads, few of them idle.
+    ///
+    /// On software devices loads count most, and more channels a thread share them: measured on lavapipe, a thread's time
+    /// goes as 2.2 + vectors. A GPU hides loads behind other threads, and needs the registers for that.
+    pub fn new(quads: u32, software: bool) -> EvaluateShape {
+        let width = if software { 8 } else { 32 };
+        let of = |vectors: u32| {
+            let threads = quads.div_ceil(vectors);
+            if threads < width {
+                let lanes = threads.next_power_of_two();
+                return EvaluateShape { vectors, lanes, pixels: (64 / lanes).max(1), blocks: 1 };
+            }
+            let blocks = threads.div_ceil(256);
+            EvaluateShape { vectors, lanes: threads.div_ceil(blocks).next_multiple_of(width), pixels: 1, blocks }
+        };
+        let cost = |s: &EvaluateShape| f64::from(s.lanes * s.blocks) * (2.2 + f64::from(s.vectors));
+        let candidates: &[u32] = if software { &[1, 2, 4] } else { &[1] };
+        let shapes = candidates.iter().map(|&v| of(v));
+        shapes.min_by(|a, b| cost(a).total_cmp(&cost(b))).expect("at least one candidate")
     }
 }
 
@@ -307,14 +312,17 @@ mod tests {
 
     #[test]
     fn evaluation_groups_cover_all_channels_with_few_idle_threads() {
-        for vector in [8, 32] {
+        for software in [true, false] {
+            let width = if software { 8 } else { 32 };
             for quads in (1..300).chain([500, 512, 1250, 2500]) {
-                let s = EvaluateShape::new(quads, vector);
-                assert!(s.lanes * s.blocks >= quads && s.lanes * s.pixels <= 256, "{quads}: {s:?}");
-                assert!(s.lanes * s.blocks < 2 * quads || s.lanes * s.blocks < quads + vector * s.blocks, "{quads}: {s:?}");
+                let s = EvaluateShape::new(quads, software);
+                let (threads, needed) = (s.lanes * s.blocks, quads.div_ceil(s.vectors));
+                assert!(threads >= needed && s.lanes * s.pixels <= 256, "{quads}: {s:?}");
+                assert!(threads < 2 * needed || threads < needed + width * s.blocks, "{quads}: {s:?}");
             }
         }
-        assert_eq!(EvaluateShape::new(100, 8), EvaluateShape { lanes: 104, pixels: 1, blocks: 1 });
-        assert_eq!(EvaluateShape::new(2, 8), EvaluateShape { lanes: 2, pixels: 32, blocks: 1 });
+        assert_eq!(EvaluateShape::new(100, false), EvaluateShape { vectors: 1, lanes: 128, pixels: 1, blocks: 1 });
+        assert_eq!(EvaluateShape::new(100, true), EvaluateShape { vectors: 4, lanes: 32, pixels: 1, blocks: 1 });
+        assert_eq!(EvaluateShape::new(2, true), EvaluateShape { vectors: 2, lanes: 1, pixels: 64, blocks: 1 });
     }
 }

@@ -5,9 +5,11 @@ use crate::gpu::self_test::LOOP_LIMIT;
 use crate::render::prepare::Prepared;
 use crate::{Error, Result};
 
-/// Bytes of a path between the passes: state (32), head (8), throughput under roulette (4), and 8 a record.
+/// Bytes of a path between the passes: state (32), head (8), its places in the queues (8), throughput under roulette
+/// (4), and 8 a record.
 const STATE_BYTES: u64 = 32;
 const HEAD_BYTES: u64 = 8;
+const QUEUE_BYTES: u64 = 8;
 const THROUGHPUT_BYTES: u64 = 4;
 const RECORD_BYTES: u64 = 8;
 
@@ -36,6 +38,8 @@ pub struct WavePlan {
     pub channels: u32,
     pub max_records: u32,
     pub roulette: bool,
+    /// Largest binding of the device, bytes.
+    pub binding: u64,
 }
 
 impl WavePlan {
@@ -67,7 +71,7 @@ impl WavePlan {
         }
         // One invocation of `evaluate` walks all samples of a pixel.
         let samples = (u64::from(LOOP_LIMIT) / (records + 1)).clamp(1, 64).min(paths);
-        let by_memory = (if limits.software { 32 << 20 } else { limits.binding.min(512 << 20) }) / tile_bytes;
+        let by_memory = (if limits.software { 32 << 20 } else { 128 << 20 }) / tile_bytes;
         let units = (paths / tile_pixels).min(by_memory).max(1);
         Ok(WavePlan {
             tile,
@@ -77,6 +81,7 @@ impl WavePlan {
             channels: channels as u32,
             max_records: records as u32,
             roulette: prepared.features.roulette,
+            binding: limits.binding,
         })
     }
 
@@ -90,6 +95,11 @@ impl WavePlan {
 
     pub fn head_bytes(&self) -> u64 {
         u64::from(self.paths) * HEAD_BYTES
+    }
+
+    /// Two lists of the paths still under way.
+    pub fn queue_bytes(&self) -> u64 {
+        u64::from(self.paths) * QUEUE_BYTES
     }
 
     pub fn throughput_bytes(&self) -> u64 {
@@ -107,12 +117,12 @@ impl WavePlan {
 
     /// Everything but the scene that a device holds: path buffers, means, and two staging buffers of that size.
     pub fn device_bytes(&self) -> u64 {
-        self.state_bytes() + self.head_bytes() + self.throughput_bytes() + self.record_bytes() + 3 * self.mean_bytes()
+        u64::from(self.paths) * self.path_bytes() + 3 * self.mean_bytes()
     }
 
     /// Bytes of one saved path, all its records included.
     pub fn path_bytes(&self) -> u64 {
-        STATE_BYTES + HEAD_BYTES + RECORD_BYTES * u64::from(self.max_records) + self.throughput_bytes().min(THROUGHPUT_BYTES)
+        STATE_BYTES + HEAD_BYTES + QUEUE_BYTES + RECORD_BYTES * u64::from(self.max_records) + self.throughput_bytes().min(THROUGHPUT_BYTES)
     }
 
     /// How many units to submit together in an epoch of `samples` samples per pixel.
@@ -157,7 +167,7 @@ mod tests {
     use super::*;
 
     fn plan(paths: u32, samples: u32, tile: [u32; 2]) -> WavePlan {
-        WavePlan { tile, paths, samples, units: 4, channels: 8, max_records: 11, roulette: false }
+        WavePlan { tile, paths, samples, units: 4, channels: 8, max_records: 11, roulette: false, binding: 128 << 20 }
     }
 
     /// Every (pixel, sample) once, a pixel's samples in order.

@@ -1,6 +1,7 @@
 //! One device at work: generate, evaluate, transfer. The names are the method's own.
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use crate::gpu::adapter::Gpu;
 use crate::gpu::buffer;
@@ -36,9 +37,13 @@ pub struct Worker {
     evaluate: Stage,
     shape: EvaluateShape,
     path_buffers: PathBuffers,
+    scene_bytes: u64,
     timestamps: Option<Timestamps>,
     slots: Vec<Slot>,
     next_slot: usize,
+    idle_since: Instant,
+    /// Seconds in which nothing was submitted.
+    pub idle_s: f64,
 }
 
 /// A pass with its bind groups.
@@ -57,6 +62,8 @@ struct PathBuffers {
     heads: wgpu::Buffer,
     records: wgpu::Buffer,
     throughputs: Option<wgpu::Buffer>,
+    queue: wgpu::Buffer,
+    queue_lengths: wgpu::Buffer,
     counters: wgpu::Buffer,
     means: wgpu::Buffer,
 }
@@ -89,7 +96,7 @@ impl Worker {
         let scene = SceneBuffers::new(&gpu, &prepared, &windows)?;
         let path_buffers = PathBuffers::new(&gpu, &prepared, &plan);
 
-        let shape = EvaluateShape::new(prepared.tables.channels_padded as u32 / 4, if gpu.is_software { 8 } else { 32 });
+        let shape = EvaluateShape::new(prepared.tables.channels_padded as u32 / 4, gpu.is_software);
         let defines = prepared.defines(&windows);
         let stage = |modules: &[shader::Module], defines: &shader::Defines| {
             let pass = Pass::new(&gpu, &shader::compose(modules, defines))?;
@@ -115,7 +122,23 @@ impl Worker {
         gpu.check()?;
         let profile = Profile::default();
         let timestamps = None;
-        Ok(Worker { gpu, plan, profile, prepared, camera, bounce, evaluate, shape, path_buffers, timestamps, slots, next_slot: 0 })
+        Ok(Worker {
+            gpu,
+            plan,
+            profile,
+            prepared,
+            camera,
+            bounce,
+            evaluate,
+            shape,
+            path_buffers,
+            scene_bytes: scene.bytes,
+            timestamps,
+            slots,
+            next_slot: 0,
+            idle_since: Instant::now(),
+            idle_s: 0.0,
+        })
     }
 
     /// Measures the passes from now on, at the price of waiting for every wave.
@@ -135,6 +158,9 @@ impl Worker {
         let slot = self.next_slot;
         self.next_slot = (slot + 1) % SLOTS;
         self.collect_slot(slot, collected)?;
+        if self.is_idle() {
+            self.idle_s += self.idle_since.elapsed().as_secs_f64();
+        }
 
         let buffers = &self.path_buffers;
         self.gpu.queue.write_buffer(&buffers.units, 0, bytemuck::cast_slice(units));
@@ -166,6 +192,9 @@ impl Worker {
     fn collect_slot(&mut self, slot: usize, collected: &mut dyn FnMut(Collected) -> Result<()>) -> Result<()> {
         let Some(pending) = self.slots[slot].pending.take() else { return Ok(()) };
         buffer::wait(&self.gpu, pending.submission)?;
+        if self.is_idle() {
+            self.idle_since = Instant::now();
+        }
         let size = self.unit_bytes() * pending.units.len() as u64;
         let staging = &self.slots[slot].staging;
         {
@@ -183,6 +212,15 @@ impl Worker {
         Ok(())
     }
 
+    /// Scene and buffers on the device, bytes.
+    pub fn device_bytes(&self) -> u64 {
+        self.scene_bytes + self.plan.device_bytes()
+    }
+
+    fn is_idle(&self) -> bool {
+        self.slots.iter().all(|slot| slot.pending.is_none())
+    }
+
     fn unit_bytes(&self) -> u64 {
         u64::from(self.plan.tile_pixels()) * u64::from(self.plan.channels) * 4
     }
@@ -195,6 +233,7 @@ impl Worker {
     fn submit_wave(&mut self, wave: &Wave) -> Result<()> {
         self.gpu.queue.write_buffer(&self.path_buffers.wave, 0, bytemuck::bytes_of(wave));
         let mut encoder = self.encoder("wave");
+        encoder.clear_buffer(&self.path_buffers.queue_lengths, 0, None);
         {
             let mut pass = self.begin(&mut encoder, "generate", 0);
             let [x, y] = fold(wave.path_count.div_ceil(64));
@@ -277,6 +316,8 @@ impl PathBuffers {
             heads: buffer::empty(gpu, "heads", plan.head_bytes(), storage),
             records: buffer::empty(gpu, "records", plan.record_bytes(), storage),
             throughputs: plan.roulette.then(|| buffer::empty(gpu, "throughputs", plan.throughput_bytes(), storage)),
+            queue: buffer::empty(gpu, "queue", plan.queue_bytes(), storage),
+            queue_lengths: buffer::empty(gpu, "queue_lengths", 4 * wave::steps(prepared.frame.max_bounces).len() as u64, storage),
             counters: buffer::empty(gpu, "counters", size_of::<Counters>() as u64, storage),
             means: buffer::empty(gpu, "means", plan.mean_bytes(), storage),
         }
@@ -294,6 +335,8 @@ impl PathBuffers {
             "heads" => &self.heads,
             "records" => &self.records,
             "throughputs" => self.throughputs.as_ref()?,
+            "queue" => &self.queue,
+            "queue_lengths" => &self.queue_lengths,
             "counters" => &self.counters,
             "means" => &self.means,
             _ => return None,

@@ -1,10 +1,26 @@
 //! A resolved, validated scene: what `scene.toml`, its meshes and its spectra say, in metres and nanometres,
 //! f64, world space. Knows no GPU and no paths.
 
+mod camera;
+mod channels;
+mod context;
+mod decode;
+mod digest;
+mod file;
+mod material;
+mod object;
+mod overrides;
+mod shape;
+mod spectrum;
+mod transform;
+mod tree;
+
 use std::path::PathBuf;
 
 use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
+
+pub use file::{load, parse};
 
 use crate::spectral::{Channels, Curve};
 

@@ -1,9 +1,12 @@
 //! Spectra, channels, Planck's law and colour, in f64 nanometres.
 
 pub mod channels;
+pub mod colour;
 pub mod curve;
+mod data;
 pub mod planck;
 pub mod table;
+pub mod upsample;
 
 pub use channels::Channels;
 pub use curve::{Curve, Outside};

@@ -31,8 +31,8 @@ pub struct SpectralTables {
     pub strata: Vec<f32>,
     /// First knot of (knotted spectrum, padded channel), with one more entry at the end.
     pub knot_starts: Vec<u32>,
-    /// (μ, value), μ ascending within a channel.
-    pub knots: Vec<[f32; 2]>,
+    /// (μ in units of 2⁻³², bits of the f32 value), μ ascending within a channel.
+    pub knots: Vec<[u32; 2]>,
     /// Device id of each curve that was given.
     pub ids: Vec<u32>,
     /// Reached per curve: largest pointwise error relative to the channel's peak, and largest relative error of a
@@ -104,16 +104,21 @@ impl SpectralTables {
             if k < channels.len() {
                 let [from, to] = channels.bounds[k];
                 let nodes = curve.linear_pieces(from, to).unwrap_or_else(|| smooth_nodes(curve, from, to));
-                for (nm, value) in &nodes {
-                    self.knots.push([((nm - from) / (to - from)) as f32, *value as f32]);
-                }
-                let area: f64 = nodes.windows(2).map(|w| (w[1].0 - w[0].0) * 0.5 * (w[0].1 + w[1].1)).sum();
                 let exact = curve.mean(from, to);
+                let knots: Vec<(f64, f64)> =
+                    nodes.iter().map(|(nm, value)| (fixed_point((nm - from) / (to - from)), *value)).collect();
+                // A line much narrower than the channel changes its width a little when its ends are rounded.
+                let area: f64 = knots.windows(2).map(|w| (w[1].0 - w[0].0) * 0.5 * (w[0].1 + w[1].1)).sum();
+                let correction = if area > 0.0 { exact / (area / FIXED_ONE) } else { 1.0 };
+                let small = (correction - 1.0).abs() <= POINTWISE_BOUND;
+                let scale = if small { correction } else { 1.0 };
+                self.knots.extend(knots.iter().map(|&(mu, value)| [mu as u32, ((value * scale) as f32).to_bits()]));
+                bounds.pointwise = bounds.pointwise.max((scale - 1.0).abs());
                 if exact != 0.0 {
-                    bounds.mean = bounds.mean.max((area / (to - from) / exact - 1.0).abs());
+                    bounds.mean = bounds.mean.max((scale / correction - 1.0).abs());
                 }
             } else {
-                self.knots.extend([[0.0, 0.0], [1.0, 0.0]]);
+                self.knots.extend([[0, 0], [u32::MAX, 0]]);
             }
             self.knot_starts.push(self.knots.len() as u32);
         }
@@ -129,6 +134,14 @@ impl SpectralTables {
     pub fn has_knots(&self) -> bool {
         !self.knots.is_empty()
     }
+}
+
+/// μ = 1 in the units of the device's wavelength coordinate.
+const FIXED_ONE: f64 = 4_294_967_296.0;
+
+/// μ as the device has it, a whole number.
+fn fixed_point(mu: f64) -> f64 {
+    (mu * FIXED_ONE).round().clamp(0.0, FIXED_ONE - 1.0)
 }
 
 impl Bounds {
@@ -251,10 +264,10 @@ mod tests {
         } else {
             let first = t.knot_starts[(id - t.stratified) * t.channels_padded + k] as usize;
             let last = t.knot_starts[(id - t.stratified) * t.channels_padded + k + 1] as usize - 1;
-            let mu = (mu >> 8) as f32 * 5.9604645e-8;
             let i = first + t.knots[first..last].partition_point(|n| n[0] <= mu).max(1) - 1;
-            let [a, b] = [t.knots[i], t.knots[i + 1]];
-            a[1] + ((mu - a[0]) / (b[0] - a[0]).max(1e-30)).clamp(0.0, 1.0) * (b[1] - a[1])
+            let [a_value, b_value] = [t.knots[i][1], t.knots[i + 1][1]].map(f32::from_bits);
+            let place = (mu - t.knots[i][0]) as f32 / ((t.knots[i + 1][0] - t.knots[i][0]) as f32).max(1.0);
+            a_value + place.min(1.0) * (b_value - a_value)
         }
     }
 
@@ -269,8 +282,9 @@ mod tests {
         }
         let start = (id - t.stratified) * t.channels_padded + k;
         let range = t.knot_starts[start] as usize..t.knot_starts[start + 1] as usize;
-        let area = |w: &[[f32; 2]]| f64::from(w[1][0] - w[0][0]) * 0.5 * (f64::from(w[0][1]) + f64::from(w[1][1]));
-        t.knots[range].windows(2).map(area).sum()
+        let value = |knot: [u32; 2]| f64::from(f32::from_bits(knot[1]));
+        let area = |w: &[[u32; 2]]| f64::from(w[1][0] - w[0][0]) * 0.5 * (value(w[0]) + value(w[1]));
+        t.knots[range].windows(2).map(area).sum::<f64>() / FIXED_ONE
     }
 
     fn table(points: &[(f64, f64)], outside: Outside) -> Curve {

@@ -109,7 +109,9 @@ impl Epochs {
     /// Mean of every channel over the image, from the spread of the epochs.
     pub fn image_means(&self) -> Vec<Estimate> {
         let pixels = (self.width * self.height) as f64;
-        let mean = |m: &Vec<f32>, k: usize| m.iter().skip(k).step_by(self.channels).map(|v| f64::from(*v)).sum::<f64>() / pixels;
+        let mean = |m: &Vec<f32>, k: usize| {
+            m.iter().skip(k).step_by(self.channels).map(|v| f64::from(*v)).sum::<f64>() / pixels
+        };
         (0..self.channels).map(|k| Estimate::of(self.means.iter().map(|m| mean(m, k)))).collect()
     }
 

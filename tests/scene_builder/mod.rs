@@ -187,7 +187,8 @@ pub fn icosphere(center: DVec3, radius: f64, levels: u32) -> Shape {
         for b in a + 1..12 {
             for c in b + 1..12 {
                 if near(a, b) && near(b, c) && near(c, a) {
-                    let outward = (positions[b] - positions[a]).cross(positions[c] - positions[a]).dot(positions[a]) > 0.0;
+                    let outward =
+                        (positions[b] - positions[a]).cross(positions[c] - positions[a]).dot(positions[a]) > 0.0;
                     triangles.push(if outward { [a, b, c] } else { [a, c, b] }.map(|i| i as u32));
                 }
             }

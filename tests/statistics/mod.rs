@@ -69,7 +69,10 @@ pub fn assert_estimates(what: &str, estimates: &[Estimate], expected: &[f64], bo
     assert_eq!(estimates.len(), expected.len(), "{what}");
     for (i, (e, want)) in estimates.iter().zip(expected).enumerate() {
         let Estimate { mean, error, freedom } = *e;
-        assert!(error <= bound.resolution * want.abs(), "{what}, value {i}: standard error {error} too large for {want}");
+        assert!(
+            error <= bound.resolution * want.abs(),
+            "{what}, value {i}: standard error {error} too large for {want}"
+        );
         let limit = t_limit(expected.len(), freedom) * error + bound.allowance * want.abs();
         assert!((mean - want).abs() <= limit, "{what}, value {i}: {mean} ± {error}, expected {want} within {limit}");
     }

@@ -1,0 +1,120 @@
+//! `spectile compare`: how a cube differs from a reference.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use serde_json::{Value, json};
+
+use super::Output;
+use crate::cube::{Comparison, Cube, compare};
+use crate::{Error, Result};
+
+/// Compare a cube with a reference, channel by channel
+///
+/// For every channel, over all pixels: bias = mean of A - B; RMSE = root of the mean of (A - B)²; both in W m-2 sr-1
+/// nm-1; and relMSE = mean of (A - B)² / (B² + e) with e = (0.01 x mean of B)², which counts dark and bright pixels
+/// alike and has no unit. A renderer's noise shows in RMSE and relMSE, a mistake also in the bias.
+///
+/// Size and channels must agree, tiles need not. Pixels that one of the cubes has not rendered yet are left out, which is
+/// said.
+#[derive(Debug, clap::Args)]
+#[command(after_long_help = "\
+Examples:
+  spectile compare cube.zarr reference.zarr
+  spectile compare cube.zarr reference.zarr --tolerance 1e-3 || echo differs")]
+pub struct Args {
+    /// The cube in question
+    pub a: PathBuf,
+
+    /// The reference
+    pub b: PathBuf,
+
+    /// Fail, with exit code 1, if the largest relMSE of any channel exceeds this
+    ///
+    /// Cubes that have not rendered every pixel fail as well.
+    #[arg(long, value_name = "RELMSE", value_parser = parse_tolerance, allow_negative_numbers = true)]
+    pub tolerance: Option<f64>,
+
+    /// One JSON object on stdout, instead of a table
+    #[arg(long)]
+    pub json: bool,
+}
+
+pub fn run(args: &Args, output: &Output) -> Result<()> {
+    let (cube, reference) = (Cube::open(&args.a)?, Cube::open(&args.b)?);
+    let comparison = compare(&cube, &reference)?;
+    let verdict = args.tolerance.map(|tolerance| judge(&comparison, tolerance));
+    output.event("done", facts(args, &cube, &comparison, verdict.as_ref().map(|v| v.is_ok())))?;
+    output.text(&table(&cube, &comparison))?;
+    verdict.unwrap_or(Ok(()))
+}
+
+fn judge(comparison: &Comparison, tolerance: f64) -> Result<()> {
+    let Comparison { pixels, pixels_in_all, .. } = comparison;
+    if pixels < pixels_in_all {
+        let what = format!("only {pixels} of {pixels_in_all} pixels are rendered in both cubes");
+        return Err(Error::Check(format!("{what}, so they cannot pass --tolerance")));
+    }
+    let (channel, largest) = comparison.worst();
+    // A NaN is not within any tolerance.
+    if largest <= tolerance {
+        return Ok(());
+    }
+    Err(Error::Check(format!("relMSE {largest:.3e} of channel {channel} exceeds the tolerance {tolerance:e}")))
+}
+
+fn mean_rel_mse(comparison: &Comparison) -> f64 {
+    comparison.channels.iter().map(|c| c.rel_mse).sum::<f64>() / comparison.channels.len() as f64
+}
+
+fn facts(args: &Args, cube: &Cube, comparison: &Comparison, passed: Option<bool>) -> Value {
+    let (worst, largest) = comparison.worst();
+    let each = comparison.channels.iter().enumerate().map(|(k, c)| {
+        json!({
+            "wavelength_nm": cube.channels().centre(k),
+            "mean": c.mean,
+            "reference_mean": c.reference_mean,
+            "bias": c.bias,
+            "rmse": c.rmse,
+            "rel_mse": c.rel_mse,
+        })
+    });
+    json!({
+        "cube": args.a,
+        "reference": args.b,
+        "pixels": comparison.pixels,
+        "pixels_in_all": comparison.pixels_in_all,
+        "rel_mse": { "mean": mean_rel_mse(comparison), "largest": largest, "channel": worst },
+        "tolerance": args.tolerance,
+        "passed": passed,
+        "channels": each.collect::<Vec<_>>(),
+    })
+}
+
+fn table(cube: &Cube, comparison: &Comparison) -> String {
+    let mut text = format!(
+        "{:>7} {:>14} {:>13} {:>13} {:>13} {:>13}\n",
+        "channel", "wavelength_nm", "mean_B", "bias", "RMSE", "relMSE"
+    );
+    for (k, c) in comparison.channels.iter().enumerate() {
+        let nm = cube.channels().centre(k);
+        let (mean, bias, rmse, rel_mse) = (c.reference_mean, c.bias, c.rmse, c.rel_mse);
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{k:>7} {nm:>14.4} {mean:>13.5e} {bias:>13.5e} {rmse:>13.5e} {rel_mse:>13.5e}");
+    }
+    let ((worst, largest), mean) = (comparison.worst(), mean_rel_mse(comparison));
+    let Comparison { pixels, pixels_in_all, .. } = comparison;
+    let left_out = match pixels_in_all - pixels {
+        0 => String::new(),
+        missing => format!("; {missing} pixels left out, not rendered in both yet"),
+    };
+    let _ = writeln!(text, "relMSE: {mean:.5e} in the mean, {largest:.5e} at most (channel {worst}){left_out}");
+    text
+}
+
+fn parse_tolerance(text: &str) -> std::result::Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(tolerance) if tolerance >= 0.0 => Ok(tolerance),
+        _ => Err("a tolerance is a relMSE from 0, such as 1e-3".into()),
+    }
+}

@@ -1,0 +1,148 @@
+//! `spectile info`: what a cube is and how far it got.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use serde_json::{Value, json};
+
+use super::Output;
+use crate::Result;
+use crate::cube::{Cube, Progress};
+use crate::spectral::Channels;
+use crate::spectral::colour::ProjectionKind;
+
+/// Say what a cube is, how far it got and how large its error is
+///
+/// Works on finished cubes and on those being rendered. The error estimate of a channel is the standard error of its
+/// pixels, root mean square over the picture, relative to their root mean square radiance. It comes from the spread of
+/// the epochs (64 samples each), so it needs two of them and is rough below eight.
+#[derive(Debug, clap::Args)]
+#[command(after_long_help = "\
+Examples:
+  spectile info cube.zarr
+  spectile info cube.zarr --json        all channels, with bounds and error estimates; null where unknown")]
+pub struct Args {
+    /// The cube, a folder
+    pub cube: PathBuf,
+
+    /// One JSON object on stdout, instead of text
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Epochs below which an error estimate is only rough (DESIGN section 8).
+const ROUGH_BELOW: u32 = 8;
+
+pub fn run(args: &Args, output: &Output) -> Result<()> {
+    let cube = Cube::open(&args.cube)?;
+    let progress = cube.progress()?;
+    let estimate = cube.error_estimate()?;
+    output.event("done", facts(&cube, progress, &estimate))?;
+    output.text(&describe(&cube, progress, &estimate))
+}
+
+/// Whole epochs that every tile begun has.
+fn epochs(cube: &Cube, progress: Progress) -> u32 {
+    progress.samples[0] / cube.header().epoch
+}
+
+fn facts(cube: &Cube, progress: Progress, estimate: &[f64]) -> Value {
+    let (header, channels) = (cube.header(), cube.channels());
+    let each = (0..channels.len()).map(|k| {
+        json!({
+            "name": channels.names[k],
+            "wavelength_nm": channels.centre(k),
+            "bounds_nm": channels.bounds[k],
+            "error_estimate": estimate[k],
+        })
+    });
+    json!({
+        "cube": cube.path(),
+        "size": header.size,
+        "origin": header.origin,
+        "tile": header.tile,
+        "tiles": progress.tiles,
+        "tiles_started": progress.tiles_started,
+        "samples": { "least": progress.samples[0], "most": progress.samples[1] },
+        "epoch": header.epoch,
+        "epochs": epochs(cube, progress),
+        "error_estimate_is_rough": epochs(cube, progress) < ROUGH_BELOW,
+        "store_bytes": header.store_bytes(),
+        "preview": shows(cube),
+        "attributes": header.attributes,
+        "channels": each.collect::<Vec<_>>(),
+    })
+}
+
+fn describe(cube: &Cube, progress: Progress, estimate: &[f64]) -> String {
+    let header = cube.header();
+    let ([width, height], [tile_width, tile_height]) = (header.size, header.tile);
+    let mut text = String::new();
+    let mut row = |name: &str, value: String| {
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{name:<16} {value}");
+    };
+    row("cube", cube.path().display().to_string());
+    row("size", format!("{width} x {height} pixels x {} channels", cube.channels().len()));
+    if header.origin != [0, 0] {
+        row("crop", format!("from column {}, row {} of the film", header.origin[0], header.origin[1]));
+    }
+    row("wavelengths", describe_channels(cube.channels()));
+    row("tiles", format!("{} of {tile_width} x {tile_height} pixels", progress.tiles));
+    row("samples", describe_samples(progress));
+    row("error estimate", describe_estimate(cube, progress, estimate));
+    row("preview", shows(cube));
+    row("on disk", format!("{} when all tiles are begun", crate::files::format_bytes(header.store_bytes())));
+    for (name, value) in &header.attributes {
+        row(name, value.as_str().map_or_else(|| value.to_string(), str::to_owned));
+    }
+    text
+}
+
+fn describe_channels(channels: &Channels) -> String {
+    let from = channels.bounds.iter().map(|b| b[0]).fold(f64::INFINITY, f64::min);
+    let to = channels.bounds.iter().map(|b| b[1]).fold(f64::NEG_INFINITY, f64::max);
+    let widths = || (0..channels.len()).map(|k| channels.width(k));
+    let (least, most) = (widths().fold(f64::INFINITY, f64::min), widths().fold(0.0, f64::max));
+    let width = if most - least <= 1e-6 * most { format!("{most:.6}") } else { format!("{least:.6} to {most:.6}") };
+    format!("{from} to {to} nm, channels {width} nm wide")
+}
+
+fn describe_samples(progress: Progress) -> String {
+    let [least, most] = progress.samples;
+    let per_pixel = if least == most { format!("{most} per pixel") } else { format!("{least} to {most} per pixel") };
+    match progress.tiles - progress.tiles_started {
+        0 => per_pixel,
+        missing if missing == progress.tiles => "none yet".into(),
+        missing => format!("{per_pixel}; {missing} of {} tiles have none yet", progress.tiles),
+    }
+}
+
+fn describe_estimate(cube: &Cube, progress: Progress, estimate: &[f64]) -> String {
+    let epochs = epochs(cube, progress);
+    if epochs < 2 {
+        return format!("unknown before 2 epochs ({} samples per pixel)", 2 * cube.header().epoch);
+    }
+    let mut order: Vec<usize> = (0..estimate.len()).collect();
+    order.sort_by(|&a, &b| estimate[a].total_cmp(&estimate[b]));
+    let (median, worst) = (order[(order.len() - 1) / 2], order[order.len() - 1]);
+    let rough = if epochs < ROUGH_BELOW { ", rough" } else { "" };
+    format!(
+        "{:.3} % in the median channel, {:.3} % in the worst ({}: {}), from {epochs} epochs{rough}",
+        100.0 * estimate[median],
+        100.0 * estimate[worst],
+        worst,
+        cube.channels().names[worst],
+    )
+}
+
+/// What the preview shows, for people.
+pub(super) fn shows(cube: &Cube) -> String {
+    match cube.projection().kind {
+        ProjectionKind::Xyz => "colours as seen (CIE 1931, sRGB)".into(),
+        ProjectionKind::FalseColour(rgb) => {
+            let [r, g, b] = rgb.map(|k| cube.channels().names[k].as_str());
+            format!("false colours: {r} as red, {g} as green, {b} as blue")
+        }
+    }
+}

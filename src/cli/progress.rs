@@ -1,0 +1,193 @@
+//! What `render` says while it works: a progress bar, plain lines, or one JSON object a line.
+
+use std::io::IsTerminal;
+use std::time::Duration;
+
+use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde_json::{Value, json};
+
+use super::Output;
+use super::output::say;
+use super::render::Args;
+use crate::files::format_bytes;
+use crate::render::plan;
+use crate::render::schedule::{Event, Job, Status, Summary};
+use crate::{Error, Result};
+
+/// Epochs below which an error estimate is only rough (DESIGN section 8).
+const ROUGH_BELOW: u32 = 8;
+
+pub struct Reporter<'a> {
+    output: &'a Output,
+    quiet: bool,
+    profile: bool,
+    epoch: u32,
+    /// Only on a terminal.
+    bar: Option<ProgressBar>,
+}
+
+impl<'a> Reporter<'a> {
+    pub fn new(args: &Args, output: &'a Output) -> Self {
+        let bar = (!args.quiet && !args.json && std::io::stderr().is_terminal()).then(|| {
+            let bar = ProgressBar::with_draw_target(Some(1), ProgressDrawTarget::stderr_with_hz(5));
+            let style = ProgressStyle::with_template("{bar:30} {pos}/{len} units  {msg}").expect("a valid template");
+            bar.with_style(style)
+        });
+        Reporter { output, quiet: args.quiet, profile: args.profile, epoch: 64, bar }
+    }
+
+    /// A line on stderr that neither breaks the bar nor appears under --quiet.
+    fn line(&self, text: &str) {
+        match &self.bar {
+            Some(bar) => bar.println(text),
+            None if !self.quiet && !self.output.json() => say(text),
+            None => {}
+        }
+    }
+
+    /// Warnings are always said, and are events of their own.
+    pub fn warn(&self, text: &str) -> Result<()> {
+        match &self.bar {
+            Some(bar) => bar.println(format!("warning: {text}")),
+            None => say(&format!("warning: {text}")),
+        }
+        self.output.event("warning", json!({ "message": text }))
+    }
+
+    pub fn start(&mut self, job: &Job) -> Result<()> {
+        self.epoch = job.scene.integrator.epoch;
+        let [width, height] = job.scene.film.cube_size();
+        let tile = plan::tile_size(&job.scene, job.tile);
+        let disk = plan::header(&job.scene, tile, job.seed).store_bytes();
+        let channels = job.scene.channels.len();
+        self.line(&format!(
+            "{}: {width} x {height} pixels x {channels} channels, {} on disk",
+            job.scene.file.display(),
+            format_bytes(disk)
+        ));
+        self.output.event(
+            "start",
+            json!({
+                "scene": job.scene.file, "output": job.output, "size": [width, height], "channels": channels, "tile": tile,
+                "seed": job.seed, "scene_digest": job.scene.digest, "disk_bytes": disk,
+            }),
+        )
+    }
+
+    pub fn event(&mut self, event: Event) -> Result<()> {
+        match event {
+            Event::Warning(text) => self.warn(&text),
+            Event::Device(name) => {
+                self.line(&format!("device: {name}"));
+                self.output.event("device", json!({ "name": name }))
+            }
+            Event::Progress(status) => {
+                if let Some(bar) = &self.bar {
+                    bar.set_length(u64::from(status.units.1));
+                    bar.set_position(u64::from(status.units.0));
+                    bar.set_message(self.describe(status, status.samples_next));
+                }
+                self.output.event("progress", fields(status))
+            }
+            Event::Epoch(status) => {
+                if self.bar.is_none() {
+                    self.line(&self.describe(status, status.samples));
+                }
+                self.output.event("epoch", fields(status))
+            }
+        }
+    }
+
+    fn describe(&self, status: &Status, samples: u32) -> String {
+        let rate = |count: u64| HumanCount((count as f64 / status.busy_s.max(1e-9)) as u64).to_string();
+        let mut text = format!("{samples} samples/pixel  {} paths/s  {} rays/s", rate(status.paths), rate(status.rays));
+        if let Some(error) = status.error_estimate {
+            let rough = if status.samples / self.epoch < ROUGH_BELOW { " (rough)" } else { "" };
+            text += &format!("  error {:.2} %{rough}", 100.0 * error);
+        }
+        if let Some(left) = status.remaining.filter(|left| !left.is_zero()) {
+            text += &format!("  {} left", short(left));
+        }
+        text
+    }
+
+    /// The end, good or bad.
+    pub fn finish(&mut self, job: &Job, summary: Result<Summary>) -> Result<()> {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+        let summary = match summary {
+            Ok(summary) => summary,
+            Err(error @ Error::Interrupted { .. }) => {
+                say(&format!("interrupted: every unit merged so far is in {}", job.output.display()));
+                return Err(error);
+            }
+            Err(error) => return Err(error),
+        };
+        let status = &summary.status;
+        if self.profile {
+            self.describe_profile(&summary)?;
+        }
+        let mut done = fields(status);
+        done["output"] = json!(job.output);
+        self.output.event("done", done)?;
+        if self.quiet {
+            return Ok(());
+        }
+        let mut text = format!(
+            "{}: {} samples/pixel in {}, {} paths\n",
+            job.output.display(),
+            status.samples,
+            short(status.elapsed),
+            HumanCount(status.paths)
+        );
+        if let (Some(preview), Some(exposure)) = (&job.preview, summary.exposure) {
+            text += &format!("{}: exposure {exposure:+.2} EV\n", preview.file.display());
+        }
+        self.output.text(&text)
+    }
+
+    fn describe_profile(&self, summary: &Summary) -> Result<()> {
+        let status = &summary.status;
+        let device = summary.profile.map(|p| json!({ "generate_s": p.generate_s, "evaluate_s": p.evaluate_s }));
+        self.output.event(
+            "profile",
+            json!({ "setup_s": summary.setup_s, "merge_s": summary.merge_s, "device": device, "rays": status.rays }),
+        )?;
+        let per_path = |seconds: f64| 1e6 * seconds / status.paths.max(1) as f64;
+        let mut text = format!("set-up    {:8.3} s  (scene, device, shaders)\n", summary.setup_s);
+        if let Some(p) = summary.profile {
+            text += &format!("generate  {:8.3} s  {:.3} us a path\n", p.generate_s, per_path(p.generate_s));
+            text += &format!("evaluate  {:8.3} s  {:.3} us a path\n", p.evaluate_s, per_path(p.evaluate_s));
+        }
+        text += &format!("merge     {:8.3} s  {:.3} us a path, beside the device's work\n", summary.merge_s, per_path(summary.merge_s));
+        text += &format!("idle      {:8.3} s\n", status.idle_s);
+        self.output.text(&text)
+    }
+}
+
+/// The fields of `progress`, `epoch` and `done`; docs/json.md lists them.
+fn fields(status: &Status) -> Value {
+    json!({
+        "samples": status.samples,
+        "samples_next": status.samples_next,
+        "units": status.units.0,
+        "units_total": status.units.1,
+        "paths": status.paths,
+        "paths_per_s": status.paths as f64 / status.busy_s.max(1e-9),
+        "rays": status.rays,
+        "error_estimate": status.error_estimate,
+        "remaining_s": status.remaining.map(|d| d.as_secs_f64()),
+        "devices": [{ "name": status.device, "units": status.units.0, "busy_s": status.busy_s, "idle_s": status.idle_s }],
+    })
+}
+
+/// A duration as people say it.
+pub fn short(d: Duration) -> String {
+    let s = d.as_secs_f64();
+    match s {
+        s if s < 60.0 => format!("{s:.1} s"),
+        s if s < 3600.0 => format!("{:.0} min {:02.0} s", (s / 60.0).floor(), s % 60.0),
+        s => format!("{:.0} h {:02.0} min", (s / 3600.0).floor(), (s % 3600.0) / 60.0),
+    }
+}

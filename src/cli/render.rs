@@ -1,0 +1,133 @@
+//! `spectile render`: from a scene to a cube.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use super::Output;
+use super::progress::Reporter;
+use super::scene::SceneArgs;
+use crate::Result;
+use crate::render::schedule::{self, Job, Preview, StopRule};
+
+/// Render a scene into a cube
+///
+/// Renders SCENE into a new cube, a Zarr v3 store that other programs can open while it grows. Every tile first gets 1
+/// sample per pixel, then 1, 2, 4, … 32 more, then 64 at a time: there is a picture at once, and after every epoch the
+/// cube is complete.
+///
+/// Rendering stops at the first limit reached, --spp or --time, always at the end of an epoch of the whole picture;
+/// without a limit, after 64 samples per pixel. Noise falls with the square root of the samples: four times the samples
+/// halve the error. Ctrl-C keeps everything merged so far.
+#[derive(Debug, clap::Args)]
+#[command(after_long_help = "\
+Examples:
+  spectile render scene.toml -o cube.zarr --spp 256
+  spectile render scene.toml -o cube.zarr --time 10m --preview now.png
+  spectile render scene.toml -o quick.zarr --size 128x128 --set channels.equal.count=30")]
+pub struct Args {
+    /// The cube to make, a folder
+    #[arg(short, long, value_name = "OUT.zarr")]
+    pub output: PathBuf,
+
+    /// Stop after this many samples per pixel
+    ///
+    /// Rounded up to the end of an epoch: 1, 2, 4, 8, 16, 32, 64, then multiples of 64 (or of integrator.epoch).
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub spp: Option<u32>,
+
+    /// Stop after this time, e.g. 90s, 10m or 1.5h
+    ///
+    /// Seconds where there is no unit. An epoch that would not finish in time is not started.
+    #[arg(long, value_name = "TIME", value_parser = parse_time)]
+    pub time: Option<Duration>,
+
+    /// Seed of all random numbers
+    ///
+    /// The same scene, settings and seed give the same cube, bit for bit. Cubes of different seeds are independent:
+    /// their mean has half the variance.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+
+    /// Replace OUT.zarr if it exists
+    ///
+    /// Only a Spectile cube is ever replaced; any other folder or file is refused.
+    #[arg(long)]
+    pub overwrite: bool,
+
+    #[command(flatten)]
+    pub scene: SceneArgs,
+
+    /// Keep a picture of the cube as it grows (PNG, 8-bit sRGB)
+    #[arg(long, value_name = "FILE.png")]
+    pub preview: Option<PathBuf>,
+
+    /// Exposure of the preview in EV: every step up is twice as bright
+    ///
+    /// At 0 a radiance of 1 W m-2 sr-1 nm-1 in all channels is white. Without it the 99th percentile of the lit pixels
+    /// is, and the exposure chosen is printed.
+    #[arg(long, value_name = "EV", value_parser = super::parse_exposure, allow_hyphen_values = true)]
+    #[arg(requires = "preview")]
+    pub exposure: Option<f64>,
+
+    /// Say where the time went, stage by stage
+    #[arg(long)]
+    pub profile: bool,
+
+    /// One JSON object a line on stdout, instead of text
+    #[arg(long)]
+    pub json: bool,
+
+    /// No progress; only warnings and errors
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+pub fn run(args: &Args, output: &Output) -> Result<()> {
+    let interrupt = super::interrupt::watch()?;
+    let scene = args.scene.load()?;
+    let mut reporter = Reporter::new(args, output);
+    for warning in &scene.warnings {
+        reporter.warn(warning)?;
+    }
+    let job = Job {
+        output: args.output.clone(),
+        overwrite: args.overwrite,
+        seed: args.seed,
+        tile: args.scene.tile,
+        stop: StopRule { samples: args.spp, time: args.time },
+        preview: args.preview.clone().map(|file| Preview { file, exposure: args.exposure }),
+        profile: args.profile,
+        scene,
+    };
+    reporter.start(&job)?;
+    let summary = schedule::run(&job, &interrupt, &mut |event| reporter.event(event));
+    reporter.finish(&job, summary)
+}
+
+/// A duration as a number of seconds, or with a unit s, m or h.
+fn parse_time(text: &str) -> std::result::Result<Duration, String> {
+    let explain = || "a time is a positive number with s, m or h, such as 90s, 10m or 1.5h".to_owned();
+    let (number, unit) = match text.char_indices().next_back() {
+        Some((last, 's')) => (&text[..last], 1.0),
+        Some((last, 'm')) => (&text[..last], 60.0),
+        Some((last, 'h')) => (&text[..last], 3600.0),
+        _ => (text, 1.0),
+    };
+    let seconds = number.trim_end().parse::<f64>().map_err(|_| explain())? * unit;
+    if seconds > 0.0 { Duration::try_from_secs_f64(seconds).map_err(|_| explain()) } else { Err(explain()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_have_units() {
+        for (text, seconds) in [("90", 90.0), ("90s", 90.0), ("10m", 600.0), ("1.5h", 5400.0), ("0.5 s", 0.5)] {
+            assert_eq!(parse_time(text), Ok(Duration::from_secs_f64(seconds)), "{text}");
+        }
+        for bad in ["", "m", "0", "-5s", "nan", "inf", "5d", "1e300h", "10m30"] {
+            assert!(parse_time(bad).unwrap_err().contains("1.5h"), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,55 @@
+//! `spectile spectrum`: one pixel of a cube.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use super::Output;
+use crate::cube::Cube;
+use crate::files::write_atomically;
+use crate::format::plot;
+use crate::{Error, Result};
+
+/// Print the spectrum of one pixel as CSV
+///
+/// One line a channel, in the order of the cube: the centre of the channel in nm and its mean spectral radiance in W m-2
+/// sr-1 nm-1, with as many digits as bring back the stored number exactly.
+#[derive(Debug, clap::Args)]
+#[command(after_long_help = "\
+Examples:
+  spectile spectrum cube.zarr 120 80 > pixel.csv
+  spectile spectrum cube.zarr 120 80 --plot pixel.svg")]
+pub struct Args {
+    /// The cube, a folder
+    pub cube: PathBuf,
+
+    /// Column, from 0 at the left
+    #[arg(allow_negative_numbers = true)]
+    pub x: u32,
+
+    /// Row, from 0 at the top
+    #[arg(allow_negative_numbers = true)]
+    pub y: u32,
+
+    /// Draw the spectrum too, as SVG: every channel a level over its own interval
+    #[arg(long, value_name = "FILE.svg")]
+    pub plot: Option<PathBuf>,
+}
+
+pub fn run(args: &Args, output: &Output) -> Result<()> {
+    let cube = Cube::open(&args.cube)?;
+    let Some(spectrum) = cube.spectrum(args.x, args.y)? else {
+        let what = format!("pixel {} {} has no samples yet; try again when its tile is rendered", args.x, args.y);
+        return Err(Error::Usage(format!("{}: {what}", args.cube.display())));
+    };
+    let samples = cube.samples(cube.grid().tile_at(args.x, args.y))?;
+    let title = format!("{}, column {}, row {}, {samples} samples", args.cube.display(), args.x, args.y);
+    if let Some(path) = &args.plot {
+        write_atomically(path, plot::spectrum(cube.channels(), &spectrum, &title)?.as_bytes())?;
+    }
+    let mut csv = format!("# {title}\n# radiance in W m-2 sr-1 nm-1, mean over the channel\nwavelength_nm,radiance\n");
+    for (k, radiance) in spectrum.iter().enumerate() {
+        // Debug, not Display: 1e-30 instead of thirty zeros. Writing to a string cannot fail.
+        let _ = writeln!(csv, "{},{radiance:?}", cube.channels().centre(k));
+    }
+    output.text(&csv)
+}

@@ -1,0 +1,138 @@
+//! How one cube differs from another that serves as reference.
+
+use super::grid::Rect;
+use super::map::Chunk;
+use super::store::Cube;
+use crate::{Error, Result};
+
+/// Two cubes against each other, over the pixels that are rendered in both.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Comparison {
+    pub channels: Vec<ChannelMetrics>,
+    /// Pixels compared.
+    pub pixels: u64,
+    /// Pixels of the picture.
+    pub pixels_in_all: u64,
+}
+
+/// The metrics of DESIGN section 8 for one channel, x against ref; means over pixels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ChannelMetrics {
+    /// mean of x, W m⁻² sr⁻¹ nm⁻¹.
+    pub mean: f64,
+    /// mean of ref, W m⁻² sr⁻¹ nm⁻¹.
+    pub reference_mean: f64,
+    /// mean of x - ref, W m⁻² sr⁻¹ nm⁻¹.
+    pub bias: f64,
+    /// sqrt of the mean of (x - ref)², W m⁻² sr⁻¹ nm⁻¹.
+    pub rmse: f64,
+    /// mean of (x - ref)² / (ref² + ε), ε = (0.01 · mean of ref)². Equal values differ by 0, also where ref and ε are 0;
+    /// others are infinitely far apart there.
+    pub rel_mse: f64,
+}
+
+impl Comparison {
+    /// The channel with the largest relMSE, and that; NaN is larger than any number.
+    pub fn worst(&self) -> (usize, f64) {
+        // `total_cmp` puts a positive NaN above infinity.
+        let of = |k: usize| if self.channels[k].rel_mse.is_nan() { f64::NAN.abs() } else { self.channels[k].rel_mse };
+        let worst = (0..self.channels.len()).rev().max_by(|&a, &b| of(a).total_cmp(&of(b))).unwrap_or(0);
+        (worst, of(worst))
+    }
+}
+
+/// Compares `cube` with `reference`. Their sizes and channels must agree, their tiles need not.
+pub fn compare(cube: &Cube, reference: &Cube) -> Result<Comparison> {
+    check_comparable(cube, reference)?;
+    let channels = cube.channels().len();
+    let mut pixels = 0u64;
+    let (mut sums, mut reference_sums) = (vec![0.0; channels], vec![0.0; channels]);
+    visit(cube, reference, |x, reference| {
+        pixels += 1;
+        for k in 0..channels {
+            sums[k] += f64::from(x[k]);
+            reference_sums[k] += f64::from(reference[k]);
+        }
+    })?;
+    if pixels == 0 {
+        let (a, b) = (cube.path().display(), reference.path().display());
+        return Err(Error::Usage(format!("{a} and {b} have no rendered pixel in common")));
+    }
+
+    // The reference's mean is part of relMSE, hence a second pass. Sums of differences of means would cancel.
+    let mean = |sum: f64| sum / pixels as f64;
+    let epsilon: Vec<f64> = reference_sums.iter().map(|&sum| (0.01 * mean(sum)).powi(2)).collect();
+    // Counted anew: a cube that is being rendered may have grown meanwhile.
+    let mut compared = 0u64;
+    let (mut bias, mut square, mut relative) = (vec![0.0; channels], vec![0.0; channels], vec![0.0; channels]);
+    visit(cube, reference, |x, reference| {
+        compared += 1;
+        for k in 0..channels {
+            let reference = f64::from(reference[k]);
+            let difference = f64::from(x[k]) - reference;
+            let distance = difference * difference;
+            bias[k] += difference;
+            square[k] += distance;
+            if distance != 0.0 {
+                relative[k] += distance / (reference * reference + epsilon[k]);
+            }
+        }
+    })?;
+    let n = compared as f64;
+    let metrics = |k: usize| ChannelMetrics {
+        mean: mean(sums[k]),
+        reference_mean: mean(reference_sums[k]),
+        bias: bias[k] / n,
+        rmse: (square[k] / n).sqrt(),
+        rel_mse: relative[k] / n,
+    };
+    let [width, height] = cube.header().size.map(u64::from);
+    Ok(Comparison { channels: (0..channels).map(metrics).collect(), pixels: compared, pixels_in_all: width * height })
+}
+
+fn check_comparable(a: &Cube, b: &Cube) -> Result<()> {
+    let refuse = |what: String| {
+        let (a, b) = (a.path().display(), b.path().display());
+        Err(Error::Usage(format!("{a} and {b} cannot be compared: {what}")))
+    };
+    let ([wa, ha], [wb, hb]) = (a.header().size, b.header().size);
+    if [wa, ha] != [wb, hb] {
+        return refuse(format!("the first has {wa}x{ha} pixels, the second {wb}x{hb}"));
+    }
+    let (ca, cb) = (a.channels(), b.channels());
+    if ca.len() != cb.len() {
+        return refuse(format!("the first has {} channels, the second {}", ca.len(), cb.len()));
+    }
+    // Bounds that were computed in different ways may differ in their last bits.
+    let same = |a: f64, b: f64| (a - b).abs() <= 1e-9 * a.abs().max(b.abs());
+    let differs = |k: &usize| (0..2).any(|end| !same(ca.bounds[*k][end], cb.bounds[*k][end]));
+    match (0..ca.len()).find(differs) {
+        Some(k) => {
+            let ([a0, a1], [b0, b1]) = (ca.bounds[k], cb.bounds[k]);
+            refuse(format!("channel {k} is {a0}-{a1} nm in the first and {b0}-{b1} nm in the second"))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Calls `each` with the spectra of every pixel rendered in both cubes.
+fn visit(a: &Cube, b: &Cube, mut each: impl FnMut(&[f32], &[f32])) -> Result<()> {
+    for tile in 0..a.grid().count() {
+        let Some(chunk) = a.chunk(tile)? else { continue };
+        for other in b.grid().tiles_in(chunk.rect()) {
+            let Some(other) = b.chunk(other)? else { continue };
+            if let Some(common) = chunk.rect().intersection(&other.rect()) {
+                visit_common(&chunk, &other, common, &mut each);
+            }
+        }
+    }
+    Ok(())
+}
+
+fn visit_common(a: &Chunk, b: &Chunk, common: Rect, each: &mut impl FnMut(&[f32], &[f32])) {
+    for y in common.y0..common.y1 {
+        for x in common.x0..common.x1 {
+            each(a.spectrum(x, y), b.spectrum(x, y));
+        }
+    }
+}

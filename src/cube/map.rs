@@ -1,0 +1,58 @@
+//! Chunks mapped into memory: the only place that maps files.
+
+use std::fs::File;
+use std::io::ErrorKind;
+use std::path::Path;
+
+use memmap2::Mmap;
+
+use super::grid::Rect;
+use crate::{Error, Result};
+
+#[cfg(target_endian = "big")]
+compile_error!("chunks are little-endian floats that are used in place; a big-endian host would need to swap them");
+
+/// The radiance of one tile, mapped from its file: [tile_h][tile_w][K] f32, the channel fastest. Pixels beyond the
+/// edge of the picture are NaN. It stays what it was when the tile is merged again.
+pub struct Chunk {
+    map: Mmap,
+    rect: Rect,
+    tile_width: usize,
+    channels: usize,
+}
+
+impl Chunk {
+    /// Maps the chunk at `path`; `None` where the file does not exist. A file of another size is damage.
+    pub(super) fn open(path: &Path, rect: Rect, tile: [u32; 2], channels: usize) -> Result<Option<Chunk>> {
+        let file = match File::open(path) {
+            Ok(file) => file,
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+            Err(error) => return Err(Error::storage(path, format!("cannot be opened: {error}"))),
+        };
+        // SAFETY: a mapped file must not change or shrink underneath. Spectile never writes to a chunk that bears its
+        // name: a new one is written aside and renamed over it, and the old one lives on for as long as it is mapped.
+        let map = unsafe { Mmap::map(&file) }.map_err(|error| Error::storage(path, format!("cannot map: {error}")))?;
+        let (bytes, expected) = (map.len(), tile[0] as usize * tile[1] as usize * channels * 4);
+        if bytes != expected {
+            return Err(Error::storage(path, format!("is damaged: {bytes} bytes long, not {expected}")));
+        }
+        Ok(Some(Chunk { map, rect, tile_width: tile[0] as usize, channels }))
+    }
+
+    /// All values, [tile_h][tile_w][K].
+    pub fn values(&self) -> &[f32] {
+        // A mapping starts at a page, so it is aligned, and `open` has checked the length.
+        bytemuck::cast_slice(&self.map)
+    }
+
+    /// The pixels of the picture in this tile.
+    pub fn rect(&self) -> Rect {
+        self.rect
+    }
+
+    /// The K channels of a pixel of the picture that lies in this tile.
+    pub fn spectrum(&self, x: u32, y: u32) -> &[f32] {
+        let pixel = (y - self.rect.y0) as usize * self.tile_width + (x - self.rect.x0) as usize;
+        &self.values()[pixel * self.channels..][..self.channels]
+    }
+}

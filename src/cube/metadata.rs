@@ -1,0 +1,327 @@
+//! What a cube says about itself: the header, and its form as Zarr v3 metadata with CF attributes.
+
+use std::path::Path;
+
+use serde_json::{Map, Value, json};
+
+use super::grid::Grid;
+use crate::spectral::Channels;
+use crate::spectral::colour::{Projection, ProjectionKind};
+use crate::{Error, Result};
+
+/// The version of the layout, `spectile_format` among the attributes of the group.
+pub const FORMAT: u64 = 1;
+
+/// Everything about a cube that is fixed when it is created.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Header {
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// Column and row, on the full film, of the cube's top left pixel: not zero under `film.crop`.
+    pub origin: [u32; 2],
+    /// Width and height of a tile in pixels; a multiple of 8, or at least the picture's own width or height.
+    pub tile: [u32; 2],
+    pub channels: Channels,
+    /// Samples per pixel of a full epoch, a power of two up to 1,024.
+    pub epoch: u32,
+    /// Further attributes of the group: scene digest, settings, seed, evaluator, …
+    pub attributes: Map<String, Value>,
+}
+
+/// Attributes of the group that the header's own fields make.
+const RESERVED: [&str; 8] =
+    ["Conventions", "title", "spectile_format", "spectile_version", "epoch", "origin", "channel_names", "false_colour"];
+
+impl Header {
+    pub fn grid(&self) -> Grid {
+        Grid { size: self.size, tile: self.tile }
+    }
+
+    /// Bytes of one chunk of `radiance`.
+    pub fn chunk_bytes(&self) -> u64 {
+        u64::from(self.tile[0]) * u64::from(self.tile[1]) * self.channels.len() as u64 * 4
+    }
+
+    /// Bytes on disk of the finished cube, with one more tile for the files aside. Files take whole blocks of 4 KiB.
+    pub fn store_bytes(&self) -> u64 {
+        let channels = self.channels.len() as u64;
+        let pixels = u64::from(self.tile[0]) * u64::from(self.tile[1]);
+        let blocks = self.grid().tile_blocks().map(u64::from);
+        let files = [pixels * channels * 4, pixels * 12, blocks[0] * blocks[1] * channels * 4, 4, channels * 16 + 64];
+        let tile: u64 = files.iter().map(|bytes| bytes.div_ceil(4096) * 4096).sum();
+        let [columns, rows] = self.grid().tiles().map(u64::from);
+        tile.saturating_mul(columns * rows + 1)
+    }
+
+    /// Checks what a cube relies on, [`super::Cube::create`] included; the message says which value is wrong and what is allowed.
+    pub fn validate(&self) -> std::result::Result<(), String> {
+        let [width, height] = self.size;
+        if width == 0 || height == 0 {
+            return Err(format!("a cube of {width}x{height} pixels has no pixels"));
+        }
+        for (axis, name) in ["width", "height"].into_iter().enumerate() {
+            let (tile, size) = (self.tile[axis], self.size[axis]);
+            if tile == 0 || (tile < size && tile % super::BLOCK != 0) {
+                return Err(format!(
+                    "tile {name} {tile} is neither a multiple of {} nor the whole {size}",
+                    super::BLOCK
+                ));
+            }
+        }
+        let tiles = self.grid().tiles().map(u64::from);
+        if tiles[0] * tiles[1] > u64::from(u32::MAX) {
+            return Err(format!("{} x {} tiles are more than 2^32; choose larger tiles", tiles[0], tiles[1]));
+        }
+        let values = u128::from(self.tile[0]) * u128::from(self.tile[1]) * self.channels.len() as u128;
+        if values > (isize::MAX / 8) as u128 {
+            return Err(format!("a tile of {}x{} pixels is too large", self.tile[0], self.tile[1]));
+        }
+        if !self.epoch.is_power_of_two() || self.epoch > 1024 {
+            return Err(format!("an epoch of {} samples is not a power of two up to 1024", self.epoch));
+        }
+        self.validate_channels()
+    }
+
+    fn validate_channels(&self) -> std::result::Result<(), String> {
+        let channels = &self.channels;
+        if channels.is_empty() || channels.names.len() != channels.len() {
+            return Err(format!("{} channels with {} names", channels.len(), channels.names.len()));
+        }
+        for (k, [from, to]) in channels.bounds.iter().enumerate() {
+            if !(*from > 0.0 && from < to && to.is_finite()) {
+                return Err(format!("channel {k} from {from} to {to} nm is no interval of wavelength"));
+            }
+        }
+        match channels.false_colour {
+            Some(rgb) if rgb.iter().any(|&k| k >= channels.len()) => {
+                Err(format!("false colour {rgb:?} names a channel that is not among the {}", channels.len()))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The metadata of the group and, for readers that open an array by itself, of every array.
+    pub(super) fn metadata(&self) -> Result<(Value, Vec<(&'static str, Value)>)> {
+        let mut attributes = self.attributes.clone();
+        if let Some(name) = RESERVED.iter().find(|name| attributes.contains_key(**name)) {
+            return Err(Error::Internal(format!("the attribute `{name}` of a cube is made from its header")));
+        }
+        attributes.extend([
+            ("Conventions".into(), json!("CF-1.11")),
+            ("title".into(), json!("Spectral image")),
+            ("spectile_format".into(), json!(FORMAT)),
+            ("spectile_version".into(), json!(env!("CARGO_PKG_VERSION"))),
+            ("epoch".into(), json!(self.epoch)),
+            ("origin".into(), json!(self.origin)),
+            ("channel_names".into(), json!(self.channels.names)),
+            ("false_colour".into(), json!(self.channels.false_colour)),
+        ]);
+        let arrays = arrays(self);
+        let consolidated: Map<String, Value> = arrays.iter().map(|(name, v)| ((*name).into(), v.clone())).collect();
+        let group = json!({
+            "zarr_format": 3,
+            "node_type": "group",
+            "attributes": attributes,
+            "consolidated_metadata": { "kind": "inline", "must_understand": false, "metadata": consolidated },
+        });
+        Ok((group, arrays))
+    }
+
+    /// The header of the cube at `path` from its group's metadata and the values of `wavelength_bounds`, which
+    /// `read_bounds(K)` gets.
+    pub(super) fn parse(
+        path: &Path,
+        group: &Value,
+        read_bounds: impl FnOnce(usize) -> Result<Vec<[f64; 2]>>,
+    ) -> Result<Header> {
+        let damaged = |what: &str| Error::storage(path, format!("is a damaged Spectile cube: its zarr.json {what}"));
+        let stored = &group["consolidated_metadata"]["metadata"];
+        let numbers = |value: &Value| -> Option<Vec<u32>> {
+            value.as_array()?.iter().map(|v| u32::try_from(v.as_u64()?).ok()).collect()
+        };
+        let shape = numbers(&stored["radiance"]["shape"]);
+        let chunk = numbers(&stored["radiance"]["chunk_grid"]["configuration"]["chunk_shape"]);
+        let (Some([count, height, width]), Some([_, tile_height, tile_width])) = (shape.as_deref(), chunk.as_deref())
+        else {
+            return Err(damaged("gives no shape [wavelength, y, x] and chunk of `radiance`"));
+        };
+
+        let mut attributes = group["attributes"].as_object().cloned().unwrap_or_default();
+        let mut take = |name: &str| attributes.remove(name).unwrap_or_default();
+        let names = serde_json::from_value(take("channel_names")).map_err(|_| damaged("has no `channel_names`"))?;
+        let false_colour =
+            serde_json::from_value(take("false_colour")).map_err(|_| damaged("has no `false_colour`"))?;
+        let epoch = serde_json::from_value(take("epoch")).map_err(|_| damaged("has no `epoch`"))?;
+        let origin = serde_json::from_value(take("origin")).map_err(|_| damaged("has no `origin`"))?;
+        for name in RESERVED {
+            attributes.remove(name);
+        }
+        let header = Header {
+            size: [*width, *height],
+            origin,
+            tile: [*tile_width, *tile_height],
+            channels: Channels { bounds: read_bounds(*count as usize)?, names, false_colour },
+            epoch,
+            attributes,
+        };
+        header.validate().map_err(|what| damaged(&format!("is not valid: {what}")))?;
+
+        // What is read and written as raw files must be laid out as this version does it, to the last codec.
+        for (name, array) in arrays(&header) {
+            let same = ["shape", "data_type", "chunk_grid", "chunk_key_encoding", "fill_value", "codecs"]
+                .iter()
+                .all(|key| array[key] == stored[name][key]);
+            if !same {
+                return Err(damaged(&format!("describes a `{name}` of another layout")));
+            }
+        }
+        Ok(header)
+    }
+}
+
+/// The arrays of DESIGN section 4, by name.
+fn arrays(header: &Header) -> Vec<(&'static str, Value)> {
+    let channels = header.channels.len() as u64;
+    let [width, height] = header.size.map(u64::from);
+    let [tile_width, tile_height] = header.tile.map(u64::from);
+    let [columns, rows] = header.grid().tiles().map(u64::from);
+    let [blocks_x, blocks_y] = header.grid().blocks().map(u64::from);
+    let [tile_blocks_x, tile_blocks_y] = header.grid().tile_blocks().map(u64::from);
+    let radiance_units = "W m-2 sr-1 nm-1";
+    let shows = match Projection::new(&header.channels).kind {
+        ProjectionKind::Xyz => "linear sRGB of CIE 1931 XYZ divided by the integral of ybar".to_owned(),
+        ProjectionKind::FalseColour(rgb) => {
+            let [r, g, b] = rgb.map(|k| header.channels.names[k].as_str());
+            format!("false colour: radiance of the channels {r}, {g}, {b} as red, green, blue")
+        }
+    };
+    let pixel = |side: &str| json!({ "long_name": format!("pixel centre on the full film, from the {side}"), "units": "pixel" });
+    vec![
+        (
+            "radiance",
+            Array {
+                codecs: channel_fastest(),
+                attributes: json!({
+                    "long_name": "mean spectral radiance over the channel",
+                    "units": radiance_units,
+                    "coordinates": "response_integral",
+                }),
+                ..Array::new("float32", &[channels, height, width], &["wavelength", "y", "x"])
+            }
+            .chunked(&[channels, tile_height, tile_width]),
+        ),
+        (
+            "wavelength",
+            Array {
+                attributes: json!({
+                    "standard_name": "radiation_wavelength",
+                    "long_name": "centre of the channel",
+                    "units": "nm",
+                    "bounds": "wavelength_bounds",
+                }),
+                ..Array::new("float64", &[channels], &["wavelength"])
+            }
+            .whole(),
+        ),
+        (
+            "wavelength_bounds",
+            Array {
+                attributes: json!({ "long_name": "lower and upper end of the channel", "units": "nm" }),
+                ..Array::new("float64", &[channels, 2], &["wavelength", "bnds"])
+            }
+            .whole(),
+        ),
+        (
+            "response_integral",
+            Array {
+                attributes: json!({
+                    "long_name": "integral of the channel's response (its width where it has none): times radiance, W m-2 sr-1",
+                    "units": "nm",
+                }),
+                ..Array::new("float64", &[channels], &["wavelength"])
+            }
+            .whole(),
+        ),
+        ("y", Array { attributes: pixel("top"), ..Array::new("float64", &[height], &["y"]) }.whole()),
+        ("x", Array { attributes: pixel("left"), ..Array::new("float64", &[width], &["x"]) }.whole()),
+        (
+            "samples",
+            Array {
+                fill: json!(0),
+                attributes: json!({ "long_name": "samples per pixel in the tile", "units": "1" }),
+                ..Array::new("uint32", &[rows, columns], &["tile_y", "tile_x"])
+            }
+            .chunked(&[1, 1]),
+        ),
+        (
+            "preview",
+            Array {
+                attributes: json!({ "long_name": shows, "units": radiance_units }),
+                ..Array::new("float32", &[height, width, 3], &["y", "x", "rgb"])
+            }
+            .chunked(&[tile_height, tile_width, 3]),
+        ),
+        (
+            "overview",
+            Array {
+                attributes: json!({ "long_name": "radiance, mean over blocks of 8 x 8 pixels", "units": radiance_units }),
+                ..Array::new("float32", &[channels, blocks_y, blocks_x], &["wavelength", "overview_y", "overview_x"])
+            }
+            .chunked(&[channels, tile_blocks_y, tile_blocks_x]),
+        ),
+    ]
+}
+
+/// `radiance` is encoded as [y, x, wavelength]: the chunk is the raw tile, a pixel's spectrum contiguous.
+fn channel_fastest() -> Value {
+    json!([
+        { "name": "transpose", "configuration": { "order": [1, 2, 0] } },
+        { "name": "bytes", "configuration": { "endian": "little" } },
+    ])
+}
+
+/// The metadata of one array, made into a Zarr v3 document by naming its chunks.
+struct Array {
+    data_type: &'static str,
+    shape: Vec<u64>,
+    dimensions: Vec<&'static str>,
+    fill: Value,
+    codecs: Value,
+    attributes: Value,
+}
+
+impl Array {
+    /// An array of raw little-endian numbers, NaN where there is no chunk.
+    fn new(data_type: &'static str, shape: &[u64], dimensions: &[&'static str]) -> Self {
+        Array {
+            data_type,
+            shape: shape.to_vec(),
+            dimensions: dimensions.to_vec(),
+            fill: json!("NaN"),
+            codecs: json!([{ "name": "bytes", "configuration": { "endian": "little" } }]),
+            attributes: json!({}),
+        }
+    }
+
+    /// The array in a single chunk.
+    fn whole(self) -> Value {
+        let shape = self.shape.clone();
+        self.chunked(&shape)
+    }
+
+    fn chunked(self, chunk: &[u64]) -> Value {
+        json!({
+            "zarr_format": 3,
+            "node_type": "array",
+            "shape": self.shape,
+            "data_type": self.data_type,
+            "chunk_grid": { "name": "regular", "configuration": { "chunk_shape": chunk } },
+            "chunk_key_encoding": { "name": "default", "configuration": { "separator": "/" } },
+            "fill_value": self.fill,
+            "codecs": self.codecs,
+            "attributes": self.attributes,
+            "dimension_names": self.dimensions,
+            "storage_transformers": [],
+        })
+    }
+}

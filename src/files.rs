@@ -1,0 +1,107 @@
+//! Files written whole or not at all: first aside under a random name, then renamed over their target. And the space
+//! for them.
+
+use std::ffi::OsString;
+use std::fs;
+use std::hash::{BuildHasher, Hasher, RandomState};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use crate::{Error, Result};
+
+/// 16 hex digits that no other process or call draws, for names of files that are still being written.
+pub fn random_suffix() -> String {
+    // The standard library seeds its hash keys from the operating system's randomness.
+    format!("{:016x}", RandomState::new().build_hasher().finish())
+}
+
+/// A hidden sibling of `path` under a random name: same folder, hence same file system, hence renamed in one step.
+pub fn sibling(path: &Path, extension: &str) -> PathBuf {
+    let mut name = OsString::from(".");
+    name.push(path.file_name().unwrap_or_default());
+    name.push(format!(".{}.{extension}", random_suffix()));
+    path.with_file_name(name)
+}
+
+/// Writes `bytes` to `path`, replacing what was there in one step: a reader sees the old file or the new one, never a
+/// part, and a failure leaves the old one.
+pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
+    if path.is_dir() {
+        return Err(Error::storage(path, "is a folder, so no file can be written under this name"));
+    }
+    let aside = sibling(path, "part");
+    let written =
+        fs::File::create_new(&aside).and_then(|mut file| file.write_all(bytes)).and_then(|()| fs::rename(&aside, path));
+    written.map_err(|error| {
+        // The write has failed already; a leftover that cannot be removed either changes nothing about that.
+        let _ = fs::remove_file(&aside);
+        Error::storage(path, format!("cannot be written: {error}"))
+    })
+}
+
+/// Bytes that this user may still write to the file system of `folder`; `None` where that cannot be asked.
+pub fn free_bytes(folder: &Path) -> Option<u64> {
+    #[cfg(unix)]
+    {
+        let stat = rustix::fs::statvfs(folder).ok()?;
+        Some(stat.f_bavail.saturating_mul(stat.f_frsize))
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = folder;
+        None
+    }
+}
+
+/// The folder that holds `path`, `.` for a bare name.
+pub fn parent(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    }
+}
+
+/// A size for people, in binary units.
+pub fn format_bytes(bytes: u64) -> String {
+    let units = ["KiB", "MiB", "GiB", "TiB", "PiB", "EiB"];
+    let mut value = bytes as f64;
+    let mut unit = "bytes";
+    for next in units {
+        if value < 1024.0 {
+            break;
+        }
+        (value, unit) = (value / 1024.0, next);
+    }
+    if unit == "bytes" { format!("{bytes} bytes") } else { format!("{value:.1} {unit}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn replaces_whole_and_leaves_nothing_aside() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = folder.path().join("picture.png");
+        for content in [b"first".as_slice(), b"second, longer"] {
+            write_atomically(&path, content).expect("written");
+            assert_eq!(fs::read(&path).expect("read"), content);
+        }
+        assert_eq!(fs::read_dir(folder.path()).expect("list").count(), 1);
+        let missing = folder.path().join("no such folder/picture.png");
+        assert!(write_atomically(&missing, b"x").unwrap_err().to_string().contains("picture.png: cannot be written"));
+        assert!(write_atomically(folder.path(), b"x").unwrap_err().to_string().contains("is a folder"));
+    }
+
+    #[test]
+    fn sizes_for_people() {
+        let shown = [0, 1023, 1024, 1536, 5 << 30, u64::MAX].map(format_bytes);
+        assert_eq!(shown, ["0 bytes", "1023 bytes", "1.0 KiB", "1.5 KiB", "5.0 GiB", "16.0 EiB"]);
+    }
+
+    #[test]
+    fn suffixes_differ() {
+        assert_ne!(random_suffix(), random_suffix());
+        assert_eq!(random_suffix().len(), 16);
+    }
+}

@@ -1,0 +1,119 @@
+//! Plots as SVG, with text as text: no fonts are needed to make them.
+
+use plotters::prelude::*;
+
+use crate::spectral::Channels;
+use crate::{Error, Result};
+
+/// An SVG plot of one spectrum over its channels: every channel a level over its own interval, joined where intervals
+/// meet. `radiance` in W m⁻² sr⁻¹ nm⁻¹; what is not finite is left out.
+pub fn spectrum(channels: &Channels, radiance: &[f32], title: &str) -> Result<String> {
+    let mut svg = String::new();
+    draw(&mut svg, channels, radiance, title).map_err(|error| Error::Internal(format!("plot: {error}")))?;
+    Ok(svg)
+}
+
+fn draw(
+    svg: &mut String,
+    channels: &Channels,
+    radiance: &[f32],
+    title: &str,
+) -> std::result::Result<(), Box<dyn std::error::Error>> {
+    let finite = || radiance.iter().copied().filter(|v| v.is_finite()).map(f64::from);
+    let largest = finite().fold(0.0, |a, b| f64::max(a, b.abs()));
+    // In powers of 1000, so that the axis has numbers for people whatever the level.
+    let exponent = if largest > 0.0 { (largest.log10() / 3.0).floor() as i32 * 3 } else { 0 };
+    // Not divided by 10^exponent, which underflows for the smallest f32.
+    let scaled = |v: f64| v * 10f64.powi(-exponent);
+    let low = 1.05 * scaled(finite().fold(0.0, f64::min));
+    let high = if largest > 0.0 { 1.05 * scaled(finite().fold(0.0, f64::max)) } else { 1.0 };
+    let from = channels.bounds.iter().map(|b| b[0]).fold(f64::INFINITY, f64::min);
+    let to = channels.bounds.iter().map(|b| b[1]).fold(f64::NEG_INFINITY, f64::max);
+
+    let root = SVGBackend::with_string(svg, (960, 540)).into_drawing_area();
+    root.fill(&WHITE)?;
+    let mut chart = ChartBuilder::on(&root)
+        .caption(title, ("sans-serif", 20))
+        .margin(16)
+        .x_label_area_size(48)
+        .y_label_area_size(80)
+        .build_cartesian_2d(from..to, low..high)?;
+    let decimals = ((10.0 / (to - from)).log10().ceil().max(0.0) as usize).min(9);
+    let unit = "W m⁻² sr⁻¹ nm⁻¹";
+    let y_label = match exponent {
+        0 => format!("spectral radiance ({unit})"),
+        _ => format!("spectral radiance (10{} {unit})", superscript(exponent)),
+    };
+    chart
+        .configure_mesh()
+        .x_desc("wavelength (nm)")
+        .y_desc(y_label)
+        .x_label_formatter(&|nm| format!("{nm:.decimals$}"))
+        .label_style(("sans-serif", 14))
+        .axis_desc_style(("sans-serif", 16))
+        .light_line_style(BLACK.mix(0.06))
+        .draw()?;
+    for line in levels(channels, radiance) {
+        let points = line.into_iter().map(|(nm, v)| (nm, scaled(v)));
+        chart.draw_series(LineSeries::new(points, RGBColor(0x1f, 0x4e, 0x9e).stroke_width(2)))?;
+    }
+    root.present()?;
+    Ok(())
+}
+
+/// The lines to draw: both ends of every channel, one line as long as each channel begins where the last one ended.
+fn levels(channels: &Channels, radiance: &[f32]) -> Vec<Vec<(f64, f64)>> {
+    let mut order: Vec<usize> = (0..channels.len()).filter(|&k| radiance[k].is_finite()).collect();
+    order.sort_by(|&a, &b| channels.bounds[a][0].total_cmp(&channels.bounds[b][0]));
+    let mut lines: Vec<Vec<(f64, f64)>> = Vec::new();
+    for k in order {
+        let ([from, to], value) = (channels.bounds[k], f64::from(radiance[k]));
+        match lines.last_mut() {
+            Some(line) if line.last().is_some_and(|end| (end.0 - from).abs() <= 1e-9 * from) => {
+                line.extend([(from, value), (to, value)]);
+            }
+            _ => lines.push(vec![(from, value), (to, value)]),
+        }
+    }
+    lines
+}
+
+fn superscript(number: i32) -> String {
+    let sign = if number < 0 { "⁻" } else { "" };
+    let digits = number.unsigned_abs().to_string();
+    let digit = |c: char| ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'][c as usize - '0' as usize];
+    sign.chars().chain(digits.chars().map(digit)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn axes_have_labels_units_and_scale() {
+        let channels = Channels::equal(400.0, 700.0, 3);
+        let svg = spectrum(&channels, &[1e-5, 4e-5, 2e-5], "pixel <1> & \"2\"").expect("plot");
+        assert!(svg.contains("wavelength (nm)") && svg.contains("10⁻⁶ W m⁻² sr⁻¹ nm⁻¹"), "{svg}");
+        assert!(svg.contains("<text") && svg.contains("pixel &lt;1&gt; &amp;"), "{svg}");
+        assert!(svg.trim_end().ends_with("</svg>"));
+    }
+
+    #[test]
+    fn levels_join_where_channels_meet() {
+        let channels =
+            Channels::from_bounds(vec![[500.0, 600.0], [400.0, 500.0], [8000.0, 9000.0], [550.0, 560.0]], None);
+        let lines = levels(&channels, &[2.0, 1.0, 3.0, f32::NAN]);
+        let joined = vec![(400.0, 1.0), (500.0, 1.0), (500.0, 2.0), (600.0, 2.0)];
+        assert_eq!(lines, [joined, vec![(8000.0, 3.0), (9000.0, 3.0)]]);
+    }
+
+    #[test]
+    fn extreme_spectra_are_drawn() {
+        let narrow = Channels::from_bounds(vec![[19_999.999, 20_000.0]], None);
+        for values in [[0.0], [f32::MAX], [f32::from_bits(1)], [-3.0], [f32::NAN]] {
+            let svg = spectrum(&narrow, &values, "one channel").expect("plot");
+            assert!(!svg.contains("NaN") && !svg.contains("inf"), "{values:?}");
+        }
+        assert_eq!([superscript(-45), superscript(36)], ["⁻⁴⁵", "³⁶"]);
+    }
+}

@@ -1,0 +1,298 @@
+//! Spectra in text files: CSV (`nm,value`, with more columns by name) and `.spd` (`nm value`).
+
+use std::path::Path;
+
+use crate::error::Problem;
+
+/// Wavelengths in nm, ascending (two equal ones make a step), and a value for each.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SpectrumTable {
+    pub nm: Vec<f64>,
+    pub value: Vec<f64>,
+    /// The 1-based line each value stands on.
+    pub line: Vec<usize>,
+}
+
+/// Reads the spectrum of `column` (by name; absent: the only value column) of the file at `path`.
+///
+/// Errors name the line; without one, the file as a whole could not be read.
+pub fn read_spectrum(path: &Path, column: Option<&str>) -> Result<SpectrumTable, Box<Problem>> {
+    let reader = Reader { path, column };
+    let bytes = std::fs::read(path).map_err(|e| reader.at(None, format!("cannot be read: {e}"), ""))?;
+    parse_spectrum(&bytes, path, column)
+}
+
+/// [`read_spectrum`] on the content of the file; `path` tells `.spd` from CSV and stands in messages.
+pub fn parse_spectrum(bytes: &[u8], path: &Path, column: Option<&str>) -> Result<SpectrumTable, Box<Problem>> {
+    // Only comments and names can hold anything but ASCII, so old encodings do no harm.
+    let text = String::from_utf8_lossy(bytes);
+    let text = text.trim_start_matches('\u{feff}');
+    let reader = Reader { path, column };
+    let mut lines = (1..)
+        .zip(text.lines())
+        .map(|(line, text)| (line, text.split('#').next().unwrap_or("").trim()))
+        .filter(|(_, text)| !text.is_empty())
+        .peekable();
+    let Some(&(first_line, first)) = lines.peek() else {
+        return Err(reader.at(None, "holds no data".to_owned(), "write lines of `nm,value`"));
+    };
+
+    let is_spd = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("spd"));
+    let separator = if is_spd { Separator::Space } else { Separator::of(first) };
+    let first_cells = separator.split(first);
+    let header = first_cells[0].parse::<f64>().is_err();
+    let layout = reader.layout(first_line, &first_cells, header)?;
+    if header {
+        lines.next();
+    }
+
+    let mut table = SpectrumTable { nm: Vec::new(), value: Vec::new(), line: Vec::new() };
+    for (line, text) in lines {
+        if let Some((x, value)) = reader.row(line, &separator.split(text), &layout)? {
+            table.nm.push(layout.unit.to_nm(x));
+            table.value.push(value);
+            table.line.push(line);
+        }
+    }
+    reader.ascending(table)
+}
+
+/// How the cells of a line are told apart; decided by the first line.
+#[derive(Clone, Copy)]
+enum Separator {
+    Char(char),
+    Space,
+}
+
+impl Separator {
+    fn of(line: &str) -> Self {
+        [';', '\t', ','].into_iter().find(|c| line.contains(*c)).map_or(Separator::Space, Separator::Char)
+    }
+
+    /// At least one cell, without surrounding blanks and quotes.
+    fn split(self, line: &str) -> Vec<&str> {
+        match self {
+            Separator::Char(c) => line.split(c).map(|cell| cell.trim().trim_matches('"').trim()).collect(),
+            Separator::Space => line.split_whitespace().collect(),
+        }
+    }
+}
+
+/// Unit of the first column, from its header.
+#[derive(Clone, Copy, PartialEq)]
+enum Unit {
+    Nanometre,
+    Micrometre,
+    Wavenumber,
+}
+
+impl Unit {
+    fn to_nm(self, x: f64) -> f64 {
+        match self {
+            Unit::Nanometre => x,
+            Unit::Micrometre => x * 1e3,
+            Unit::Wavenumber => 1e7 / x,
+        }
+    }
+
+    /// `Err` names a unit that is none of ours.
+    fn from_header(name: &str) -> Result<Self, String> {
+        let name = name.to_lowercase();
+        if name.contains("cm-1") || name.contains("cm^-1") || name.contains("wavenumber") {
+            return Ok(Unit::Wavenumber);
+        }
+        for word in name.split(|c: char| !c.is_alphanumeric()) {
+            match word {
+                "um" | "µm" | "μm" | "micron" | "microns" | "micrometer" | "micrometers" | "micrometre"
+                | "micrometres" => {
+                    return Ok(Unit::Micrometre);
+                }
+                "m" | "mm" | "angstrom" | "angstroms" | "å" | "ev" | "hz" | "thz" => return Err(word.to_owned()),
+                _ => {}
+            }
+        }
+        Ok(Unit::Nanometre)
+    }
+}
+
+/// Where in a line the numbers are.
+struct Layout {
+    cells: usize,
+    value: usize,
+    unit: Unit,
+}
+
+/// What every message needs.
+struct Reader<'a> {
+    path: &'a Path,
+    column: Option<&'a str>,
+}
+
+impl Reader<'_> {
+    fn at(&self, line: Option<usize>, message: String, help: &str) -> Box<Problem> {
+        let help = (!help.is_empty()).then(|| help.to_owned());
+        Box::new(Problem { file: self.path.to_owned(), line, message, help, ..Problem::default() })
+    }
+
+    fn layout(&self, line: usize, cells: &[&str], header: bool) -> Result<Layout, Box<Problem>> {
+        let names = || cells[1..].join(", ");
+        if cells.len() < 2 {
+            return Err(self.at(Some(line), "has one column only".to_owned(), "write lines of `nm,value`"));
+        }
+        let value = match self.column {
+            Some(_) if !header => {
+                let help = "name the columns in a first line such as `nm,value`, or leave `column` out";
+                return Err(self.at(
+                    Some(line),
+                    "has no header line, so no column can be picked by name".to_owned(),
+                    help,
+                ));
+            }
+            Some(wanted) => {
+                let found = cells.iter().skip(1).position(|cell| *cell == wanted);
+                found.map(|i| i + 1).ok_or_else(|| {
+                    self.at(Some(line), format!("has no column \"{wanted}\""), &format!("its columns are {}", names()))
+                })?
+            }
+            None if cells.len() == 2 => 1,
+            None if header => {
+                let message = format!("has {} value columns", cells.len() - 1);
+                return Err(self.at(Some(line), message, &format!("pick one with `column`: {}", names())));
+            }
+            None => {
+                let message = format!("has {} columns and no header line", cells.len());
+                return Err(self.at(
+                    Some(line),
+                    message,
+                    "name the columns in a first line and pick one with `column`",
+                ));
+            }
+        };
+        let unit = if header { Unit::from_header(cells[0]) } else { Ok(Unit::Nanometre) };
+        let unit = unit.map_err(|unit| {
+            self.at(Some(line), format!("the first column is in `{unit}`"), "give wavelengths in nm, um or cm-1")
+        })?;
+        Ok(Layout { cells: cells.len(), value, unit })
+    }
+
+    /// The two numbers of a line; `None` where a file of several columns leaves the value empty: not given there.
+    fn row(&self, line: usize, cells: &[&str], layout: &Layout) -> Result<Option<(f64, f64)>, Box<Problem>> {
+        if cells.len() != layout.cells {
+            let message = format!("has {} cells where {} are expected", cells.len(), layout.cells);
+            return Err(self.at(Some(line), message, "give every line the same number of cells"));
+        }
+        let number = |cell: &str| {
+            cell.parse::<f64>()
+                .ok()
+                .filter(|v| v.is_finite())
+                .ok_or_else(|| self.at(Some(line), format!("`{}` is not a finite number", cell.escape_debug()), ""))
+        };
+        let x = number(cells[0])?;
+        if x <= 0.0 {
+            return Err(self.at(Some(line), format!("the wavelength must be greater than 0, but is {x}"), ""));
+        }
+        if cells[layout.value].is_empty() && layout.cells > 2 {
+            return Ok(None);
+        }
+        Ok(Some((x, number(cells[layout.value])?)))
+    }
+
+    /// The table in ascending order, which its lines must have one way or the other.
+    fn ascending(&self, mut table: SpectrumTable) -> Result<SpectrumTable, Box<Problem>> {
+        if table.nm.len() < 2 {
+            return Err(self.at(None, format!("has {} values", table.nm.len()), "give at least two wavelengths"));
+        }
+        if let Some(i) = table.nm.iter().position(|nm| !nm.is_finite()) {
+            return Err(self.at(Some(table.line[i]), "the wavelength cannot be represented in nm".to_owned(), ""));
+        }
+        if table.nm.first() > table.nm.last() {
+            table.nm.reverse();
+            table.value.reverse();
+            table.line.reverse();
+        }
+        for i in 1..table.nm.len() {
+            let (before, nm) = (table.nm[i - 1], table.nm[i]);
+            if nm < before {
+                let message = format!("{nm} nm follows {before} nm");
+                return Err(self.at(Some(table.line[i]), message, "sort the lines by wavelength"));
+            }
+            if i >= 2 && nm == table.nm[i - 2] {
+                let message = format!("{nm} nm stands here for the third time");
+                return Err(self.at(
+                    Some(table.line[i]),
+                    message,
+                    "two equal wavelengths make a step; remove the others",
+                ));
+            }
+        }
+        Ok(table)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn csv(text: &str, column: Option<&str>) -> Result<SpectrumTable, Box<Problem>> {
+        parse_spectrum(text.as_bytes(), Path::new("t.csv"), column)
+    }
+
+    #[test]
+    fn reads_the_common_layouts() {
+        for text in [
+            "400,0.5\n500,0.75\n",
+            "# about\nwavelength_nm,value\n400,0.5\n\n500,0.75 # end\n",
+            "\u{feff}nm;r\r\n400;0.5\r\n500;0.75",
+            "nm\tr\n400\t0.5\n500\t0.75",
+            "\"wavelength (um)\",\"r\"\n0.5,0.75\n0.4,0.5",
+            "wavenumber_cm-1,r\n20000,0.75\n25000,0.5",
+            "400 0.5\n500   0.75",
+        ] {
+            let table = csv(text, None).unwrap();
+            assert_eq!((table.nm, table.value), (vec![400.0, 500.0], vec![0.5, 0.75]), "{text}");
+        }
+        let spd = parse_spectrum(b"400 0.5 # x\n500 0.75", Path::new("t.SPD"), None).unwrap();
+        assert_eq!((spd.nm, spd.line), (vec![400.0, 500.0], vec![1, 2]));
+    }
+
+    #[test]
+    fn picks_columns_and_skips_what_is_not_given() {
+        let text = "nm,a,b\n400,1,\n500,2,5\n600,3,6\n";
+        assert_eq!(csv(text, Some("a")).unwrap().value, [1.0, 2.0, 3.0]);
+        let b = csv(text, Some("b")).unwrap();
+        assert_eq!((b.nm, b.value, b.line), (vec![500.0, 600.0], vec![5.0, 6.0], vec![3, 4]));
+        assert!(csv(text, None).unwrap_err().help.unwrap().contains("a, b"));
+        assert!(csv(text, Some("c")).unwrap_err().help.unwrap().contains("a, b"));
+    }
+
+    #[test]
+    fn a_step_is_two_equal_wavelengths() {
+        assert_eq!(csv("400,1\n400,2\n500,3", None).unwrap().nm, [400.0, 400.0, 500.0]);
+    }
+
+    #[test]
+    fn mistakes_name_their_line() {
+        for (text, line, words) in [
+            ("", None, "no data"),
+            ("# only\n\n", None, "no data"),
+            ("400\n500", Some(1), "one column"),
+            ("400,1,2\n500,1,2", Some(1), "no header"),
+            ("nm,v\n400,1\n500,x", Some(3), "`x` is not a finite number"),
+            ("400,1\n500,nan", Some(2), "finite"),
+            ("400,1\n500,inf", Some(2), "finite"),
+            ("400,1\n500,", Some(2), "finite"),
+            ("400,1\n500,1,1", Some(2), "cells"),
+            ("400,1\n-500,1", Some(2), "greater than 0"),
+            ("400,1\n500,1\n450,1\n600,1", Some(3), "follows"),
+            ("400,1\n400,2\n400,3\n500,1", Some(3), "third time"),
+            ("400,1", None, "1 values"),
+            ("angstrom,v\n4000,1\n5000,1", Some(1), "angstrom"),
+        ] {
+            let problem = csv(text, None).unwrap_err();
+            assert_eq!(problem.line, line, "{text:?}: {problem}");
+            assert!(problem.message.contains(words), "{text:?}: {problem}");
+            assert_eq!(problem.file, Path::new("t.csv"));
+        }
+        assert!(csv("400,1\n500,2", Some("a")).unwrap_err().message.contains("no header"));
+    }
+}

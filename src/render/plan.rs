@@ -1,0 +1,145 @@
+//! What a render will need, before anything starts: features used and left out, tiles, waves, memory, disk.
+
+use serde_json::{Map, Value, json};
+
+use crate::cube::{BLOCK, Header};
+use crate::gpu::upload;
+use crate::render::prepare::{Features, Prepared};
+use crate::render::wave::{DeviceLimits, WavePlan};
+use crate::scene::Scene;
+use crate::{Error, Result};
+
+/// Side of a tile where nothing says otherwise, in pixels.
+const DEFAULT_TILE: u32 = 64;
+/// A tile with all its channels stays below this, so that a few fit into any device and any host.
+const MAX_DEFAULT_TILE_BYTES: u64 = 64 << 20;
+
+/// The evaluator that `auto` stands for; the only one so far.
+pub const EVALUATOR: &str = "dpept-pixel";
+
+/// Width and height of the tiles: from the number of channels, the film and `--tile` alone, never from the device.
+pub fn tile_size(scene: &Scene, asked: Option<u32>) -> [u32; 2] {
+    let [width, height] = scene.film.cube_size();
+    let mut side = asked.unwrap_or(DEFAULT_TILE);
+    let bytes = |side: u32| u64::from(side.min(width)) * u64::from(side.min(height)) * scene.channels.len() as u64 * 4;
+    while asked.is_none() && side > BLOCK && bytes(side) > MAX_DEFAULT_TILE_BYTES {
+        side /= 2;
+    }
+    [side.min(width), side.min(height)]
+}
+
+/// The header of the cube that rendering `scene` makes.
+pub fn header(scene: &Scene, tile: [u32; 2], seed: u64) -> Header {
+    let integrator = serde_json::to_value(&scene.integrator).expect("plain values");
+    let mut attributes = Map::new();
+    attributes.insert("scene_digest".into(), json!(scene.digest));
+    attributes.insert("seed".into(), json!(seed));
+    attributes.insert("evaluator".into(), json!(EVALUATOR));
+    attributes.insert(
+        "settings".into(),
+        json!({
+            "film": { "width": scene.film.width, "height": scene.film.height, "crop": scene.film.crop, "filter": scene.film.filter },
+            "integrator": integrator,
+        }),
+    );
+    Header {
+        size: scene.film.cube_size(),
+        origin: [scene.film.crop[0], scene.film.crop[1]],
+        tile,
+        channels: scene.channels.clone(),
+        epoch: scene.integrator.epoch,
+        attributes,
+    }
+}
+
+/// One part of the renderer, and whether this scene needs it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FeatureLine {
+    pub name: &'static str,
+    pub used: bool,
+    /// What leaving it out saves, or what it costs.
+    pub effect: String,
+}
+
+/// Every optional part, used or left out.
+pub fn feature_lines(prepared: &Prepared, waves: &WavePlan) -> Vec<FeatureLine> {
+    let f: &Features = &prepared.features;
+    let module = |m: crate::gpu::shader::Module| format!("{} lines of shader", m.text.lines().count());
+    let bounces = prepared.frame.max_bounces + 1;
+    let line = |name, used, effect: String| FeatureLine { name, used, effect };
+    use crate::gpu::shader as s;
+    vec![
+        line("area lights", f.emitters, format!("{} records of 8 bytes a path", bounces)),
+        line("environment", f.environment, "one light to choose from".into()),
+        line("spheres, disks, cylinders", f.shapes, format!("{}, a test per primitive", module(s::SHAPES))),
+        line("next-event estimation", f.emitters || f.environment, format!("{}, a shadow ray a bounce", module(s::LIGHT))),
+        line("thin lens", f.thin_lens, "a pair of random numbers a path".into()),
+        line("orthographic camera", f.orthographic, "its own camera rays".into()),
+        line("Gaussian filter", f.gaussian, "an inverse error function a path".into()),
+        line("Russian roulette", f.roulette, "4 bytes a path, a load and a store a bounce".into()),
+        line("Owen-scrambled Sobol", !f.independent, "nets in every epoch instead of independent numbers".into()),
+        line(
+            "wavelength strata",
+            f.strata,
+            format!("tables x {}", 1u64 << prepared.tables.stratum_bits),
+        ),
+        line("exact spectral knots", f.knots, "a search per lookup and channel".into()),
+        line(
+            "spectra in registers",
+            f.registers,
+            format!("no table lookups per vertex; {} spectra here", prepared.factors + prepared.sources),
+        ),
+        line(
+            "windowed geometry",
+            upload::windows(prepared, waves.binding).is_ok_and(|w| w.nodes.count > 1 || w.primitives.count > 1),
+            "a switch per load".into(),
+        ),
+    ]
+}
+
+/// Memory of a render, bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Memory {
+    /// Scene on the device: BVH, primitives, materials, lights, spectra.
+    pub scene: u64,
+    /// Path buffers, means and staging on the device.
+    pub waves: u64,
+    /// On the host, anonymous: the scene as parsed and flattened, apart from the cube's mapped files.
+    pub host_scene: u64,
+    /// The finished cube.
+    pub disk: u64,
+}
+
+/// Adds up what `prepared` takes with these waves and this cube.
+pub fn memory(prepared: &Prepared, waves: &WavePlan, header: &Header) -> Memory {
+    let accel = &prepared.accel;
+    let scene = size_of_val(accel.nodes.as_slice())
+        + size_of_val(accel.primitives.as_slice())
+        + size_of_val(prepared.materials.as_slice())
+        + size_of_val(prepared.emitters.as_slice())
+        + size_of_val(prepared.picks.cdf.as_slice())
+        + size_of_val(prepared.tables.strata.as_slice())
+        + size_of_val(prepared.tables.knots.as_slice())
+        + size_of_val(prepared.tables.knot_starts.as_slice());
+    Memory { scene: scene as u64, waves: waves.device_bytes(), host_scene: scene as u64, disk: header.store_bytes() }
+}
+
+/// Waves for a device that is not there: what a GPU of common limits would get.
+pub fn waves_without_device(prepared: &Prepared, tile: [u32; 2]) -> Result<WavePlan> {
+    WavePlan::new(prepared, tile, DeviceLimits { binding: 128 << 20, software: false, max_paths: None })
+}
+
+/// Refuses what cannot work, before anything is written.
+pub fn check(scene: &Scene) -> Result<()> {
+    let [width, height] = scene.film.cube_size();
+    if width == 0 || height == 0 || scene.channels.is_empty() {
+        return Err(Error::input(&scene.file, "there is nothing to render: no pixels or no channels"));
+    }
+    Ok(())
+}
+
+/// Spectra whose tables miss the bounds of DESIGN section 7, or nothing.
+pub fn table_bounds(prepared: &Prepared) -> Value {
+    let each = prepared.spectrum_names.iter().zip(&prepared.tables.bounds).skip(1);
+    each.map(|(name, b)| json!({ "name": name, "pointwise": b.pointwise, "mean": b.mean })).collect()
+}

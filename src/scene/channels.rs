@@ -1,0 +1,100 @@
+//! `[channels]`: the intervals of wavelength that are rendered.
+
+use super::decode::{Fields, Item, Keys};
+use super::overrides::CHANNEL_KINDS;
+use crate::spectral::Channels;
+
+/// The most channels a cube may have; far beyond the 5,000 that are meant to be used.
+const MAX_CHANNELS: u32 = 65_536;
+/// Beyond a millimetre geometric optics has nothing to say.
+const MAX_NM: f64 = 1e6;
+const WAVELENGTHS: &str = "greater than 0 and at most 1000000 (nm)";
+
+const KEYS: Keys = Keys::new(&["equal", "wavenumber", "intervals", "false_colour"]).later(&["responses"]);
+const RANGE: Keys = Keys::new(&["from", "to", "count"]);
+
+pub fn decode(item: &Item) -> Option<Channels> {
+    let fields = item.table(KEYS)?;
+    let kind = fields.exactly_one(&CHANNEL_KINDS, "kind of channels");
+    let bounds = kind.as_ref().and_then(|kind| match kind.path.as_str() {
+        "channels.equal" => equal(kind),
+        "channels.wavenumber" => wavenumber(kind),
+        "channels.intervals" => intervals(kind),
+        // Refused by the table's key check.
+        _ => None,
+    });
+    let false_colour = match fields.get("false_colour") {
+        Some(item) => Some(self::false_colour(&item, bounds.as_ref().map(Vec::len))?),
+        None => None,
+    };
+    Some(Channels::from_bounds(bounds?, false_colour))
+}
+
+fn wavelength(item: &Item) -> Option<f64> {
+    item.number_where(|nm| nm > 0.0 && nm <= MAX_NM, WAVELENGTHS)
+}
+
+/// `from` < `to` and `count` of a table, `from` and `to` read by `number`.
+fn range(fields: &Fields, example: &str, number: impl Fn(&Item) -> Option<f64>) -> Option<(f64, f64, usize)> {
+    let bound = |key: &str| fields.require(key, example).and_then(|item| number(&item));
+    let (from, to) = (bound("from"), bound("to"));
+    let count = fields.require("count", example).and_then(|item| item.whole(1..=MAX_CHANNELS));
+    let (from, to) = (from?, to?);
+    if from >= to {
+        fields.get("from")?.error_help(format!("`from` must be less than `to`, but {from} ≥ {to}"), "exchange them");
+        return None;
+    }
+    Some((from, to, count? as usize))
+}
+
+fn equal(item: &Item) -> Option<Vec<[f64; 2]>> {
+    const EXAMPLE: &str = "all of { from = 380, to = 780, count = 400 }";
+    let (from, to, count) = range(&item.table(RANGE)?, EXAMPLE, wavelength)?;
+    not_empty(item, Channels::equal(from, to, count).bounds)
+}
+
+/// Equal steps of wavenumber, in ascending nanometres.
+fn wavenumber(item: &Item) -> Option<Vec<[f64; 2]>> {
+    const EXAMPLE: &str = "all of { from = 500, to = 5000, count = 1000 }";
+    let per_cm = |item: &Item| item.number_where(|v| v >= 1e7 / MAX_NM, "at least 10 (cm-1, a wavelength of 1 mm)");
+    let (from, to, count) = range(&item.table(RANGE)?, EXAMPLE, per_cm)?;
+    let edges = Channels::equal(from, to, count).bounds;
+    not_empty(item, edges.iter().rev().map(|[low, high]| [1e7 / high, 1e7 / low]).collect())
+}
+
+fn intervals(item: &Item) -> Option<Vec<[f64; 2]>> {
+    let items = item.array()?;
+    if items.is_empty() || items.len() > MAX_CHANNELS as usize {
+        let help = "list [from, to] pairs in nm, e.g. [[380, 390], [8000, 12000]]";
+        item.error_help(format!("must have 1 to {MAX_CHANNELS} intervals, but has {}", items.len()), help);
+        return None;
+    }
+    let pair = |item: &Item| {
+        let [from, to] = item.array_of::<2>("two wavelengths [from, to]")?;
+        let (from, to) = (wavelength(&from), wavelength(&to));
+        let (from, to) = (from?, to?);
+        if from >= to {
+            item.error_help(format!("must be [from, to] with from less than to, but {from} ≥ {to}"), "exchange them");
+            return None;
+        }
+        Some([from, to])
+    };
+    let pairs: Vec<_> = items.iter().map(pair).collect();
+    pairs.into_iter().collect()
+}
+
+/// Channels so narrow that rounding leaves nothing of them are an error.
+fn not_empty(item: &Item, bounds: Vec<[f64; 2]>) -> Option<Vec<[f64; 2]>> {
+    if bounds.iter().any(|[a, b]| a >= b) {
+        item.error_help("the channels are too narrow to be told apart", "use fewer channels or a wider range");
+        return None;
+    }
+    Some(bounds)
+}
+
+fn false_colour(item: &Item, count: Option<usize>) -> Option<[usize; 3]> {
+    let items = item.array_of::<3>("three channel numbers [r, g, b]")?;
+    let last = count.map_or(MAX_CHANNELS, |count| count as u32) - 1;
+    let numbers = items.each_ref().map(|item| item.whole(0..=last));
+    numbers.iter().all(Option::is_some).then(|| numbers.map(|n| n.unwrap_or_default() as usize))
+}

@@ -1,0 +1,374 @@
+//! Typed access to the scene tree: every accessor either gives a checked value or records what is wrong and gives
+//! `None`, so that decoding carries on with the next item.
+
+use std::fmt::Display;
+use std::ops::RangeInclusive;
+
+use glam::DVec3;
+
+use super::context::Context;
+use super::tree::{Entry, Node, Origin, Value};
+
+/// A value of the scene tree with its dotted key.
+#[derive(Clone)]
+pub struct Item<'a> {
+    pub cx: &'a Context<'a>,
+    pub node: &'a Node,
+    pub path: String,
+    /// Where to point when the value as a whole is wrong.
+    pub at: &'a Origin,
+}
+
+/// A table whose keys have been checked against those it may have.
+#[derive(Clone)]
+pub struct Fields<'a> {
+    pub cx: &'a Context<'a>,
+    pub path: String,
+    /// Where to point when something is missing from the table.
+    pub at: &'a Origin,
+    entries: &'a [Entry],
+    /// For every unknown key the known one that was probably meant, or "".
+    misspelt: Vec<&'static str>,
+}
+
+/// The keys of a table: those understood, and those of the contract that a later version brings.
+#[derive(Clone, Copy)]
+pub struct Keys {
+    pub known: &'static [&'static str],
+    pub later: &'static [&'static str],
+}
+
+impl Keys {
+    pub const fn new(known: &'static [&'static str]) -> Self {
+        Keys { known, later: &[] }
+    }
+
+    pub const fn later(self, later: &'static [&'static str]) -> Self {
+        Keys { later, ..self }
+    }
+}
+
+impl<'a> Item<'a> {
+    pub fn error(&self, message: impl Into<String>) {
+        self.cx.error(self.at, &self.path, message, None);
+    }
+
+    pub fn error_help(&self, message: impl Into<String>, help: impl Into<String>) {
+        self.cx.error(self.at, &self.path, message, Some(help.into()));
+    }
+
+    fn wrong_kind<T>(&self, expected: &str) -> Option<T> {
+        self.error(format!("must be {expected}, but is {}", self.node.value.kind()));
+        None
+    }
+
+    /// A finite number.
+    pub fn number(&self) -> Option<f64> {
+        let value = match self.node.value {
+            Value::Integer(i) => i as f64,
+            Value::Float(f) => f,
+            _ => return self.wrong_kind("a number"),
+        };
+        if !value.is_finite() {
+            self.error(format!("must be a finite number, but is {value}"));
+            return None;
+        }
+        Some(value)
+    }
+
+    /// A finite number for which `allowed` holds; `range` says so in words.
+    pub fn number_where(&self, allowed: impl Fn(f64) -> bool, range: &str) -> Option<f64> {
+        let value = self.number()?;
+        if !allowed(value) {
+            self.error(format!("must be {range}, but is {value}"));
+            return None;
+        }
+        Some(value)
+    }
+
+    /// A finite number above zero.
+    pub fn positive(&self) -> Option<f64> {
+        self.number_where(|v| v > 0.0, "greater than 0")
+    }
+
+    /// A finite number of at least zero.
+    pub fn not_negative(&self) -> Option<f64> {
+        self.number_where(|v| v >= 0.0, "0 or greater")
+    }
+
+    /// A whole number in `range`.
+    pub fn whole(&self, range: RangeInclusive<u32>) -> Option<u32> {
+        let words = format!("a whole number from {} to {}", range.start(), range.end());
+        let Value::Integer(value) = self.node.value else {
+            if let Value::Float(value) = self.node.value {
+                self.error(format!("must be {words}, but is {value}"));
+                return None;
+            }
+            return self.wrong_kind(&words);
+        };
+        let inside = u32::try_from(value).ok().filter(|v| range.contains(v));
+        if inside.is_none() {
+            self.error(format!("must be {words}, but is {value}"));
+        }
+        inside
+    }
+
+    pub fn boolean(&self) -> Option<bool> {
+        match self.node.value {
+            Value::Boolean(b) => Some(b),
+            _ => self.wrong_kind("true or false"),
+        }
+    }
+
+    pub fn text(&self) -> Option<&'a str> {
+        match &self.node.value {
+            Value::String(s) => Some(s),
+            _ => self.wrong_kind("a string"),
+        }
+    }
+
+    /// One of a few named values.
+    pub fn choice<T: Copy>(&self, choices: &[(&str, T)]) -> Option<T> {
+        let written = self.text()?;
+        if let Some((_, value)) = choices.iter().find(|(name, _)| *name == written) {
+            return Some(*value);
+        }
+        let names = choices.iter().map(|(name, _)| *name);
+        self.error_help(
+            format!("must be one of {}, but is \"{written}\"", quoted(names.clone())),
+            did_you_mean(written, names).unwrap_or_else(|| "use one of these values".to_owned()),
+        );
+        None
+    }
+
+    /// The elements of an array.
+    pub fn array(&self) -> Option<Vec<Item<'a>>> {
+        let Value::Array(nodes) = &self.node.value else {
+            return self.wrong_kind("an array");
+        };
+        let item = |(i, node): (usize, &'a Node)| Item {
+            cx: self.cx,
+            node,
+            path: format!("{}.{i}", self.path),
+            at: if node.origin == Origin::Whole { self.at } else { &node.origin },
+        };
+        Some(nodes.iter().enumerate().map(item).collect())
+    }
+
+    /// An array of exactly N elements; `what` says what they are.
+    pub fn array_of<const N: usize>(&self, what: &str) -> Option<[Item<'a>; N]> {
+        if !matches!(self.node.value, Value::Array(_)) {
+            return self.wrong_kind(what);
+        }
+        let items = self.array()?;
+        let found = items.len();
+        let items = items.try_into().ok();
+        if items.is_none() {
+            self.error(format!("must be {what}, but has {found} elements"));
+        }
+        items
+    }
+
+    /// An array of exactly N finite numbers.
+    pub fn numbers<const N: usize>(&self, what: &str) -> Option<[f64; N]> {
+        let items = self.array_of::<N>(what)?;
+        let numbers = items.each_ref().map(|item| item.number());
+        numbers.iter().all(Option::is_some).then(|| numbers.map(Option::unwrap_or_default))
+    }
+
+    /// Three finite numbers.
+    pub fn vector(&self) -> Option<DVec3> {
+        self.numbers::<3>("three numbers [x, y, z]").map(DVec3::from_array)
+    }
+
+    /// A vector of some length, normalised.
+    pub fn direction(&self) -> Option<DVec3> {
+        let unit = self.vector()?.try_normalize();
+        if unit.is_none() {
+            self.error("must be a direction, but its length is 0 or cannot be represented");
+        }
+        unit
+    }
+
+    /// The table, with unknown keys reported and keys of later versions refused by name.
+    pub fn table(&self, keys: Keys) -> Option<Fields<'a>> {
+        let Value::Table(entries) = &self.node.value else {
+            return self.wrong_kind("a table");
+        };
+        let mut fields = Fields { cx: self.cx, path: self.path.clone(), at: self.at, entries, misspelt: Vec::new() };
+        fields.check(keys);
+        Some(fields)
+    }
+
+    /// A table of items under names the user chose.
+    pub fn named_items(&self) -> Option<Vec<(&'a str, Item<'a>)>> {
+        let Value::Table(entries) = &self.node.value else {
+            return self.wrong_kind("a table");
+        };
+        Some(entries.iter().map(|e| (e.key.as_str(), child(self.cx, &self.path, e))).collect())
+    }
+
+    /// Refuses a value that the contract has and this version has not.
+    pub fn not_supported_yet(&self) {
+        self.error_help(format!("`{}` is not supported yet", self.path), "remove it, or use a later version");
+    }
+}
+
+impl<'a> Fields<'a> {
+    /// The tables of the whole file.
+    pub fn root(cx: &'a Context<'a>, entries: &'a [Entry], keys: Keys) -> Self {
+        let mut fields = Fields { cx, path: String::new(), at: &Origin::Whole, entries, misspelt: Vec::new() };
+        fields.check(keys);
+        fields
+    }
+
+    fn check(&mut self, keys: Keys) {
+        for entry in self.entries {
+            let key = entry.key.as_str();
+            if keys.known.contains(&key) {
+                continue;
+            }
+            let path = join(&self.path, key);
+            if keys.later.contains(&key) {
+                let help = Some("remove it, or use a later version".to_owned());
+                self.cx.error(&entry.key_origin, &path, format!("`{path}` is not supported yet"), help);
+                continue;
+            }
+            let all = keys.known.iter().chain(keys.later).copied();
+            let meant = nearest(key, all.clone());
+            let help = meant.map_or_else(|| format!("known keys: {}", list(all)), suggestion);
+            self.cx.error(&entry.key_origin, &path, format!("unknown key `{key}`"), Some(help));
+            self.misspelt.push(meant.unwrap_or(""));
+        }
+    }
+
+    pub fn get(&self, key: &str) -> Option<Item<'a>> {
+        self.entries.iter().find(|e| e.key == key).map(|e| child(self.cx, &self.path, e))
+    }
+
+    pub fn has(&self, key: &str) -> bool {
+        self.entries.iter().any(|e| e.key == key)
+    }
+
+    /// The value of `key`, whose absence is an error; `help` shows how to write it.
+    pub fn require(&self, key: &str, help: &str) -> Option<Item<'a>> {
+        let item = self.get(key);
+        if item.is_none() && !self.misspelt.contains(&key) {
+            self.cx.error(self.at, &join(&self.path, key), format!("`{key}` is missing"), Some(format!("add {help}")));
+        }
+        item
+    }
+
+    /// The one key among `names` that is present; several or none are an error. `what` names the thing chosen.
+    pub fn exactly_one(&self, names: &[&str], what: &str) -> Option<Item<'a>> {
+        let present: Vec<&Entry> = self.entries.iter().filter(|e| names.contains(&e.key.as_str())).collect();
+        match present[..] {
+            [entry] => Some(child(self.cx, &self.path, entry)),
+            // An unknown key was probably meant to be one.
+            [] if !self.misspelt.is_empty() => None,
+            [] => {
+                self.error_help(
+                    format!("has no {what}"),
+                    format!("add exactly one of {}", list(names.iter().copied())),
+                );
+                None
+            }
+            [_, second, ..] => {
+                self.cx.error(
+                    &second.key_origin,
+                    &join(&self.path, &second.key),
+                    format!(
+                        "only one {what} is allowed, but {} are given",
+                        list(present.iter().map(|e| e.key.as_str()))
+                    ),
+                    Some("keep exactly one".to_owned()),
+                );
+                None
+            }
+        }
+    }
+
+    pub fn error_help(&self, message: impl Into<String>, help: impl Into<String>) {
+        self.cx.error(self.at, &self.path, message, Some(help.into()));
+    }
+}
+
+fn child<'a>(cx: &'a Context<'a>, parent: &str, entry: &'a Entry) -> Item<'a> {
+    // A table's own span may be its header or nothing at all; its key is always there.
+    let at = if matches!(entry.node.value, Value::Table(_)) { &entry.key_origin } else { &entry.node.origin };
+    Item { cx, node: &entry.node, path: join(parent, &entry.key), at }
+}
+
+/// `parent.key`; keys that TOML would quote are quoted.
+pub fn join(parent: &str, key: &str) -> String {
+    let bare = !key.is_empty() && key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');
+    let key = if bare { key.to_owned() } else { format!("{key:?}") };
+    if parent.is_empty() { key } else { format!("{parent}.{key}") }
+}
+
+/// `a, b, c`.
+pub fn list<T: Display>(names: impl IntoIterator<Item = T>) -> String {
+    names.into_iter().map(|n| n.to_string()).collect::<Vec<_>>().join(", ")
+}
+
+/// `"a", "b", "c"`.
+pub fn quoted<T: Display>(names: impl IntoIterator<Item = T>) -> String {
+    list(names.into_iter().map(|n| format!("\"{n}\"")))
+}
+
+/// The nearest of `names`, where one is near enough to be meant.
+fn nearest<'n>(written: &str, names: impl IntoIterator<Item = &'n str>) -> Option<&'n str> {
+    let best = names.into_iter().min_by_key(|name| edit_distance(written, name))?;
+    let allowed = 1 + written.chars().count().min(best.chars().count()) / 3;
+    (edit_distance(written, best) <= allowed).then_some(best)
+}
+
+fn suggestion(name: &str) -> String {
+    format!("did you mean `{name}`?")
+}
+
+/// A hint at the nearest of `names`, where one is near enough to be meant.
+pub fn did_you_mean<'n>(written: &str, names: impl IntoIterator<Item = &'n str>) -> Option<String> {
+    nearest(written, names).map(suggestion)
+}
+
+/// Levenshtein distance in characters, of the first 64 of each.
+fn edit_distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().take(64).collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, ca) in a.chars().take(64).enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, &cb) in b.iter().enumerate() {
+            let substituted = diagonal + usize::from(ca != cb);
+            diagonal = row[j + 1];
+            row[j + 1] = substituted.min(row[j] + 1).min(diagonal + 1);
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distances() {
+        for (a, b, expected) in [("", "abc", 3), ("width", "widht", 2), ("kitten", "sitting", 3), ("x", "x", 0)] {
+            assert_eq!(edit_distance(a, b), expected, "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn suggestions_are_near_or_absent() {
+        let names = ["width", "height", "filter", "crop"];
+        assert_eq!(did_you_mean("widht", names).as_deref(), Some("did you mean `width`?"));
+        assert_eq!(did_you_mean("temperature", names), None);
+    }
+
+    #[test]
+    fn keys_are_quoted_where_toml_would() {
+        assert_eq!(join("materials", "my paint"), "materials.\"my paint\"");
+        assert_eq!(join("", "film"), "film");
+    }
+}

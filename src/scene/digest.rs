@@ -1,0 +1,186 @@
+//! The identity of a scene: what decides the values of a cube, and nothing else.
+
+use glam::DVec3;
+use sha2::{Digest, Sha256};
+
+use super::{Bsdf, Filter, Projection, Sampler, Scene, Shape, Sides, Wavelengths};
+use crate::spectral::{Curve, Outside};
+
+/// Hex SHA-256 over every number's bits and every choice of `scene`, in order; not over paths, names and warnings.
+pub fn digest(scene: &Scene) -> String {
+    let mut hash = Hash(Sha256::new());
+    // Changes with the meaning of what follows.
+    hash.text("spectile scene 1");
+    hash.settings(scene);
+    hash.count(scene.spectra.len());
+    scene.spectra.iter().for_each(|spectrum| hash.curve(&spectrum.curve));
+    hash.count(scene.materials.len());
+    for material in &scene.materials {
+        match material.bsdf {
+            Bsdf::Diffuse { reflectance } => {
+                hash.tag(0);
+                hash.count(reflectance);
+            }
+            Bsdf::Black => hash.tag(1),
+        }
+        hash.tag(u8::from(material.two_sided));
+    }
+    hash.count(scene.objects.len());
+    for object in &scene.objects {
+        hash.shape(&object.shape);
+        hash.count(object.material);
+        match &object.emission {
+            None => hash.tag(0),
+            Some(emission) => {
+                hash.tag(match emission.sides {
+                    Sides::Front => 1,
+                    Sides::Both => 2,
+                });
+                hash.count(emission.radiance);
+            }
+        }
+    }
+    match &scene.environment {
+        None => hash.tag(0),
+        Some(environment) => {
+            hash.tag(1);
+            hash.count(environment.radiance);
+        }
+    }
+    hash.0.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Feeds values in a form that cannot be read in two ways: fixed widths, and lengths before lists.
+struct Hash(Sha256);
+
+impl Hash {
+    fn tag(&mut self, tag: u8) {
+        self.0.update([tag]);
+    }
+
+    fn count(&mut self, count: usize) {
+        self.0.update((count as u64).to_le_bytes());
+    }
+
+    fn number(&mut self, number: f64) {
+        self.0.update(number.to_bits().to_le_bytes());
+    }
+
+    fn numbers<'n>(&mut self, numbers: impl IntoIterator<Item = &'n f64>) {
+        numbers.into_iter().for_each(|number| self.number(*number));
+    }
+
+    fn vector(&mut self, vector: DVec3) {
+        self.numbers(&vector.to_array());
+    }
+
+    fn text(&mut self, text: &str) {
+        self.count(text.len());
+        self.0.update(text);
+    }
+
+    /// Camera, film, channels and integrator.
+    fn settings(&mut self, scene: &Scene) {
+        let camera = &scene.camera;
+        for vector in [camera.position, camera.forward, camera.right, camera.up] {
+            self.vector(vector);
+        }
+        match camera.projection {
+            Projection::Perspective { tan_half } => {
+                self.tag(0);
+                self.numbers(&tan_half.to_array());
+            }
+            Projection::ThinLens { tan_half, aperture_radius, focus_distance } => {
+                self.tag(1);
+                self.numbers(&[tan_half.x, tan_half.y, aperture_radius, focus_distance]);
+            }
+            Projection::Orthographic { half_size } => {
+                self.tag(2);
+                self.numbers(&half_size.to_array());
+            }
+        }
+
+        let film = &scene.film;
+        self.count(film.width as usize);
+        self.count(film.height as usize);
+        self.tag(match film.filter {
+            Filter::Box => 0,
+            Filter::Gaussian => 1,
+        });
+        film.crop.iter().for_each(|edge| self.count(*edge as usize));
+
+        self.count(scene.channels.len());
+        self.numbers(scene.channels.bounds.iter().flatten());
+        match scene.channels.false_colour {
+            None => self.tag(0),
+            Some(channels) => {
+                self.tag(1);
+                channels.iter().for_each(|channel| self.count(*channel));
+            }
+        }
+
+        let integrator = &scene.integrator;
+        self.count(integrator.max_bounces as usize);
+        self.count(integrator.russian_roulette_start as usize);
+        self.tag(match integrator.sampler {
+            Sampler::Sobol => 0,
+            Sampler::Independent => 1,
+        });
+        self.tag(match integrator.wavelengths {
+            Wavelengths::Uniform => 0,
+        });
+        self.text(&integrator.evaluator);
+        self.count(integrator.epoch as usize);
+    }
+
+    fn curve(&mut self, curve: &Curve) {
+        match curve {
+            Curve::Constant(value) => {
+                self.tag(0);
+                self.number(*value);
+            }
+            Curve::Linear { nm, value, outside } => {
+                self.tag(match outside {
+                    Outside::Zero => 1,
+                    Outside::Hold => 2,
+                });
+                self.count(nm.len());
+                self.numbers(nm);
+                self.numbers(value);
+            }
+            Curve::Blackbody { kelvin, scale } => {
+                self.tag(3);
+                self.numbers(&[*kelvin, *scale]);
+            }
+        }
+    }
+
+    fn shape(&mut self, shape: &Shape) {
+        match shape {
+            Shape::Mesh(mesh) => {
+                self.tag(0);
+                self.count(mesh.positions.len());
+                mesh.positions.iter().for_each(|p| self.vector(*p));
+                self.count(mesh.triangles.len());
+                mesh.triangles.iter().flatten().for_each(|i| self.0.update(i.to_le_bytes()));
+            }
+            Shape::Sphere { center, radius } => {
+                self.tag(1);
+                self.vector(*center);
+                self.number(*radius);
+            }
+            Shape::Disk { center, normal, radius } => {
+                self.tag(2);
+                self.vector(*center);
+                self.vector(*normal);
+                self.number(*radius);
+            }
+            Shape::Cylinder { from, to, radius } => {
+                self.tag(3);
+                self.vector(*from);
+                self.vector(*to);
+                self.number(*radius);
+            }
+        }
+    }
+}

@@ -1,0 +1,249 @@
+//! From a scene file to a [`Scene`]: the top level of `scene.toml`.
+
+use std::path::{Path, PathBuf};
+
+use super::camera;
+use super::channels;
+use super::context::{Context, position};
+use super::decode::{Fields, Item, Keys};
+use super::digest::digest;
+use super::material::Materials;
+use super::object::Objects;
+use super::overrides::{self, ENVIRONMENTS, LIGHT_KINDS};
+use super::spectrum::{Handle, Quantity, Spectra};
+use super::tree::{self, Entry, Origin};
+use super::{Environment, Integrator, Sampler, Scene, Wavelengths};
+use crate::error::{Error, Problem, Result};
+
+const TOP: Keys = Keys::new(&[
+    "camera",
+    "film",
+    "channels",
+    "integrator",
+    "spectra",
+    "materials",
+    "objects",
+    "lights",
+    "environment",
+    "media",
+]);
+const INTEGRATOR: Keys =
+    Keys::new(&["max_bounces", "russian_roulette_start", "sampler", "wavelengths", "evaluator", "epoch"]);
+const ENVIRONMENT: Keys = Keys::new(&["radiance", "up", "rotate_degrees", "scale"]).later(&["map"]);
+/// Evaluations walk all vertices of a path in one loop, whose iterations are bounded (DESIGN section 7).
+const MAX_BOUNCES: u32 = 16_384;
+const MAX_EPOCH: u32 = 1024;
+
+/// Reads the scene in `file`. `overrides` are the `--set` arguments: a dotted key and the text of a TOML value; a bare
+/// word is a string.
+///
+/// # Errors
+/// [`Error::Input`] with every independent mistake in the scene, its spectra and its meshes.
+pub fn load(file: &Path, overrides: &[(String, String)]) -> Result<Scene> {
+    let bytes = std::fs::read(file).map_err(|e| Error::input(file, format!("cannot be read: {e}")))?;
+    let text = String::from_utf8(bytes).map_err(|e| {
+        let line = e.as_bytes()[..e.utf8_error().valid_up_to()].iter().filter(|b| **b == b'\n').count() + 1;
+        Error::Input(vec![Problem {
+            file: file.to_owned(),
+            line: Some(line),
+            message: "is not UTF-8 text".to_owned(),
+            help: Some("save the scene as UTF-8".to_owned()),
+            ..Problem::default()
+        }])
+    })?;
+    parse(&text, file, overrides)
+}
+
+/// [`load`] on the text of a scene; `file` only locates relative paths and messages.
+pub fn parse(text: &str, file: &Path, overrides: &[(String, String)]) -> Result<Scene> {
+    // A mark some editors put first; it is no part of the scene.
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let cx = Context::new(file, text, overrides);
+    let mut root = match tree::parse_document(text) {
+        Ok(root) => root,
+        Err(errors) => {
+            let mut last_line = None;
+            for (span, message) in errors {
+                let line = span.as_ref().map(|span| position(text, span.start).0);
+                // What follows on the same line is mostly an echo of the first mistake.
+                if line.is_none() || line != last_line {
+                    let origin = span.map_or(Origin::Whole, Origin::File);
+                    cx.error(&origin, "", format!("is not valid TOML: {message}"), None);
+                }
+                last_line = line;
+            }
+            return Err(Error::Input(cx.finish().0));
+        }
+    };
+    overrides::apply(&cx, &mut root, overrides);
+    let scene = decode(&cx, &root);
+    let (problems, warnings) = cx.finish();
+    if !problems.is_empty() {
+        return Err(Error::Input(problems));
+    }
+    let mut scene = scene.ok_or_else(|| Error::Internal("a scene was refused without saying why".to_owned()))?;
+    scene.file = std::path::absolute(file).unwrap_or_else(|_| file.to_owned());
+    scene.warnings = warnings;
+    scene.digest = digest(&scene);
+    Ok(scene)
+}
+
+/// Decodes every section, whatever is wrong with the others; `None` if anything was.
+fn decode<'a>(cx: &'a Context<'a>, root: &'a [Entry]) -> Option<Scene> {
+    let top = Fields::root(cx, root, TOP);
+    let section = |key: &str, example: &str| {
+        let item = top.get(key);
+        if item.is_none() {
+            cx.error(&Origin::Whole, key, format!("`[{key}]` is missing"), Some(format!("add {example}")));
+        }
+        item
+    };
+    let film = section("film", "[film] with width and height in pixels").and_then(|i| camera::decode_film(&i));
+    let camera = section("camera", "[camera.perspective] with position, look_at and fov")
+        .and_then(|i| camera::decode_camera(&i, film.as_ref()));
+    let channels = section("channels", "[channels] with equal = { from = 380, to = 780, count = 400 }")
+        .and_then(|i| channels::decode(&i));
+    let integrator = match top.get("integrator") {
+        Some(item) => decode_integrator(&item),
+        None => Some(Integrator::default()),
+    };
+
+    let mut spectra = Spectra::new(cx, top.get("spectra"), channels.clone());
+    let mut materials = Materials::new(top.get("materials"), &mut spectra);
+    let mut objects = Objects::new(&mut spectra, &mut materials);
+    if let Some(items) = top.get("objects").and_then(|item| item.array()) {
+        items.iter().for_each(|item| objects.add(item));
+    }
+    let objects = objects.finish();
+    let environment = top.get("environment").map(|item| {
+        let radiance = decode_environment(&item, &mut spectra)?;
+        Some(Environment { radiance: spectra.take(radiance) })
+    });
+    refuse_lights(top.get("lights"));
+    refuse_media(top.get("media"));
+
+    Some(Scene {
+        file: PathBuf::new(),
+        camera: camera?,
+        film: film?,
+        channels: channels?,
+        integrator: integrator?,
+        materials: materials.finish(),
+        spectra: spectra.finish(),
+        objects,
+        environment: match environment {
+            Some(environment) => Some(environment?),
+            None => None,
+        },
+        warnings: Vec::new(),
+        digest: String::new(),
+    })
+}
+
+impl Default for Integrator {
+    /// What a scene without `[integrator]` gets.
+    fn default() -> Self {
+        Integrator {
+            max_bounces: 5,
+            russian_roulette_start: 0,
+            sampler: Sampler::Sobol,
+            wavelengths: Wavelengths::Uniform,
+            evaluator: "auto".to_owned(),
+            epoch: 64,
+        }
+    }
+}
+
+fn decode_integrator(item: &Item) -> Option<Integrator> {
+    let fields = item.table(INTEGRATOR)?;
+    let default = Integrator::default();
+    let bounces = |key: &str, default: u32| match fields.get(key) {
+        Some(item) => item.whole(0..=MAX_BOUNCES),
+        None => Some(default),
+    };
+    let max_bounces = bounces("max_bounces", default.max_bounces);
+    let russian_roulette_start = bounces("russian_roulette_start", default.russian_roulette_start);
+    let sampler = match fields.get("sampler") {
+        Some(item) => item.choice(&[("sobol", Sampler::Sobol), ("independent", Sampler::Independent)]),
+        None => Some(default.sampler),
+    };
+    let wavelengths = match fields.get("wavelengths") {
+        Some(item) => choice_or_later(&item, &[("uniform", Wavelengths::Uniform)], &["emission"]),
+        None => Some(default.wavelengths),
+    };
+    let evaluator = match fields.get("evaluator") {
+        Some(item) => choice_or_later(
+            &item,
+            &[("auto", "auto"), ("dpept-pixel", "dpept-pixel")],
+            &["dpept-path", "dpept-spectral", "pt"],
+        ),
+        None => Some("auto"),
+    };
+    let epoch = match fields.get("epoch") {
+        Some(item) => item.whole(1..=MAX_EPOCH).filter(|epoch| {
+            if !epoch.is_power_of_two() {
+                item.error_help(
+                    format!("must be a power of two up to {MAX_EPOCH}, but is {epoch}"),
+                    format!("use {} or {}", epoch.next_power_of_two() / 2, epoch.next_power_of_two()),
+                );
+            }
+            epoch.is_power_of_two()
+        }),
+        None => Some(default.epoch),
+    };
+    Some(Integrator {
+        max_bounces: max_bounces?,
+        russian_roulette_start: russian_roulette_start?,
+        sampler: sampler?,
+        wavelengths: wavelengths?,
+        evaluator: evaluator?.to_owned(),
+        epoch: epoch?,
+    })
+}
+
+/// One of `now`; a value of `later` is refused by name.
+fn choice_or_later<T: Copy>(item: &Item, now: &[(&str, T)], later: &[&str]) -> Option<T> {
+    let written = item.text()?;
+    if later.contains(&written) {
+        let help = format!("use {}", super::decode::quoted(now.iter().map(|(name, _)| name)));
+        item.error_help(format!("`{written}` is not supported yet"), help);
+        return None;
+    }
+    item.choice(now)
+}
+
+fn decode_environment<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Handle> {
+    let fields = item.table(ENVIRONMENT)?;
+    let radiance = fields.exactly_one(&ENVIRONMENTS, "source of radiance");
+    // A uniform environment looks the same however it is turned; the keys still have to make sense.
+    let up = fields.get("up").map(|item| item.direction());
+    let turn = fields.get("rotate_degrees").map(|item| item.number());
+    let scale = fields.get("scale");
+    let radiance = radiance.filter(|item| item.path == "environment.radiance")?;
+    let radiance = spectra.resolve(&radiance, Quantity::Radiance);
+    if up == Some(None) || turn == Some(None) {
+        return None;
+    }
+    match scale {
+        Some(scale) => spectra.scaled(radiance?, &scale),
+        None => radiance,
+    }
+}
+
+/// `[[lights]]` come with a later version; what is written is still checked to be one of them.
+fn refuse_lights(item: Option<Item>) {
+    for item in item.and_then(|item| item.array()).unwrap_or_default() {
+        let kind =
+            item.table(Keys::new(&LIGHT_KINDS)).and_then(|fields| fields.exactly_one(&LIGHT_KINDS, "kind of light"));
+        if let Some(kind) = kind {
+            kind.not_supported_yet();
+        }
+    }
+}
+
+/// `[media]` come with a later version.
+fn refuse_media(item: Option<Item>) {
+    for (_, medium) in item.and_then(|item| item.named_items()).unwrap_or_default() {
+        medium.not_supported_yet();
+    }
+}

@@ -1,0 +1,267 @@
+//! `[[objects]]`: a shape, a material, and what it emits.
+
+use std::collections::HashMap;
+use std::path::PathBuf;
+use std::rc::Rc;
+
+use glam::DAffine3;
+
+use super::decode::{Fields, Item, Keys, list};
+use super::material::Materials;
+use super::overrides::SHAPES;
+use super::shape;
+use super::spectrum::{Handle, Quantity, Spectra, report_in_file};
+use super::transform;
+use super::tree::Value;
+use super::{Emission, MaterialId, Object, Shape, Sides};
+use crate::format::obj::{self, Obj, Part};
+
+const KEYS: Keys = Keys::new(&[
+    "mesh",
+    "sphere",
+    "quad",
+    "disk",
+    "cube",
+    "cylinder",
+    "group",
+    "material",
+    "emission",
+    "emission_sides",
+    "transform",
+])
+.later(&["interior"]);
+
+/// Decodes objects one after the other; a mesh file is read once.
+pub struct Objects<'s, 'a> {
+    pub spectra: &'s mut Spectra<'a>,
+    pub materials: &'s mut Materials<'a>,
+    /// `None` where the file is wrong, which has been said.
+    meshes: HashMap<PathBuf, Option<Rc<Obj>>>,
+    scene: Vec<Object>,
+}
+
+/// What all pieces of one object share. An outer `None` is a mistake that has been said; the rest of the object is
+/// still looked at.
+struct Common {
+    affine: Option<DAffine3>,
+    emission: Option<Option<(Handle, Sides)>>,
+}
+
+impl<'s, 'a> Objects<'s, 'a> {
+    pub fn new(spectra: &'s mut Spectra<'a>, materials: &'s mut Materials<'a>) -> Self {
+        Objects { spectra, materials, meshes: HashMap::new(), scene: Vec::new() }
+    }
+
+    /// Decodes one entry of `[[objects]]`.
+    pub fn add(&mut self, item: &Item<'a>) {
+        let Some(fields) = item.table(KEYS) else { return };
+        let shape = fields.exactly_one(&SHAPES, "shape");
+        let group = fields.get("group");
+        if let (Some(group), false) = (&group, fields.has("mesh")) {
+            group.error_help("goes with `mesh` only", "remove it");
+        }
+        let common = self.common(&fields);
+        let named = fields.get("material");
+        let material = named.as_ref().map(|named| self.named_material(named));
+        let Some(shape) = shape else { return };
+
+        if shape.path.ends_with(".mesh") {
+            let Some(mesh) = self.read(&shape) else { return };
+            let Some(parts) = pick(&mesh, &shape, group.as_ref()) else { return };
+            match material {
+                Some(material) => self.push_mesh(&fields, &shape, &parts, None, material, &common),
+                None => self.push_by_usemtl(&fields, &shape, &parts, &common),
+            }
+            return;
+        }
+        let Some(local) = shape::decode(&shape) else { return };
+        let Some(material) = material else {
+            // A shape without material but with an interior will be a null boundary; it has been refused by name.
+            if !fields.has("interior") {
+                no_material(&fields, "the object has no `material`");
+            }
+            return;
+        };
+        let kind = shape.path.rsplit('.').next().unwrap_or_default();
+        let name = format!("{} ({kind})", item.path);
+        self.push(&fields, name, local, material, &common);
+    }
+
+    pub fn finish(self) -> Vec<Object> {
+        self.scene
+    }
+
+    fn common(&mut self, fields: &Fields<'a>) -> Common {
+        let affine = fields.get("transform").map_or(Some(DAffine3::IDENTITY), |item| transform::decode(&item));
+        let emission = fields.get("emission").map(|item| self.spectra.resolve(&item, Quantity::Radiance));
+        let sides = match fields.get("emission_sides") {
+            Some(item) => {
+                if emission.is_none() {
+                    item.cx.warn(format!("`{}` has no effect without `emission`", item.path));
+                }
+                item.choice(&[("front", Sides::Front), ("both", Sides::Both)])
+            }
+            None => Some(Sides::Front),
+        };
+        let emission = match emission {
+            Some(radiance) => radiance.zip(sides).map(Some),
+            None => sides.map(|_| None),
+        };
+        Common { affine, emission }
+    }
+
+    fn named_material(&mut self, item: &Item<'a>) -> Option<MaterialId> {
+        let name = item.text()?;
+        if !self.materials.has(name) {
+            item.error_help(format!("no material is named \"{name}\""), self.materials.help(name));
+        }
+        self.materials.take(name, self.spectra)
+    }
+
+    /// The mesh file that `item` names.
+    fn read(&mut self, item: &Item<'a>) -> Option<Rc<Obj>> {
+        let path = item.cx.path(item.text()?);
+        if let Some(known) = self.meshes.get(&path) {
+            return known.clone();
+        }
+        let mesh = match obj::read(&path) {
+            Ok(mesh) => {
+                warn_about(item, &mesh);
+                Some(Rc::new(mesh))
+            }
+            Err(problem) => {
+                report_in_file(item, *problem);
+                None
+            }
+        };
+        self.meshes.insert(path, mesh.clone());
+        mesh
+    }
+
+    /// One object for each `usemtl` name, in the order of the file.
+    fn push_by_usemtl(&mut self, fields: &Fields<'a>, shape: &Item<'a>, parts: &[&Part], common: &Common) {
+        if fields.has("interior") {
+            return;
+        }
+        let mut names: Vec<&str> = Vec::new();
+        let mut bare = None;
+        for part in parts {
+            match part.labels.material.as_deref() {
+                Some(name) if !names.contains(&name) => names.push(name),
+                Some(_) => {}
+                None => bare = bare.or(Some(part.line)),
+            }
+        }
+        if let Some(line) = bare {
+            let file = file_name(shape);
+            let message = match names.len() {
+                0 => format!("the object has no `material`, and {file} no usemtl"),
+                _ => format!("the object has no `material`, and the faces from line {line} of {file} have no usemtl"),
+            };
+            no_material(fields, &message);
+            return;
+        }
+        let unknown: Vec<&str> = names.iter().copied().filter(|name| !self.materials.has(name)).collect();
+        if !unknown.is_empty() {
+            shape.error_help(
+                format!("{} uses materials that [materials] does not have: {}", file_name(shape), list(&unknown)),
+                format!("define them, or set `material`; the file's usemtl names are {}", list(&names)),
+            );
+        }
+        for name in names {
+            let of_name: Vec<&Part> =
+                parts.iter().copied().filter(|part| part.labels.material.as_deref() == Some(name)).collect();
+            let material = self.materials.take(name, self.spectra);
+            self.push_mesh(fields, shape, &of_name, Some(name), material, common);
+        }
+    }
+
+    fn push_mesh(
+        &mut self,
+        fields: &Fields<'a>,
+        shape: &Item<'a>,
+        parts: &[&Part],
+        usemtl: Option<&str>,
+        material: Option<MaterialId>,
+        common: &Common,
+    ) {
+        let label = usemtl.map_or_else(String::new, |name| format!(", material \"{name}\""));
+        let name = format!("{} ({}{label})", fields.path, file_name(shape));
+        self.push(fields, name, Shape::Mesh(shape::join(parts)), material, common);
+    }
+
+    /// Moves `local` into the world and adds it to the scene.
+    fn push(&mut self, fields: &Fields<'a>, name: String, local: Shape, material: Option<MaterialId>, common: &Common) {
+        let Some(affine) = common.affine else { return };
+        let mut shape = match transform::apply(&affine, local) {
+            Ok(shape) => shape,
+            Err(message) => {
+                let item = fields.get("transform");
+                let (at, key) = item.as_ref().map_or((fields.at, fields.path.as_str()), |i| (i.at, i.path.as_str()));
+                fields.cx.error(at, key, message, None);
+                return;
+            }
+        };
+        if let Shape::Mesh(mesh) = &mut shape {
+            let dropped = shape::drop_degenerate(mesh);
+            if mesh.triangles.is_empty() {
+                fields.error_help(format!("{name} has no area: all its triangles are degenerate"), "correct the mesh");
+                return;
+            }
+            if dropped > 0 {
+                fields.cx.warn(format!("{name}: {dropped} triangles without area were dropped"));
+            }
+        }
+        let (Some(material), Some(emission)) = (material, common.emission) else { return };
+        let emission = emission.map(|(radiance, sides)| Emission { radiance: self.spectra.take(radiance), sides });
+        self.scene.push(Object { name, shape, material, emission });
+    }
+}
+
+fn no_material(fields: &Fields, message: &str) {
+    let path = &fields.path;
+    let help =
+        "add e.g. `material = \"white\"`; for a lamp that reflects nothing, a material of kind `black`".to_owned();
+    fields.cx.error(fields.at, &format!("{path}.material"), message, Some(help));
+}
+
+/// The parts that `group` picks, or all.
+fn pick<'m>(mesh: &'m Obj, shape: &Item, group: Option<&Item>) -> Option<Vec<&'m Part>> {
+    let Some(group) = group else { return Some(mesh.parts.iter().collect()) };
+    let wanted = group.text()?;
+    let parts: Vec<&Part> = mesh.parts.iter().filter(|part| part.labels.in_group(wanted)).collect();
+    if parts.is_empty() {
+        let mut names: Vec<&str> = Vec::new();
+        for label in mesh.parts.iter().flat_map(|p| [p.labels.object.as_deref(), p.labels.group.as_deref()]).flatten() {
+            if !names.contains(&label) && names.len() < 20 {
+                names.push(label);
+            }
+        }
+        let help = if names.is_empty() {
+            "the file has no groups".to_owned()
+        } else {
+            format!("groups with faces: {}", list(names))
+        };
+        group.error_help(format!("{} has no faces in a group or object \"{wanted}\"", file_name(shape)), help);
+        return None;
+    }
+    Some(parts)
+}
+
+fn warn_about(item: &Item, mesh: &Obj) {
+    let file = file_name(item);
+    if mesh.has_normals {
+        item.cx.warn(format!("{file}: its vertex normals are not used; shading follows the triangles"));
+    }
+    if mesh.without_surface > 0 {
+        item.cx.warn(format!("{file}: {} points and lines have no surface and are left out", mesh.without_surface));
+    }
+}
+
+/// The last part of the path that `item` spells.
+fn file_name(item: &Item) -> String {
+    match &item.node.value {
+        Value::String(path) => path.rsplit(['/', '\\']).next().unwrap_or(path).to_owned(),
+        _ => String::new(),
+    }
+}

@@ -1,0 +1,260 @@
+//! `--set key=value`: replaces values of the scene tree by dotted path before anything is decoded.
+
+use super::context::Context;
+use super::tree::{self, Entry, Node, Origin, Value};
+
+/// The keys of which a spectrum has exactly one.
+pub const SPECTRUM_SOURCES: [&str; 6] = ["file", "constant", "blackbody", "samples", "regular", "rgb"];
+/// The keys of which a camera, channels, material, object, light and environment have exactly one.
+pub const CAMERAS: [&str; 3] = ["perspective", "thin_lens", "orthographic"];
+pub const CHANNEL_KINDS: [&str; 4] = ["equal", "wavenumber", "intervals", "responses"];
+pub const MATERIAL_KINDS: [&str; 6] = ["diffuse", "conductor", "dielectric", "plastic", "blend", "black"];
+pub const SHAPES: [&str; 6] = ["mesh", "sphere", "quad", "disk", "cube", "cylinder"];
+pub const LIGHT_KINDS: [&str; 3] = ["point", "directional", "sun"];
+pub const ENVIRONMENTS: [&str; 2] = ["radiance", "map"];
+
+/// Applies every override to `root`, in order; mistakes are recorded in `cx`.
+pub fn apply(cx: &Context<'_>, root: &mut Vec<Entry>, overrides: &[(String, String)]) {
+    for (index, (key, value)) in overrides.iter().enumerate() {
+        let origin = Origin::Set(index);
+        let Some(path) = parse_key(key) else {
+            let help = "write a dotted path such as film.width or objects.0.material";
+            cx.error(&origin, key, "is not a dotted key", Some(help.to_owned()));
+            continue;
+        };
+        let node = match parse_value(value, index) {
+            Ok(node) => node,
+            Err(message) => {
+                let help = "write a TOML value such as 5, \"text\", [1, 2, 3] or { constant = 1 }";
+                cx.error(&origin, key, format!("the value is not valid TOML: {message}"), Some(help.to_owned()));
+                continue;
+            }
+        };
+        if let Err((message, help)) = set_in_table(root, &[], &path, node, &origin) {
+            cx.error(&origin, key, message, Some(help));
+        }
+    }
+}
+
+/// The parts of a dotted key, by TOML's own rules.
+fn parse_key(key: &str) -> Option<Vec<String>> {
+    if key.contains(['\n', '=', '#']) {
+        return None;
+    }
+    let mut entries = tree::parse_document(&format!("{key} = 0")).ok()?;
+    let mut path = Vec::new();
+    loop {
+        let entry = entries.pop()?;
+        path.push(entry.key);
+        match entry.node.value {
+            Value::Table(inner) => entries = inner,
+            _ => return Some(path),
+        }
+    }
+}
+
+/// TOML, or else a bare word, which is a string.
+fn parse_value(text: &str, index: usize) -> Result<Node, String> {
+    let text = text.trim();
+    match tree::parse_value(text, index) {
+        Ok(node) => Ok(node),
+        Err(_) if !text.is_empty() && !text.starts_with(['[', '{', '"', '\'']) => {
+            Ok(Node { value: Value::String(text.to_owned()), origin: Origin::Set(index) })
+        }
+        Err(errors) => Err(errors.into_iter().next().map_or_else(|| "it is empty".to_owned(), |e| e.1)),
+    }
+}
+
+/// What is wrong, and what to do.
+type Refusal = (String, String);
+
+/// Sets `path` (not empty) below the table `entries`, which stands at `parents`.
+fn set_in_table(
+    entries: &mut Vec<Entry>,
+    parents: &[&str],
+    path: &[String],
+    node: Node,
+    origin: &Origin,
+) -> Result<(), Refusal> {
+    let key = path[0].as_str();
+    let rivals = rivals(parents, key);
+    entries.retain(|entry| !rivals.contains(&entry.key.as_str()));
+    let here: Vec<&str> = parents.iter().copied().chain([key]).collect();
+    let rest = &path[1..];
+    if let Some(entry) = entries.iter_mut().find(|entry| entry.key == key) {
+        if !rest.is_empty() {
+            return set_below(&mut entry.node, &here, rest, node, origin);
+        }
+        // From now on the value is the override's, and so is whatever it lacks.
+        *entry = Entry { key: key.to_owned(), key_origin: origin.clone(), node };
+        return Ok(());
+    }
+    let created = if rest.is_empty() {
+        node
+    } else {
+        let mut table = Node { value: Value::Table(Vec::new()), origin: origin.clone() };
+        set_below(&mut table, &here, rest, node, origin)?;
+        table
+    };
+    entries.push(Entry { key: key.to_owned(), key_origin: origin.clone(), node: created });
+    Ok(())
+}
+
+/// Sets `path` (not empty) inside `target`, which stands at `here`.
+fn set_below(target: &mut Node, here: &[&str], path: &[String], node: Node, origin: &Origin) -> Result<(), Refusal> {
+    let at = || here.join(".");
+    match &mut target.value {
+        Value::Table(entries) => set_in_table(entries, here, path, node, origin),
+        Value::Array(items) => {
+            let count = items.len();
+            let index = path[0].parse::<usize>().ok().filter(|&i| i <= count);
+            let Some(index) = index else {
+                let range = if count == 0 {
+                    "0 to append".to_owned()
+                } else {
+                    format!("0 to {} to change, {count} to append", count - 1)
+                };
+                return Err((
+                    format!("`{}` is no index of `{}`, which has {count} elements", path[0], at()),
+                    format!("use {range}"),
+                ));
+            };
+            let inner: Vec<&str> = here.iter().copied().chain([path[0].as_str()]).collect();
+            match &path[1..] {
+                [] if index < count => items[index] = node,
+                [] => items.push(node),
+                rest => {
+                    if index == count {
+                        items.push(Node { value: Value::Table(Vec::new()), origin: origin.clone() });
+                    }
+                    set_below(&mut items[index], &inner, rest, node, origin)?;
+                }
+            }
+            Ok(())
+        }
+        other => Err((
+            format!("`{}` is {}, which has no keys to set", at(), other.kind()),
+            format!("set `{}` as a whole", at()),
+        )),
+    }
+}
+
+/// The keys beside `key`, in the table at `parents`, that setting `key` replaces.
+fn rivals(parents: &[&str], key: &str) -> Vec<&'static str> {
+    let others = |group: &[&'static str]| -> Vec<&'static str> {
+        if group.contains(&key) { group.iter().copied().filter(|k| *k != key).collect() } else { Vec::new() }
+    };
+    match parents {
+        ["camera"] => others(&CAMERAS),
+        ["channels"] => others(&CHANNEL_KINDS),
+        ["materials", _] => others(&MATERIAL_KINDS),
+        ["lights", _] => others(&LIGHT_KINDS),
+        ["environment"] => others(&ENVIRONMENTS),
+        ["objects", _] => {
+            let mut rivals = others(&SHAPES);
+            if SHAPES.contains(&key) && key != "mesh" {
+                rivals.push("group");
+            }
+            rivals
+        }
+        ["objects", _, "transform"] => match key {
+            "matrix" => vec!["translate", "rotate", "scale"],
+            "translate" | "rotate" | "scale" => vec!["matrix"],
+            _ => Vec::new(),
+        },
+        // Everywhere else a table with these keys is a spectrum.
+        _ => {
+            let mut rivals = others(&SPECTRUM_SOURCES);
+            if SPECTRUM_SOURCES.contains(&key) && key != "file" {
+                rivals.push("column");
+            }
+            if matches!(key, "constant" | "blackbody") {
+                rivals.push("outside");
+            }
+            rivals
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::scene::decode::join;
+
+    fn applied(text: &str, sets: &[(&str, &str)]) -> (Vec<Entry>, Vec<String>) {
+        let sets: Vec<_> = sets.iter().map(|(k, v)| (k.to_string(), v.to_string())).collect();
+        let mut root = tree::parse_document(text).unwrap();
+        let cx = Context::new(Path::new("s.toml"), text, &sets);
+        apply(&cx, &mut root, &sets);
+        let messages = cx.finish().0.iter().map(|p| p.to_string()).collect();
+        (root, messages)
+    }
+
+    /// The tree as text, one `path=value` a leaf.
+    fn leaves(path: &str, node: &Value, out: &mut Vec<String>) {
+        match node {
+            Value::Table(entries) if entries.is_empty() => out.push(format!("{path}={{}}")),
+            Value::Table(entries) => entries.iter().for_each(|e| leaves(&join(path, &e.key), &e.node.value, out)),
+            Value::Array(items) => {
+                items.iter().enumerate().for_each(|(i, n)| leaves(&join(path, &i.to_string()), &n.value, out))
+            }
+            Value::String(s) => out.push(format!("{path}={s}")),
+            Value::Integer(i) => out.push(format!("{path}={i}")),
+            Value::Float(f) => out.push(format!("{path}={f:?}")),
+            other => out.push(format!("{path}={other:?}")),
+        }
+    }
+
+    fn check(text: &str, sets: &[(&str, &str)], expected: &[&str]) {
+        let (root, messages) = applied(text, sets);
+        assert_eq!(messages, Vec::<String>::new());
+        let mut found = Vec::new();
+        leaves("", &Value::Table(root), &mut found);
+        found.sort();
+        assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn edits_creates_and_replaces_siblings() {
+        check("a.b = 1", &[("a.b", "2"), ("a.c.d", "word")], &["a.b=2", "a.c.d=word"]);
+        check("channels.equal.count = 4", &[("channels.equal.count", "9")], &["channels.equal.count=9"]);
+        check(
+            "channels.equal.count = 4",
+            &[("channels.intervals", "[[4, 5]]")],
+            &["channels.intervals.0.0=4", "channels.intervals.0.1=5"],
+        );
+        check("materials.w.diffuse.reflectance = 1", &[("materials.w.black", "{}")], &["materials.w.black={}"]);
+        check(
+            "[[objects]]\nmesh = \"a\"\ngroup = \"g\"\nmaterial = \"w\"",
+            &[("objects.0.sphere", "{ radius = 1.5 }")],
+            &["objects.0.material=w", "objects.0.sphere.radius=1.5"],
+        );
+        check("e = { file = \"x\", column = \"c\" }", &[("e.blackbody", "300")], &["e.blackbody=300"]);
+        check("objects = []", &[("objects.0.material", "red")], &["objects.0.material=red"]);
+        check("p = [1, 2, 3]", &[("p.1", "-4e1")], &["p.0=1", "p.1=-40.0", "p.2=3"]);
+        check("m.\"my paint\".k = 1", &[("m.\"my paint\".k", "dpept-pixel")], &["m.\"my paint\".k=dpept-pixel"]);
+    }
+
+    #[test]
+    fn refusals_name_the_argument() {
+        for (key, value, words) in [
+            ("a..b", "1", "not a dotted key"),
+            ("", "1", "not a dotted key"),
+            ("a=1\nb", "1", "not a dotted key"),
+            ("p.7", "1", "no index of `p`"),
+            ("p.x", "1", "no index of `p`"),
+            ("n.x", "1", "has no keys"),
+            ("n", "[1,", "not valid TOML"),
+            ("n", "", "not valid TOML"),
+        ] {
+            let (_, messages) = applied("p = [1]\nn = 3", &[(key, value)]);
+            assert_eq!(messages.len(), 1, "{key}={value}");
+            assert!(
+                messages[0].starts_with(&format!("--set {key}={value}")) && messages[0].contains(words),
+                "{messages:?}"
+            );
+        }
+    }
+}

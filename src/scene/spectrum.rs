@@ -1,0 +1,418 @@
+//! Spectra: named ones (`[spectra]`) and those written where they are used; from any source to a [`Curve`].
+
+use std::collections::HashMap;
+use std::path::PathBuf;
+
+use super::context::Context;
+use super::decode::{Item, Keys, did_you_mean, list};
+use super::overrides::SPECTRUM_SOURCES;
+use super::tree::{Origin, Value};
+use super::{Spectrum, SpectrumId};
+use crate::error::Problem;
+use crate::format::text;
+use crate::spectral::{Channels, Curve, Outside, upsample};
+
+/// Wavelengths, in nm, far beyond any channel, between which a curve's peak is looked for.
+const SHORTEST: f64 = 1e-3;
+const LONGEST: f64 = 1e15;
+/// Sums and products of a few radiances beyond this leave f32.
+const BRIGHTEST: f64 = 1e35;
+
+/// What a spectrum describes: decides the allowed values, what a table means beyond its ends, and what `rgb` is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Quantity {
+    /// Dimensionless, in [0, 1]; held beyond its table, with a warning.
+    Reflectance,
+    /// W m⁻² sr⁻¹ nm⁻¹, not negative; zero beyond its table.
+    Radiance,
+}
+
+impl Quantity {
+    fn allows(self, value: f64) -> bool {
+        match self {
+            Quantity::Reflectance => (0.0..=1.0).contains(&value),
+            Quantity::Radiance => (0.0..=BRIGHTEST).contains(&value),
+        }
+    }
+
+    fn range(self) -> &'static str {
+        match self {
+            Quantity::Reflectance => "a reflectance must lie in [0, 1]",
+            Quantity::Radiance => "a radiance must lie in [0, 1e35]",
+        }
+    }
+}
+
+/// A spectrum as written, before it is known what it describes.
+#[derive(Debug, Clone)]
+struct Source<'a> {
+    data: Data,
+    scale: f64,
+    outside: Option<Outside>,
+    /// The key and place of what `data` was made from.
+    path: String,
+    at: &'a Origin,
+}
+
+#[derive(Debug, Clone)]
+enum Data {
+    Constant(f64),
+    Blackbody(f64),
+    Table {
+        nm: Vec<f64>,
+        value: Vec<f64>,
+        /// The file, and the line of each value in it.
+        lines: Option<(PathBuf, Vec<usize>)>,
+    },
+    Rgb([f64; 3]),
+}
+
+/// A checked spectrum; [`Spectra::take`] makes it part of the scene.
+pub type Handle = usize;
+
+/// A checked curve and what to say about it if the scene uses it.
+struct Checked {
+    name: String,
+    curve: Curve,
+    warnings: Vec<String>,
+    taken: Option<SpectrumId>,
+}
+
+/// All spectra of a scene: the named ones, and every one that was asked for.
+pub struct Spectra<'a> {
+    cx: &'a Context<'a>,
+    /// `None` where the definition is wrong, which has been said.
+    named: Vec<(&'a str, Option<Source<'a>>)>,
+    /// Curves already made from a name.
+    by_name: HashMap<(String, Quantity), Option<Handle>>,
+    checked: Vec<Checked>,
+    /// In the order of their first use.
+    scene: Vec<Spectrum>,
+    channels: Option<Channels>,
+}
+
+const KEYS: Keys =
+    Keys::new(&["file", "constant", "blackbody", "samples", "regular", "rgb", "column", "scale", "outside"])
+        .later(&["texture", "endmembers"]);
+
+impl<'a> Spectra<'a> {
+    /// Decodes `[spectra]`. `channels` decide what a table leaves uncovered.
+    pub fn new(cx: &'a Context<'a>, item: Option<Item<'a>>, channels: Option<Channels>) -> Self {
+        let items = item.and_then(|item| item.named_items()).unwrap_or_default();
+        let define = |(name, item): (&'a str, Item<'a>)| match item.node.value {
+            Value::String(_) => {
+                item.error_help(
+                    "must be a number or a table, but is a string",
+                    "write e.g. { file = \"spectrum.csv\" } or { constant = 0.5 }",
+                );
+                (name, None)
+            }
+            _ => (name, source(&item)),
+        };
+        let named = items.into_iter().map(define).collect();
+        Spectra { cx, named, by_name: HashMap::new(), checked: Vec::new(), scene: Vec::new(), channels }
+    }
+
+    /// The spectrum that `item` names or spells, checked for what it is to describe.
+    pub fn resolve(&mut self, item: &Item<'a>, quantity: Quantity) -> Option<Handle> {
+        let Value::String(name) = &item.node.value else {
+            let source = source(item)?;
+            return self.check(&source, &item.path, item, quantity);
+        };
+        let Some((_, definition)) = self.named.iter().find(|(known, _)| known == name) else {
+            let names = self.named.iter().map(|(name, _)| *name);
+            let help = if name.contains(['.', '/']) {
+                format!("for a file write {{ file = \"{}\" }}", name.escape_debug())
+            } else {
+                did_you_mean(name, names.clone()).unwrap_or_else(|| match self.named.len() {
+                    0 => format!("define it: [spectra.{name}]"),
+                    _ => format!("[spectra] has {}", list(names)),
+                })
+            };
+            item.error_help(format!("no spectrum is named \"{name}\""), help);
+            return None;
+        };
+        let key = (name.clone(), quantity);
+        if let Some(known) = self.by_name.get(&key) {
+            return *known;
+        }
+        let handle = definition.clone().and_then(|source| self.check(&source, name, item, quantity));
+        self.by_name.insert(key, handle);
+        handle
+    }
+
+    /// The index of a checked spectrum in the scene. Equal curves share one.
+    pub fn take(&mut self, handle: Handle) -> SpectrumId {
+        let spectrum = &mut self.checked[handle];
+        if let Some(id) = spectrum.taken {
+            return id;
+        }
+        spectrum.warnings.drain(..).for_each(|warning| self.cx.warn(warning));
+        let same = self.scene.iter().position(|other| other.curve == spectrum.curve);
+        let id = same.unwrap_or_else(|| {
+            self.scene.push(Spectrum { name: spectrum.name.clone(), curve: spectrum.curve.clone() });
+            self.scene.len() - 1
+        });
+        spectrum.taken = Some(id);
+        id
+    }
+
+    /// `handle`, a radiance, times the number of at least 0 that `item` holds.
+    pub fn scaled(&mut self, handle: Handle, item: &Item) -> Option<Handle> {
+        let factor = item.not_negative()?;
+        let Checked { name, curve, warnings, .. } = &self.checked[handle];
+        let (name, warnings, mut curve) = (name.clone(), warnings.clone(), curve.clone());
+        match &mut curve {
+            Curve::Constant(value) => *value *= factor,
+            Curve::Blackbody { scale, .. } => *scale *= factor,
+            Curve::Linear { value, .. } => value.iter_mut().for_each(|v| *v *= factor),
+        }
+        let peak = curve.max(SHORTEST, LONGEST);
+        if !Quantity::Radiance.allows(peak) {
+            item.error(format!("{}, but is {peak:e} after scaling", Quantity::Radiance.range()));
+            return None;
+        }
+        self.checked.push(Checked { name, curve, warnings, taken: None });
+        Some(self.checked.len() - 1)
+    }
+
+    /// The spectra in use.
+    pub fn finish(self) -> Vec<Spectrum> {
+        self.scene
+    }
+
+    fn check(&mut self, source: &Source<'a>, name: &str, user: &Item<'a>, quantity: Quantity) -> Option<Handle> {
+        let used_by =
+            if source.path.starts_with(&user.path) { String::new() } else { format!("; used by `{}`", user.path) };
+        let refuse = |value: String| {
+            let message = format!("{}, but is {value}{used_by}", quantity.range());
+            self.cx.error(source.at, &source.path, message, None);
+        };
+        let mut warnings = Vec::new();
+        let default_outside = match quantity {
+            Quantity::Reflectance => Outside::Hold,
+            Quantity::Radiance => Outside::Zero,
+        };
+        let scaled = |value: f64| {
+            let text =
+                if source.scale == 1.0 { value.to_string() } else { format!("{value} x scale {}", source.scale) };
+            (value * source.scale, text)
+        };
+        let curve = match &source.data {
+            Data::Constant(value) => {
+                let (value, text) = scaled(*value);
+                if !quantity.allows(value) {
+                    refuse(text);
+                    return None;
+                }
+                Curve::Constant(value)
+            }
+            Data::Blackbody(kelvin) => {
+                let curve = Curve::Blackbody { kelvin: *kelvin, scale: source.scale };
+                let peak = curve.max(SHORTEST, LONGEST);
+                if !quantity.allows(peak) {
+                    refuse(format!("{peak:e} at the peak of the black body"));
+                    return None;
+                }
+                curve
+            }
+            Data::Table { nm, value, lines } => {
+                if let Some(i) = value.iter().position(|v| !quantity.allows(scaled(*v).0)) {
+                    let text = format!("{} at {} nm", scaled(value[i]).1, nm[i]);
+                    match lines {
+                        None => refuse(text),
+                        Some((file, lines)) => self.cx.push(Problem {
+                            file: file.clone(),
+                            line: Some(lines[i]),
+                            key: Some(user.path.clone()),
+                            message: format!("{}, but is {text}", quantity.range()),
+                            ..Problem::default()
+                        }),
+                    }
+                    return None;
+                }
+                if quantity == Quantity::Reflectance && source.outside.is_none() {
+                    warnings.extend(self.uncovered(nm[0], nm[nm.len() - 1]).map(|gap| {
+                        format!("spectrum `{name}` (a reflectance) does not cover {gap}: its end values are held there")
+                    }));
+                }
+                let outside = source.outside.unwrap_or(default_outside);
+                let value = value.iter().map(|v| v * source.scale).collect();
+                Curve::Linear { nm: nm.clone(), value, outside }
+            }
+            Data::Rgb(rgb) => {
+                let colour = rgb.map(|v| v * source.scale);
+                if !colour.iter().all(|v| quantity.allows(*v)) {
+                    refuse(format!(
+                        "rgb = {rgb:?}{}",
+                        if source.scale == 1.0 { String::new() } else { format!(" x scale {}", source.scale) }
+                    ));
+                    return None;
+                }
+                let curve = match quantity {
+                    Quantity::Reflectance => upsample::reflectance(colour),
+                    Quantity::Radiance => upsample::emission(colour),
+                };
+                self.rgb_outside(curve, source.outside, name, &mut warnings)
+            }
+        };
+        self.checked.push(Checked { name: name.to_owned(), curve, warnings, taken: None });
+        Some(self.checked.len() - 1)
+    }
+
+    /// An upsampled colour means something in the visible only: beyond, its ends are held with a warning, or as the
+    /// scene says.
+    fn rgb_outside(&self, curve: Curve, written: Option<Outside>, name: &str, warnings: &mut Vec<String>) -> Curve {
+        let (first, last) = (f64::from(upsample::FIRST_NM), f64::from(upsample::LAST_NM));
+        if written.is_none() {
+            warnings.extend(self.uncovered(first, last).map(|gap| {
+                format!("spectrum `{name}` (rgb) says nothing about {gap}, outside the visible: its end values are held there")
+            }));
+        }
+        match (curve, written) {
+            (Curve::Linear { nm, value, .. }, Some(outside)) => Curve::Linear { nm, value, outside },
+            (Curve::Constant(v), Some(Outside::Zero)) => {
+                Curve::Linear { nm: vec![first, last], value: vec![v, v], outside: Outside::Zero }
+            }
+            (curve, _) => curve,
+        }
+    }
+
+    /// The parts of the channels below `first` and above `last` nm, in words.
+    fn uncovered(&self, first: f64, last: f64) -> Option<String> {
+        let bounds = &self.channels.as_ref()?.bounds;
+        let hull = |parts: &mut dyn Iterator<Item = [f64; 2]>| {
+            parts.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).map(|[a, b]| format!("{a}-{b} nm"))
+        };
+        let below = hull(&mut bounds.iter().filter(|b| b[0] < first).map(|b| [b[0], b[1].min(first)]));
+        let above = hull(&mut bounds.iter().filter(|b| b[1] > last).map(|b| [b[0].max(last), b[1]]));
+        let gaps: Vec<String> = [below, above].into_iter().flatten().collect();
+        (!gaps.is_empty()).then(|| gaps.join(" and "))
+    }
+}
+
+/// A spectrum written as a number or a table.
+fn source<'a>(item: &Item<'a>) -> Option<Source<'a>> {
+    let Value::Table(entries) = &item.node.value else {
+        if !matches!(item.node.value, Value::Integer(_) | Value::Float(_)) {
+            item.error_help(
+                format!("must be a spectrum, but is {}", item.node.value.kind()),
+                "write a name, a number, or a table such as { file = \"spectrum.csv\" }",
+            );
+            return None;
+        }
+        let data = Data::Constant(item.number()?);
+        return Some(Source { data, scale: 1.0, outside: None, path: item.path.clone(), at: item.at });
+    };
+    let fields = item.table(KEYS)?;
+    if entries.iter().any(|e| KEYS.later.contains(&e.key.as_str())) {
+        return None;
+    }
+    let kind = fields.exactly_one(&SPECTRUM_SOURCES, "spectrum source");
+    let scale = match fields.get("scale") {
+        Some(item) => item.not_negative(),
+        None => Some(1.0),
+    };
+    let outside = match fields.get("outside") {
+        Some(item) => Some(item.choice(&[("zero", Outside::Zero), ("hold", Outside::Hold)])?),
+        None => None,
+    };
+    let kind = kind?;
+    let data = match kind.path.rsplit('.').next() {
+        Some("file") => file(&kind, fields.get("column")),
+        Some("constant") => kind.number().map(Data::Constant),
+        Some("blackbody") => kind.positive().map(Data::Blackbody),
+        Some("samples") => samples(&kind),
+        Some("regular") => regular(&kind),
+        _ => kind.numbers::<3>("three numbers [r, g, b]").map(Data::Rgb),
+    }?;
+    if let (Some(column), false) = (fields.get("column"), fields.has("file")) {
+        column.error_help("goes with `file` only", "remove it");
+        return None;
+    }
+    if outside.is_some() && matches!(data, Data::Constant(_) | Data::Blackbody(_)) {
+        item.cx.warn(format!("`{}.outside` has no effect: the spectrum is not a table", item.path));
+    }
+    Some(Source { data, scale: scale?, outside, path: kind.path, at: kind.at })
+}
+
+fn file(item: &Item, column: Option<Item>) -> Option<Data> {
+    let path = item.cx.path(item.text()?);
+    let column = match &column {
+        Some(column) => Some(column.text()?),
+        None => None,
+    };
+    let is_yaml = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("yml") || e.eq_ignore_ascii_case("yaml"));
+    if is_yaml {
+        item.error_help("refractiveindex.info YAML is not supported yet", "use a CSV file of `nm,value` lines");
+        return None;
+    }
+    match text::read_spectrum(&path, column) {
+        Ok(table) => Some(Data::Table { nm: table.nm, value: table.value, lines: Some((path, table.line)) }),
+        Err(problem) => {
+            report_in_file(item, *problem);
+            None
+        }
+    }
+}
+
+/// A mistake in a file that `item` names: at its line there, or, if the file as a whole is wrong, at the item.
+pub fn report_in_file(item: &Item, problem: Problem) {
+    if problem.line.is_some() {
+        item.cx.push(Problem { key: Some(item.path.clone()), ..problem });
+    } else {
+        let message = format!("{} {}", problem.file.display(), problem.message);
+        item.cx.error(item.at, &item.path, message, problem.help);
+    }
+}
+
+fn samples(item: &Item) -> Option<Data> {
+    let items = item.array()?;
+    if items.len() < 2 {
+        item.error_help(format!("must have at least two [nm, value] pairs, but has {}", items.len()), "use `constant`");
+        return None;
+    }
+    let mut pairs: Vec<Option<[f64; 2]>> = Vec::with_capacity(items.len());
+    for (i, item) in items.iter().enumerate() {
+        let pair = item.numbers::<2>("a pair [nm, value]").filter(|[nm, _]| {
+            let before = |k: usize| i.checked_sub(k).and_then(|j| pairs[j]).map_or(0.0, |p| p[0]);
+            let ascending = *nm > 0.0 && *nm >= before(1) && (i < 2 || *nm > before(2));
+            if !ascending {
+                item.error_help(
+                    format!("wavelengths must be above 0 and ascend, but {nm} follows {}", before(1)),
+                    "sort the pairs; two equal wavelengths make a step",
+                );
+            }
+            ascending
+        });
+        pairs.push(pair);
+    }
+    let pairs: Vec<[f64; 2]> = pairs.into_iter().collect::<Option<_>>()?;
+    let (nm, value) = pairs.into_iter().map(|[nm, value]| (nm, value)).unzip();
+    Some(Data::Table { nm, value, lines: None })
+}
+
+fn regular(item: &Item) -> Option<Data> {
+    let fields = item.table(Keys::new(&["from", "to", "values"]))?;
+    const EXAMPLE: &str = "all of { from = 400, to = 700, values = [0.1, 0.8] }";
+    let bound = |key: &str| fields.require(key, EXAMPLE).and_then(|item| item.positive());
+    let (from, to, values) = (bound("from"), bound("to"), fields.require("values", EXAMPLE));
+    let values = values.and_then(|item| {
+        let items = item.array()?;
+        if items.len() < 2 {
+            item.error(format!("must have at least two values, but has {}", items.len()));
+            return None;
+        }
+        let numbers: Vec<_> = items.iter().map(Item::number).collect();
+        numbers.into_iter().collect::<Option<Vec<f64>>>()
+    });
+    let (from, to) = (from?, to?);
+    if from >= to {
+        fields.get("from")?.error_help(format!("`from` must be less than `to`, but {from} ≥ {to}"), "exchange them");
+        return None;
+    }
+    let value = values?;
+    let last = value.len() - 1;
+    let nm = (0..=last).map(|i| if i == last { to } else { from + (to - from) * (i as f64 / last as f64) }).collect();
+    Some(Data::Table { nm, value, lines: None })
+}

@@ -1,0 +1,327 @@
+//! Colour: from a spectrum over channels to CIE XYZ and linear sRGB, and from a linear picture to 8-bit sRGB.
+//!
+//! What a cube's preview shows is a fixed linear function of a pixel's channels, a [`Projection`]. Exposure and the
+//! sRGB transfer function come later, when a picture is shown or written.
+
+use std::sync::OnceLock;
+
+use super::data::{CIE1931, columns};
+use super::{Channels, Curve, Outside};
+
+/// CIE XYZ (D65 white, Y = 1) to linear sRGB, from the primaries and the white point of IEC 61966-2-1.
+pub const XYZ_TO_LINEAR_SRGB: [[f64; 3]; 3] = [
+    [3.240_969_941_904_521, -1.537_383_177_570_093, -0.498_610_760_293],
+    [-0.969_243_636_280_87, 1.875_967_501_507_72, 0.041_555_057_407_175],
+    [0.055_630_079_696_993, -0.203_976_958_888_976, 1.056_971_514_242_878],
+];
+
+/// Share of each of ∫x̄, ∫ȳ and ∫z̄ that the channels must cover for XYZ to stand for what an eye would see.
+const VISIBLE_SHARE: f64 = 0.95;
+
+/// The colour matching functions x̄, ȳ, z̄ of the CIE 1931 2° standard observer over nm; zero outside 360–830 nm.
+pub fn cie1931() -> &'static [Curve; 3] {
+    static OBSERVER: OnceLock<[Curve; 3]> = OnceLock::new();
+    OBSERVER.get_or_init(|| {
+        let rows: Vec<[f64; 4]> = columns(CIE1931).collect();
+        std::array::from_fn(|i| Curve::Linear {
+            nm: rows.iter().map(|row| row[0]).collect(),
+            value: rows.iter().map(|row| row[i + 1]).collect(),
+            outside: Outside::Zero,
+        })
+    })
+}
+
+/// ∫x̄ dλ, ∫ȳ dλ and ∫z̄ dλ over all wavelengths, in nm.
+fn observer_integrals() -> [f64; 3] {
+    cie1931().each_ref().map(|curve| curve.mean(300.0, 900.0) * 600.0)
+}
+
+/// Per channel, what 1 W m⁻² sr⁻¹ nm⁻¹ in it adds to X, Y and Z: ∫ x̄/n dλ over the channel, divided by ∫ȳ dλ, where
+/// n(λ) is the number of channels that cover λ.
+///
+/// So radiance that is constant within each channel is integrated exactly, whatever their widths, gaps count nothing,
+/// and where channels overlap their mean counts; a constant 1 over the whole visible has Y = 1.
+pub fn xyz_weights(channels: &Channels) -> Vec<[f64; 3]> {
+    let running = RunningIntegral::new(channels);
+    let luminous = observer_integrals()[1];
+    let weight = |from, to| {
+        let (a, b) = (running.at(from), running.at(to));
+        std::array::from_fn(|i| (b[i] - a[i]) / luminous)
+    };
+    channels.bounds.iter().map(|&[from, to]| weight(from, to)).collect()
+}
+
+/// ∫ x̄/n, ∫ ȳ/n and ∫ z̄/n from the lowest channel bound up to each bound. A running integral costs one sort where
+/// going through each channel's overlaps would cost K².
+struct RunningIntegral {
+    nm: Vec<f64>,
+    value: Vec<[f64; 3]>,
+}
+
+impl RunningIntegral {
+    fn new(channels: &Channels) -> Self {
+        let mut ends: Vec<(f64, i64)> = channels.bounds.iter().flat_map(|b| [(b[0], 1), (b[1], -1)]).collect();
+        ends.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (mut nm, mut value) = (vec![ends[0].0], vec![[0.0; 3]]);
+        let (mut covering, mut sum) = (0, [0.0; 3]);
+        for (end, step) in ends {
+            let from = nm[nm.len() - 1];
+            if end > from {
+                if covering > 0 {
+                    for (sum, curve) in sum.iter_mut().zip(cie1931()) {
+                        *sum += curve.mean(from, end) * (end - from) / covering as f64;
+                    }
+                }
+                nm.push(end);
+                value.push(sum);
+            }
+            covering += step;
+        }
+        RunningIntegral { nm, value }
+    }
+
+    /// The integral up to `nm`, which is a bound of some channel.
+    fn at(&self, nm: f64) -> [f64; 3] {
+        self.value[self.nm.partition_point(|&x| x < nm)]
+    }
+}
+
+/// How the preview makes red, green and blue out of the channels of a pixel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Projection {
+    pub kind: ProjectionKind,
+    /// (channel, its weights in R, G, B), channels without weight left out.
+    weights: Vec<(usize, [f64; 3])>,
+}
+
+/// What the preview shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ProjectionKind {
+    /// Linear sRGB of XYZ: what an eye would see.
+    Xyz,
+    /// The radiance of three channels as R, G, B.
+    FalseColour([usize; 3]),
+}
+
+impl Projection {
+    /// The projection for these channels: `channels.false_colour` where given, else XYZ where the visible is covered,
+    /// else the channels of lowest, middle and highest centre wavelength as R, G, B.
+    ///
+    /// *The visible is covered* when the union of the channels holds at least 95 % of each of ∫x̄, ∫ȳ and ∫z̄ dλ and
+    /// at least three channels take part: fewer carry no hue.
+    pub fn new(channels: &Channels) -> Self {
+        if let Some(rgb) = channels.false_colour {
+            return Self::false_colour(rgb);
+        }
+        let xyz = xyz_weights(channels);
+        if covers_the_visible(&xyz) {
+            return Self::xyz(&xyz);
+        }
+        let mut order: Vec<usize> = (0..channels.len()).collect();
+        order.sort_by(|&a, &b| channels.centre(a).total_cmp(&channels.centre(b)));
+        let last = order.len() - 1;
+        Self::false_colour([order[0], order[last / 2], order[last]])
+    }
+
+    fn xyz(xyz: &[[f64; 3]]) -> Self {
+        let weights = xyz
+            .iter()
+            .enumerate()
+            .filter(|(_, weight)| weight.iter().any(|&w| w != 0.0))
+            .map(|(k, weight)| (k, xyz_to_linear_srgb(*weight)))
+            .collect();
+        Projection { kind: ProjectionKind::Xyz, weights }
+    }
+
+    fn false_colour(rgb: [usize; 3]) -> Self {
+        let mut weights: Vec<(usize, [f64; 3])> = Vec::new();
+        for (i, k) in rgb.into_iter().enumerate() {
+            match weights.iter_mut().find(|w| w.0 == k) {
+                Some(weight) => weight.1[i] = 1.0,
+                None => weights.push((k, std::array::from_fn(|j| if i == j { 1.0 } else { 0.0 }))),
+            }
+        }
+        Projection { kind: ProjectionKind::FalseColour(rgb), weights }
+    }
+
+    /// Linear R, G, B of one pixel, from its K channels.
+    pub fn rgb(&self, spectrum: &[f32]) -> [f32; 3] {
+        let mut rgb = [0.0; 3];
+        for (k, weight) in &self.weights {
+            let radiance = f64::from(spectrum[*k]);
+            for i in 0..3 {
+                rgb[i] += weight[i] * radiance;
+            }
+        }
+        rgb.map(|v| v as f32)
+    }
+}
+
+/// Whether XYZ from channels of these weights shows what an eye would see (see [`Projection::new`]).
+fn covers_the_visible(xyz: &[[f64; 3]]) -> bool {
+    let integrals = observer_integrals();
+    let taking_part = xyz.iter().filter(|weight| weight[1] > 0.0).count();
+    let covered = |i: usize| xyz.iter().map(|weight| weight[i]).sum::<f64>() * integrals[1] / integrals[i];
+    taking_part >= 3 && (0..3).all(|i| covered(i) >= VISIBLE_SHARE)
+}
+
+/// Linear sRGB of CIE XYZ; negative components are colours outside the gamut.
+pub fn xyz_to_linear_srgb(xyz: [f64; 3]) -> [f64; 3] {
+    XYZ_TO_LINEAR_SRGB.map(|row| row[0] * xyz[0] + row[1] * xyz[1] + row[2] * xyz[2])
+}
+
+/// The sRGB transfer function (IEC 61966-2-1): linear 0…1 to encoded 0…1.
+pub fn srgb_encode(linear: f64) -> f64 {
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// A linear picture: rows from the top, R, G, B interleaved; NaN where nothing is rendered yet.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Picture {
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    pub rgb: Vec<f32>,
+}
+
+impl Picture {
+    /// The exposure in EV (a factor of 2^EV) that brings the 99th percentile of the largest component, over the
+    /// pixels with any light, to 1. A picture without light has exposure 0.
+    pub fn auto_exposure(&self) -> f64 {
+        let mut light: Vec<f32> =
+            self.rgb.chunks_exact(3).map(|p| p[0].max(p[1]).max(p[2])).filter(|v| v.is_finite() && *v > 0.0).collect();
+        if light.is_empty() {
+            return 0.0;
+        }
+        let rank = (light.len() - 1) * 99 / 100;
+        let (_, percentile, _) = light.select_nth_unstable_by(rank, f32::total_cmp);
+        -f64::from(*percentile).log2()
+    }
+
+    /// 8-bit sRGB at an exposure of `ev`. What is brighter than 1 or outside the gamut is cut to 0…255, what is not
+    /// rendered yet is black.
+    pub fn to_srgb8(&self, ev: f64) -> Vec<u8> {
+        let scale = ev.exp2();
+        // `as u8` saturates, and sends NaN to 0.
+        self.rgb.iter().map(|&v| (255.0 * srgb_encode(f64::from(v) * scale) + 0.5).floor() as u8).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sum(weights: &[[f64; 3]]) -> [f64; 3] {
+        weights.iter().fold([0.0; 3], |s, w| std::array::from_fn(|i| s[i] + w[i]))
+    }
+
+    fn channels(bounds: &[[f64; 2]]) -> Channels {
+        Channels::from_bounds(bounds.to_vec(), None)
+    }
+
+    /// Known sums of the 1 nm table: ∫x̄ = 106.865, ∫ȳ = 106.857, ∫z̄ = 106.892 nm.
+    #[test]
+    fn observer_has_its_published_sums() {
+        for (got, expected) in observer_integrals().into_iter().zip([106.865, 106.857, 106.892]) {
+            assert!((got - expected).abs() < 1e-3, "{got} {expected}");
+        }
+    }
+
+    /// The matrix from the primaries' chromaticities and white (0.3127, 0.3290), independently of its digits above.
+    #[test]
+    fn matrix_follows_from_the_primaries() {
+        let xyz = |x: f64, y: f64| [x / y, 1.0, (1.0 - x - y) / y];
+        let primaries = [xyz(0.64, 0.33), xyz(0.30, 0.60), xyz(0.15, 0.06)];
+        assert_eq!(xyz_to_linear_srgb(xyz(0.3127, 0.3290)).map(|v| (v * 1e6).round()), [1e6; 3]);
+        for (i, primary) in primaries.into_iter().enumerate() {
+            for (j, v) in xyz_to_linear_srgb(primary).into_iter().enumerate() {
+                assert!(if i == j { v > 0.1 } else { v.abs() < 1e-9 }, "primary {i} component {j}: {v}");
+            }
+        }
+    }
+
+    #[test]
+    fn constant_radiance_has_unit_luminance_for_any_partition() {
+        let whole = channels(&[[360.0, 830.0]]);
+        let uneven = channels(&[[700.0, 830.0], [360.0, 361.3], [361.3, 555.55], [555.55, 700.0]]);
+        let fine = Channels::equal(360.0, 830.0, 997);
+        for c in [whole, uneven, fine] {
+            let total = sum(&xyz_weights(&c));
+            assert!((total[1] - 1.0).abs() < 1e-12, "{total:?}");
+            assert!((total[0] - 106.865 / 106.857).abs() < 1e-5 && (total[2] - 106.892 / 106.857).abs() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn overlaps_share_and_gaps_count_nothing() {
+        let plain = xyz_weights(&channels(&[[400.0, 500.0], [500.0, 600.0], [600.0, 700.0]]));
+        let twice = xyz_weights(&channels(&[[400.0, 500.0], [500.0, 600.0], [500.0, 600.0], [600.0, 700.0]]));
+        for i in 0..3 {
+            assert!((twice[1][i] - 0.5 * plain[1][i]).abs() < 1e-14 && twice[1] == twice[2]);
+        }
+        let partly = xyz_weights(&channels(&[[400.0, 600.0], [500.0, 700.0]]));
+        assert!((sum(&partly)[1] - sum(&plain)[1]).abs() < 1e-14);
+        let (left, middle) = (partly[0][1], plain[1][1]);
+        assert!((left - (plain[0][1] + 0.5 * middle)).abs() < 1e-14);
+        let gap = xyz_weights(&channels(&[[400.0, 500.0], [600.0, 700.0], [8000.0, 12000.0]]));
+        for i in 0..3 {
+            assert!((gap[0][i] - plain[0][i]).abs() < 1e-15 && (gap[1][i] - plain[2][i]).abs() < 1e-14);
+        }
+        assert_eq!(gap[2], [0.0; 3]);
+    }
+
+    #[test]
+    fn projection_is_xyz_only_where_the_visible_is_covered() {
+        assert_eq!(Projection::new(&Channels::equal(380.0, 780.0, 8)).kind, ProjectionKind::Xyz);
+        assert_eq!(Projection::new(&Channels::equal(405.0, 700.0, 59)).kind, ProjectionKind::Xyz);
+        assert_eq!(Projection::new(&Channels::equal(380.0, 20_000.0, 2000)).kind, ProjectionKind::Xyz);
+        let false_colour = |c: &Channels| match Projection::new(c).kind {
+            ProjectionKind::FalseColour(rgb) => rgb,
+            kind => panic!("{kind:?}"),
+        };
+        assert_eq!(false_colour(&Channels::equal(380.0, 780.0, 1)), [0, 0, 0]);
+        assert_eq!(false_colour(&Channels::equal(380.0, 780.0, 2)), [0, 0, 1]);
+        assert_eq!(false_colour(&Channels::equal(380.0, 600.0, 40)), [0, 19, 39]);
+        assert_eq!(false_colour(&channels(&[[8e3, 9e3], [3e3, 4e3], [4e3, 5e3]])), [1, 2, 0]);
+        let asked = Channels { false_colour: Some([2, 0, 0]), ..Channels::equal(380.0, 780.0, 8) };
+        assert_eq!(false_colour(&asked), [2, 0, 0]);
+        let spectrum = [0.1, 0.2, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0];
+        assert_eq!(Projection::new(&asked).rgb(&spectrum), [0.3, 0.1, 0.1]);
+    }
+
+    /// VALIDATION section 1.8: D65 has x, y = 0.31271, 0.32902; it is the white of sRGB.
+    #[test]
+    fn daylight_is_white() {
+        let (nm, value) = columns::<2>(super::super::data::D65).map(|[nm, value]| (nm, value)).unzip();
+        let curve = Curve::Linear { nm, value, outside: Outside::Zero };
+        let channels = Channels::equal(360.0, 780.0, 420);
+        let spectrum: Vec<f32> = (0..420).map(|k| curve.mean(360.0 + k as f64, 361.0 + k as f64) as f32).collect();
+        let xyz = xyz_weights(&channels).iter().zip(&spectrum).fold([0.0; 3], |s, (w, &l)| {
+            std::array::from_fn(|i| s[i] + w[i] * f64::from(l)) //
+        });
+        let total: f64 = xyz.iter().sum();
+        assert!((xyz[0] / total - 0.31271).abs() < 5e-5 && (xyz[1] / total - 0.32902).abs() < 5e-5, "{xyz:?}");
+        let rgb = Projection::new(&channels).rgb(&spectrum).map(|v| f64::from(v) / xyz[1]);
+        assert!(rgb.iter().all(|v| (v - 1.0).abs() < 1e-3), "{rgb:?}");
+    }
+
+    #[test]
+    fn transfer_function_and_exposure() {
+        assert_eq!(srgb_encode(0.0), 0.0);
+        assert!((srgb_encode(1.0) - 1.0).abs() < 1e-12);
+        assert!((srgb_encode(0.18) - 0.461_356).abs() < 1e-6);
+        assert!((srgb_encode(0.003_130_8) - srgb_encode(0.003_130_800_1)).abs() < 1e-6);
+        let pixel = |v: f32| [0.0, v, v / 2.0];
+        let picture = |values: &[f32]| Picture {
+            size: [values.len() as u32, 1],
+            rgb: values.iter().flat_map(|&v| pixel(v)).collect(),
+        };
+        let ramp: Vec<f32> = (0..=100).map(|i| i as f32 / 25.0 + 0.04).collect();
+        assert_eq!(picture(&ramp).auto_exposure(), -f64::from(ramp[99]).log2());
+        // Unlit and missing pixels do not count.
+        assert_eq!(picture(&[0.0, 0.0, f32::NAN, 0.25]).auto_exposure(), 2.0);
+        assert_eq!(picture(&[0.0, f32::NAN]).auto_exposure(), 0.0);
+        let bytes = picture(&[1.0, f32::NAN, 7.0, -1.0]).to_srgb8(0.0);
+        assert_eq!(bytes, [0, 255, 188, 0, 0, 0, 0, 255, 255, 0, 0, 0]);
+        assert_eq!(picture(&[0.5]).to_srgb8(1.0), [0, 255, 188]);
+    }
+}

@@ -1,0 +1,14 @@
+//! The tables that are built in, under `data/` with their sources.
+
+/// CIE 1931 2° colour matching functions: nm, x̄, ȳ, z̄, every nm from 360 to 830.
+pub const CIE1931: &str = include_str!("data/cie1931_2deg_1nm.csv");
+/// CIE standard illuminant D65: nm, relative power, every 5 nm from 300 to 780.
+pub const D65: &str = include_str!("data/d65_300-780_5nm.csv");
+
+/// The numbers of a built-in table; comments and the header are the lines that do not begin with a digit.
+pub fn columns<const N: usize>(table: &'static str) -> impl Iterator<Item = [f64; N]> {
+    table.lines().filter(|line| line.starts_with(|c: char| c.is_ascii_digit())).map(|line| {
+        let mut cells = line.split(',').map(|cell| cell.parse().expect("built-in tables hold numbers"));
+        std::array::from_fn(|_| cells.next().expect("built-in tables are complete"))
+    })
+}

@@ -1,0 +1,79 @@
+//! The device's traversal and triangle test against a loop over all triangles in f64.
+
+use glam::DVec3;
+use spectile::gpu::layout::Primitive;
+use spectile::render::prepare::Prepared;
+use spectile::scene::Mesh;
+
+use crate::tracer::{Ray, trace};
+use crate::{Random, black_mesh, f32s};
+
+/// Distance along the ray to a triangle in f64, with barycentric weights allowed to miss by `slack`.
+fn distance_f64(p: &Primitive, ray: &Ray, slack: impl Fn(f64, f64) -> f64) -> Option<f64> {
+    let v = |a: [f32; 3]| DVec3::from(a.map(f64::from));
+    let (a, d, o) = (v(p.a), v(ray.direction), v(ray.origin));
+    let (e1, e2) = (v(p.b) - a, v(p.c) - a);
+    let n = e1.cross(e2);
+    let det = -d.dot(n);
+    let s = o - a;
+    let w = s.cross(d);
+    let (u, v, t) = (e2.dot(w) / det, -e1.dot(w) / det, s.dot(n) / det);
+    let slack = slack(det, e1.length().max(e2.length()));
+    (u >= -slack && v >= -slack && u + v <= 1.0 + slack && t > 0.0).then_some(t)
+}
+
+/// The nearest of 2,000 triangles of all sizes, at random and along axes: what the device finds lies between the nearest
+/// hit of slightly larger and of slightly smaller triangles.
+#[test]
+fn traversal_equals_brute_force() {
+    let mut random = Random(3);
+    let mut mesh = Mesh::default();
+    for i in 0..2000u32 {
+        let (centre, size) = (random.in_cube(), 0.5 * random.next());
+        let flat = if i % 3 == 0 { DVec3::new(1.0, 1.0, 0.0) } else { DVec3::ONE };
+        mesh.positions.extend((0..3).map(|_| centre + size * flat * random.in_cube()));
+        mesh.triangles.push([3 * i, 3 * i + 1, 3 * i + 2]);
+    }
+    let prepared = Prepared::new(&black_mesh(mesh), 0).unwrap();
+    let rays: Vec<Ray> = (0..20_000)
+        .map(|i| {
+            let direction = if i % 5 == 0 { DVec3::AXES[i % 3] } else { random.direction() };
+            Ray { origin: f32s(1.2 * random.in_cube()), direction: f32s(direction) }
+        })
+        .collect();
+    let hits = trace(&prepared, &rays);
+    // Rounding of sheared coordinates up to 4: three roundings of half an ulp of 4 move a vertex by 8e-7 at most, which is
+    // worth that times the longest edge over the determinant in barycentric weight, for each of two vertices of an edge.
+    let slack = |det: f64, edge: f64| 2.0 * 8e-7 * edge / det.abs();
+    let (mut hit, mut missed) = (0, 0);
+    for (ray, found) in rays.iter().zip(&hits) {
+        assert!(!found.overflow);
+        let nearest = |sign: f64| {
+            let each = prepared.accel.primitives.iter().filter_map(|p| distance_f64(p, ray, |d, e| sign * slack(d, e)));
+            each.fold(f64::INFINITY, f64::min)
+        };
+        let (larger, smaller) = (nearest(1.0), nearest(-1.0));
+        match found.primitive {
+            Some(i) => {
+                let exact = distance_f64(&prepared.accel.primitives[i as usize], ray, slack);
+                let exact = exact.unwrap_or_else(|| panic!("{ray:?} does not meet what {found:?} says"));
+                let distance = f64::from(found.distance);
+                // The same slack, of three weights, moves the distance by at most that share of the longest edge.
+                let p = &prepared.accel.primitives[i as usize];
+                let v = |a: [f32; 3]| DVec3::from(a.map(f64::from));
+                let (e1, e2) = (v(p.b) - v(p.a), v(p.c) - v(p.a));
+                let det = DVec3::from(ray.direction.map(f64::from)).dot(e1.cross(e2));
+                let tolerance = 2e-6 + 3.0 * slack(det, e1.length().max(e2.length())) * e1.length().max(e2.length());
+                assert!((distance - exact).abs() <= tolerance, "{ray:?}: {found:?}, exactly {exact}, {tolerance:e}");
+                assert!(distance <= smaller + tolerance, "{ray:?}: {found:?} behind {smaller}");
+                assert!(distance >= larger - tolerance, "{ray:?}: {found:?} before {larger}");
+                hit += 1;
+            }
+            None => {
+                assert_eq!(smaller, f64::INFINITY, "{ray:?} misses what is {smaller} away");
+                missed += 1;
+            }
+        }
+    }
+    assert!(hit > 3000 && missed > 1000, "{hit} hits, {missed} misses: a poor test");
+}

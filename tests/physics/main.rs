@@ -1,0 +1,45 @@
+//! The GPU renderer against closed forms (VALIDATION sections 1.1, 1.2, 1.6, 1.7).
+//!
+//! Bounds as in `statistics`: Student t at ALPHA = 1e-4 per test, Sidak over channels, fixed seeds, plus a stated f32
+//! allowance. Resolutions of 0.2 to 0.4 % mean that a wrong factor of 1 to 2 % in any of these would fail.
+
+#[path = "../device/mod.rs"]
+mod device;
+#[path = "../scene_builder/mod.rs"]
+mod scene_builder;
+#[path = "../statistics/mod.rs"]
+mod statistics;
+
+mod cavities;
+mod irradiance;
+mod sides;
+mod spectra;
+
+use device::{Settings, render};
+use spectile::scene::Scene;
+use spectile::spectral::{Curve, Outside};
+use statistics::*;
+
+/// 16 x 16 pixels that look along one ray, `epochs` times 64 samples: replicas of one measurement.
+fn measure(mut scene: Scene, epochs: u32, seed: u64) -> Vec<Estimate> {
+    scene.film.width = 16;
+    scene.film.height = 16;
+    scene.film.crop = [0, 0, 16, 16];
+    let rendered = render(&scene, epochs, 64, Settings { seed, ..Settings::default() });
+    rendered.assert_clean();
+    rendered.replicas()
+}
+
+/// Every pixel of every epoch has the expected value in every channel.
+fn assert_exact(what: &str, scene: &Scene, samples: u32, expected: f64, allowance: f64) {
+    let rendered = render(scene, 2, samples, Settings { seed: 1, ..Settings::default() });
+    rendered.assert_clean();
+    for value in rendered.means.iter().flatten() {
+        let error = (f64::from(*value) / expected - 1.0).abs();
+        assert!(error <= allowance, "{what}: {value} instead of {expected}, {error:e}");
+    }
+}
+
+fn table(nm: &[f64], value: &[f64]) -> Curve {
+    Curve::Linear { nm: nm.to_vec(), value: value.to_vec(), outside: Outside::Hold }
+}
