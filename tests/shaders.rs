@@ -57,7 +57,7 @@ fn combinations() -> Vec<Features> {
             knots: bit(i, 9),
             registers: bit(i, 10),
         })
-        .filter(|f| !(f.thin_lens && f.orthographic) && !(f.knots && f.registers))
+        .filter(|f| !(f.thin_lens && f.orthographic || f.knots && f.registers))
         .collect()
 }
 
