@@ -51,12 +51,13 @@ fn faint_radiance_survives() {
 #[test]
 fn products_of_spectra_are_averaged_by_wavelength() {
     let ramp = || table(&[500.0, 600.0], &[0.0, 1.0]);
-    let scene = Builder::new()
+    let mut scene = Builder::new()
         .channels(Channels::from_bounds(vec![[500.0, 600.0], [520.0, 530.0], [600.0, 700.0]], None))
         .diffuse(sphere(DVec3::ZERO, 0.5), ramp())
         .sky(ramp())
         .build();
+    scene.integrator.sampler = Sampler::Sobol;
     let cubes = |a: f64, b: f64| (b.powi(3) - a.powi(3)) / (3.0 * (b - a));
-    let bound = Bound { resolution: 0.005, allowance: 1e-5 };
+    let bound = Bound { resolution: 0.0003, allowance: 1e-5 };
     assert_estimates("ramps", &measure(scene, 4, 21), &[cubes(0.0, 1.0), cubes(0.2, 0.3), 1.0], bound);
 }
