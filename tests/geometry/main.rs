@@ -13,6 +13,7 @@ mod tracer;
 mod brute_force;
 mod closed_meshes;
 mod degenerate;
+mod self_intersection;
 
 use std::f64::consts::TAU;
 
