@@ -7,7 +7,6 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::AtomicUsize;
 
 use rustix::time::{ClockId, clock_gettime};
 use spectile::Result;
@@ -82,7 +81,11 @@ fn speed(scene: &Scene, rounds: usize, samples: u32) -> Result<()> {
     println!("{}, K = {}, {samples} samples a unit, {rounds} rounds", worker.gpu.name, scene.channels.len());
     let middle = median(&mut rates);
     println!("paths per CPU second: median {middle:.0}, {:.0} to {:.0}", rates[0], rates[rates.len() - 1]);
-    println!("of a path: generate {:.3} us, evaluate {:.3} us", us(worker.profile.generate_s), us(worker.profile.evaluate_s));
+    println!(
+        "of a path: generate {:.3} us, evaluate {:.3} us",
+        us(worker.profile.generate_s),
+        us(worker.profile.evaluate_s)
+    );
     Ok(())
 }
 
@@ -115,7 +118,7 @@ fn render(scene: &Scene, samples: u32, seed: u64, output: &Path) -> Result<(Cube
         profile: false,
     };
     let (mut began, mut peak) = (None, 0);
-    let summary = schedule::run(&job, &AtomicUsize::new(0), &mut |event| {
+    let summary = schedule::run(&job, &Arc::default(), &mut |event| {
         match event {
             // The first epoch of one sample compiles the shaders.
             Event::Epoch(status) if status.samples == 1 => began = Some(cpu_seconds()),

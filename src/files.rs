@@ -26,9 +26,7 @@ pub fn sibling(path: &Path, extension: &str) -> PathBuf {
 /// Writes `bytes` to `path`, replacing what was there in one step: a reader sees the old file or the new one, never a
 /// part, and a failure leaves the old one.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
-    if path.is_dir() {
-        return Err(Error::storage(path, "is a folder, so no file can be written under this name"));
-    }
+    check_target(path)?;
     let aside = sibling(path, "part");
     let written =
         fs::File::create_new(&aside).and_then(|mut file| file.write_all(bytes)).and_then(|()| fs::rename(&aside, path));
@@ -37,6 +35,17 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
         let _ = fs::remove_file(&aside);
         Error::storage(path, format!("cannot be written: {error}"))
     })
+}
+
+/// Refuses early a target of [`write_atomically`] that has no folder, or is one.
+pub fn check_target(path: &Path) -> Result<()> {
+    if path.is_dir() {
+        return Err(Error::storage(path, "is a folder, so no file can be written under this name"));
+    }
+    match parent(path) {
+        folder if folder.is_dir() => Ok(()),
+        folder => Err(Error::storage(path, format!("cannot be written: there is no folder {}", folder.display()))),
+    }
 }
 
 /// Bytes that this user may still write to the file system of `folder`; `None` where that cannot be asked.

@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 
-use crate::render::schedule::Interrupt;
+use crate::render::worker::Interrupt;
 use crate::{Error, Result};
 
 /// A number that a signal sets to its own; from then on a second signal ends the process at once.

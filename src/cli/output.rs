@@ -49,6 +49,8 @@ impl Output {
     pub fn error(&self, error: &Error) {
         match error {
             Error::BrokenPipe => return,
+            // The command has said what is kept.
+            Error::Interrupted { .. } => {}
             Error::Input(problems) => problems.iter().for_each(|problem| say(&format!("error: {problem}"))),
             error => say(&format!("error: {error}")),
         }

@@ -14,6 +14,7 @@ use crate::files::format_bytes;
 use crate::gpu::adapter::Gpu;
 use crate::render::plan;
 use crate::render::prepare::Prepared;
+use crate::render::schedule::StopRule;
 use crate::render::wave::WavePlan;
 use crate::render::worker::Worker;
 use crate::scene::Scene;
@@ -32,7 +33,7 @@ pub struct Args {
     #[command(flatten)]
     pub scene: SceneArgs,
 
-    /// Samples per pixel to predict the time for
+    /// Samples per pixel to predict the time for, rounded up as by `render`
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
     pub spp: u32,
 
@@ -49,6 +50,8 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         output.event("warning", json!({ "message": warning }))?;
     }
     let prepared = Arc::new(Prepared::new(&scene, 0)?);
+    let stop = StopRule { samples: Some(args.spp), time: None };
+    let samples = stop.samples_limit(scene.integrator.epoch)?.unwrap_or(args.spp);
     let tile = plan::tile_size(&scene, args.scene.tile);
     let header = plan::header(&scene, tile, 0);
     // Without a device there is no prediction, but still a plan.
@@ -64,7 +67,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         Some(m) => m.waves,
         None => plan::waves_without_device(&prepared, tile)?,
     };
-    let plan = Plan { args, prepared: &prepared, header, waves, measured };
+    let plan = Plan { args, samples, prepared: &prepared, header, waves, measured };
     output.event("done", plan.facts())?;
     output.text(&plan.describe())
 }
@@ -105,6 +108,8 @@ fn measure(gpu: Gpu, prepared: &Arc<Prepared>, scene: &Scene, tile: [u32; 2]) ->
 
 struct Plan<'a> {
     args: &'a Args,
+    /// Per pixel, at the end of an epoch.
+    samples: u32,
     prepared: &'a Prepared,
     header: Header,
     waves: WavePlan,
@@ -113,7 +118,7 @@ struct Plan<'a> {
 
 impl Plan<'_> {
     fn paths(&self) -> f64 {
-        self.header.size.iter().map(|&s| f64::from(s)).product::<f64>() * f64::from(self.args.spp)
+        self.header.size.iter().map(|&s| f64::from(s)).product::<f64>() * f64::from(self.samples)
     }
 
     fn predicted_s(&self) -> Option<f64> {
@@ -143,7 +148,7 @@ impl Plan<'_> {
             "disk_bytes": memory.disk,
             "device": self.measured.as_ref().map(|m| m.device.clone()),
             "paths_per_s": self.measured.as_ref().map(|m| m.paths_per_s),
-            "samples": self.args.spp,
+            "samples": self.samples,
             "predicted_s": self.predicted_s(),
         })
     }
@@ -174,7 +179,10 @@ impl Plan<'_> {
         }
         for (i, (name, b)) in p.spectrum_names.iter().zip(&p.tables.bounds).skip(1).enumerate() {
             let title = if i == 0 { "spectra" } else { "" };
-            text += &format!("{title:9} {name}: within {:.1e} of the channel's peak, means within {:.1e}\n", b.pointwise, b.mean);
+            text += &format!(
+                "{title:9} {name}: within {:.1e} of the channel's peak, means within {:.1e}\n",
+                b.pointwise, b.mean
+            );
         }
         text += &format!(
             "device    {} for the scene, {} for waves of {} paths ({} bytes a path)\n",
@@ -190,7 +198,7 @@ impl Plan<'_> {
                 text += &format!(
                     "time      {} for {} samples per pixel on {} ({:.0} paths/s)\n",
                     short(Duration::from_secs_f64(seconds)),
-                    self.args.spp,
+                    self.samples,
                     m.device,
                     m.paths_per_s
                 );

@@ -1,7 +1,7 @@
 //! What `render` says while it works: a progress bar, plain lines, or one JSON object a line.
 
 use std::io::IsTerminal;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::{Value, json};
@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use super::Output;
 use super::output::say;
 use super::render::Args;
+use crate::cube::{Cube, Progress};
 use crate::files::format_bytes;
 use crate::render::plan;
 use crate::render::schedule::{Event, Job, Status, Summary};
@@ -16,12 +17,16 @@ use crate::{Error, Result};
 
 /// Epochs below which an error estimate is only rough (DESIGN section 8).
 const ROUGH_BELOW: u32 = 8;
+/// Without a bar: lines about an epoch come at most this often, and some line at least this often.
+const LINE_EVERY: Duration = Duration::from_secs(1);
+const LINE_AT_LEAST_EVERY: Duration = Duration::from_secs(10);
 
 pub struct Reporter<'a> {
     output: &'a Output,
     quiet: bool,
-    profile: bool,
     epoch: u32,
+    last_line: Option<Instant>,
+    merged: bool,
     /// Only on a terminal.
     bar: Option<ProgressBar>,
 }
@@ -33,7 +38,7 @@ impl<'a> Reporter<'a> {
             let style = ProgressStyle::with_template("{bar:30} {pos}/{len} units  {msg}").expect("a valid template");
             bar.with_style(style)
         });
-        Reporter { output, quiet: args.quiet, profile: args.profile, epoch: 64, bar }
+        Reporter { output, quiet: args.quiet, epoch: 64, last_line: None, merged: false, bar }
     }
 
     /// A line on stderr that neither breaks the bar nor appears under --quiet.
@@ -45,13 +50,21 @@ impl<'a> Reporter<'a> {
         }
     }
 
+    /// An event for programs. One that has gone away does not end the render.
+    fn emit(&self, event: &str, fields: Value) -> Result<()> {
+        match self.output.event(event, fields) {
+            Err(Error::BrokenPipe) => Ok(()),
+            result => result,
+        }
+    }
+
     /// Warnings are always said, and are events of their own.
     pub fn warn(&self, text: &str) -> Result<()> {
         match &self.bar {
             Some(bar) => bar.println(format!("warning: {text}")),
             None => say(&format!("warning: {text}")),
         }
-        self.output.event("warning", json!({ "message": text }))
+        self.emit("warning", json!({ "message": text }))
     }
 
     pub fn start(&mut self, job: &Job) -> Result<()> {
@@ -60,16 +73,24 @@ impl<'a> Reporter<'a> {
         let tile = plan::tile_size(&job.scene, job.tile);
         let disk = plan::header(&job.scene, tile, job.seed).store_bytes();
         let channels = job.scene.channels.len();
+        let samples_limit = job.stop.samples_limit(self.epoch)?;
         self.line(&format!(
             "{}: {width} x {height} pixels x {channels} channels, {} on disk",
             job.scene.file.display(),
             format_bytes(disk)
         ));
-        self.output.event(
+        if let (Some(asked), Some(limit)) = (job.stop.samples, samples_limit)
+            && asked != limit
+        {
+            self.line(&format!("--spp {asked} is rounded up to {limit} samples/pixel, the end of an epoch"));
+        }
+        self.emit(
             "start",
             json!({
-                "scene": job.scene.file, "output": job.output, "size": [width, height], "channels": channels, "tile": tile,
-                "seed": job.seed, "scene_digest": job.scene.digest, "disk_bytes": disk,
+                "scene": job.scene.file, "scene_digest": job.scene.digest, "output": job.output, "seed": job.seed,
+                "size": [width, height], "channels": channels, "tile": tile, "disk_bytes": disk,
+                "samples_asked": job.stop.samples, "samples_limit": samples_limit,
+                "time_limit_s": job.stop.time.map(|t| t.as_secs_f64()),
             }),
         )
     }
@@ -79,21 +100,27 @@ impl<'a> Reporter<'a> {
             Event::Warning(text) => self.warn(&text),
             Event::Device(name) => {
                 self.line(&format!("device: {name}"));
-                self.output.event("device", json!({ "name": name }))
+                self.emit("device", json!({ "name": name }))
             }
             Event::Progress(status) => {
+                self.merged = true;
                 if let Some(bar) = &self.bar {
                     bar.set_length(u64::from(status.units.1));
                     bar.set_position(u64::from(status.units.0));
                     bar.set_message(self.describe(status, status.samples_next));
+                } else if self.last_line.is_some_and(|last| last.elapsed() >= LINE_AT_LEAST_EVERY) {
+                    let (done, all) = status.units;
+                    self.last_line = Some(Instant::now());
+                    self.line(&format!("{done}/{all} units of {}", self.describe(status, status.samples_next)));
                 }
-                self.output.event("progress", fields(status))
+                self.emit("progress", fields(status))
             }
             Event::Epoch(status) => {
-                if self.bar.is_none() {
+                if self.bar.is_none() && self.last_line.is_none_or(|last| last.elapsed() >= LINE_EVERY) {
+                    self.last_line = Some(Instant::now());
                     self.line(&self.describe(status, status.samples));
                 }
-                self.output.event("epoch", fields(status))
+                self.emit("epoch", fields(status))
             }
         }
     }
@@ -119,18 +146,22 @@ impl<'a> Reporter<'a> {
         let summary = match summary {
             Ok(summary) => summary,
             Err(error @ Error::Interrupted { .. }) => {
-                say(&format!("interrupted: every unit merged so far is in {}", job.output.display()));
+                say(&self.interrupted(job)?);
                 return Err(error);
             }
             Err(error) => return Err(error),
         };
         let status = &summary.status;
-        if self.profile {
-            self.describe_profile(&summary)?;
-        }
         let mut done = fields(status);
         done["output"] = json!(job.output);
-        self.output.event("done", done)?;
+        done["exposure_ev"] = json!(summary.exposure);
+        if job.profile {
+            done["profile"] = profile_fields(&summary);
+        }
+        self.emit("done", done)?;
+        if job.profile {
+            self.output.text(&describe_profile(&summary))?;
+        }
         if self.quiet {
             return Ok(());
         }
@@ -147,23 +178,48 @@ impl<'a> Reporter<'a> {
         self.output.text(&text)
     }
 
-    fn describe_profile(&self, summary: &Summary) -> Result<()> {
-        let status = &summary.status;
-        let device = summary.profile.map(|p| json!({ "generate_s": p.generate_s, "evaluate_s": p.evaluate_s }));
-        self.output.event(
-            "profile",
-            json!({ "setup_s": summary.setup_s, "merge_s": summary.merge_s, "device": device, "rays": status.rays }),
-        )?;
-        let per_path = |seconds: f64| 1e6 * seconds / status.paths.max(1) as f64;
-        let mut text = format!("set-up    {:8.3} s  (scene, device, shaders)\n", summary.setup_s);
-        if let Some(p) = summary.profile {
+    /// What an interrupted render leaves behind.
+    fn interrupted(&self, job: &Job) -> Result<String> {
+        if !self.merged {
+            return Ok("interrupted before anything was rendered".into());
+        }
+        let output = job.output.display();
+        let Progress { tiles, tiles_started, samples: [least, most] } = Cube::open(&job.output)?.progress()?;
+        let samples = if least == most { most.to_string() } else { format!("{least} to {most}") };
+        Ok(format!(
+            "interrupted: {output} keeps every unit merged so far, {samples} samples/pixel in {tiles_started} of {tiles} tiles \
+             (`spectile info {output}` says more)"
+        ))
+    }
+}
+
+fn profile_fields(summary: &Summary) -> Value {
+    let device = summary.profile;
+    json!({
+        "setup_s": summary.setup_s,
+        "generate_s": device.map(|p| p.generate_s),
+        "evaluate_s": device.map(|p| p.evaluate_s),
+        "merge_s": summary.merge_s,
+    })
+}
+
+fn describe_profile(summary: &Summary) -> String {
+    let status = &summary.status;
+    let per_path = |seconds: f64| 1e6 * seconds / status.paths.max(1) as f64;
+    let mut text = format!("set-up    {:8.3} s  (scene, device, shaders)\n", summary.setup_s);
+    match summary.profile {
+        Some(p) => {
             text += &format!("generate  {:8.3} s  {:.3} us a path\n", p.generate_s, per_path(p.generate_s));
             text += &format!("evaluate  {:8.3} s  {:.3} us a path\n", p.evaluate_s, per_path(p.evaluate_s));
         }
-        text += &format!("merge     {:8.3} s  {:.3} us a path, beside the device's work\n", summary.merge_s, per_path(summary.merge_s));
-        text += &format!("idle      {:8.3} s\n", status.idle_s);
-        self.output.text(&text)
+        None => text += "generate, evaluate: this device has no timestamps\n",
     }
+    text += &format!(
+        "merge     {:8.3} s  {:.3} us a path, beside the device's work\n",
+        summary.merge_s,
+        per_path(summary.merge_s)
+    );
+    text + &format!("idle      {:8.3} s\n", status.idle_s)
 }
 
 /// The fields of `progress`, `epoch` and `done`; docs/json.md lists them.
@@ -178,7 +234,7 @@ fn fields(status: &Status) -> Value {
         "rays": status.rays,
         "error_estimate": status.error_estimate,
         "remaining_s": status.remaining.map(|d| d.as_secs_f64()),
-        "devices": [{ "name": status.device, "units": status.units.0, "busy_s": status.busy_s, "idle_s": status.idle_s }],
+        "devices": [{ "name": status.device, "units": status.device_units, "busy_s": status.busy_s, "idle_s": status.idle_s }],
     })
 }
 

@@ -41,29 +41,16 @@ pub struct Progress {
 }
 
 impl Cube {
+    /// Whether [`Cube::create`] may make a cube at `path`; says why not. Changes nothing.
+    pub fn check_target(path: &Path, header: &Header, overwrite: bool) -> Result<()> {
+        find_target(path, header, overwrite).map(|_| ())
+    }
+
     /// Makes an empty cube at `path`: built under a temporary name beside it and renamed. What is there already is an
     /// error unless `overwrite`, and then only a Spectile cube is replaced. Too little space on the disk is an error.
     pub fn create(path: &Path, header: Header, overwrite: bool) -> Result<Cube> {
-        header.validate().map_err(|what| Error::Usage(format!("{}: {what}", path.display())))?;
-        // A link to a cube on another disk stays a link.
-        let path = &if overwrite { fs::canonicalize(path).unwrap_or(path.to_owned()) } else { path.to_owned() };
-        let replaces = match fs::symlink_metadata(path) {
-            Err(error) if error.kind() == ErrorKind::NotFound => false,
-            Err(error) => return Err(Error::storage(path, error)),
-            Ok(_) if overwrite => {
-                check_removable(path)?;
-                true
-            }
-            Ok(_) => {
-                let what = "exists already; choose another name, or --overwrite to replace a cube";
-                return Err(Error::Usage(format!("{} {what}", path.display())));
-            }
-        };
-        let folder = files::parent(path);
-        if !folder.is_dir() {
-            return Err(Error::storage(path, format!("cannot be created: there is no folder {}", folder.display())));
-        }
-        check_space(path, &header, if replaces { folder_bytes(path) } else { 0 })?;
+        let (target, replaces) = find_target(path, &header, overwrite)?;
+        let path = target.as_path();
 
         let mut building = Building(Some(files::sibling(path, "creating")));
         let temporary = building.0.as_deref().unwrap_or(path);
@@ -255,6 +242,31 @@ impl Cube {
     pub(super) fn sums_path(&self, tile: u32) -> PathBuf {
         self.path.join(PRIVATE).join("sums").join(tile.to_string())
     }
+}
+
+/// Where a new cube goes, and whether it replaces one.
+fn find_target(path: &Path, header: &Header, overwrite: bool) -> Result<(PathBuf, bool)> {
+    header.validate().map_err(|what| Error::Usage(format!("{}: {what}", path.display())))?;
+    // A link to a cube on another disk stays a link.
+    let target = if overwrite { fs::canonicalize(path).unwrap_or(path.to_owned()) } else { path.to_owned() };
+    let replaces = match fs::symlink_metadata(&target) {
+        Err(error) if error.kind() == ErrorKind::NotFound => false,
+        Err(error) => return Err(Error::storage(&target, error)),
+        Ok(_) if overwrite => {
+            check_removable(&target)?;
+            true
+        }
+        Ok(_) => {
+            let what = "exists already; choose another name, or --overwrite to replace a cube";
+            return Err(Error::Usage(format!("{} {what}", target.display())));
+        }
+    };
+    let folder = files::parent(&target);
+    if !folder.is_dir() {
+        return Err(Error::storage(&target, format!("cannot be created: there is no folder {}", folder.display())));
+    }
+    check_space(&target, header, if replaces { folder_bytes(&target) } else { 0 })?;
+    Ok((target, replaces))
 }
 
 /// The temporary folder of a cube that is being built, removed again unless it has taken its place.

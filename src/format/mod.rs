@@ -1,6 +1,6 @@
 //! Readers and writers of other people's formats; they know no GPU.
 
+pub mod obj;
 pub mod plot;
 pub mod png;
-pub mod obj;
 pub mod text;

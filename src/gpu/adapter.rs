@@ -32,8 +32,14 @@ pub struct Gpu {
     pub timestamps: bool,
     /// Checks that the shader translator adds; all off but in tests.
     pub shader_checks: wgpu::ShaderRuntimeChecks,
-    trouble: Arc<Mutex<Option<String>>>,
+    trouble: Arc<Mutex<Option<Trouble>>>,
     _instance: wgpu::Instance,
+}
+
+/// The first thing that went wrong on a device.
+enum Trouble {
+    Memory,
+    Other(String),
 }
 
 /// Storage buffers that the largest pass binds at once, generate_bounce under roulette: 3 of the scene, 4 windows each of
@@ -126,15 +132,22 @@ impl Gpu {
         .map_err(|e| Error::NoDevice(format!("{}: cannot be opened: {e}", info.name)))?;
 
         let trouble = Arc::new(Mutex::new(None));
-        let note = |trouble: &Arc<Mutex<Option<String>>>| {
+        let note = |trouble: &Arc<Mutex<Option<Trouble>>>| {
             let trouble = Arc::clone(trouble);
-            move |what: String| {
+            move |what: Trouble| {
                 trouble.lock().unwrap_or_else(|e| e.into_inner()).get_or_insert(what);
             }
         };
         let (on_error, on_lost) = (note(&trouble), note(&trouble));
-        device.on_uncaptured_error(Arc::new(move |e: wgpu::Error| on_error(e.to_string())));
-        device.set_device_lost_callback(move |reason, message| on_lost(format!("device lost ({reason:?}) {message}")));
+        device.on_uncaptured_error(Arc::new(move |e: wgpu::Error| {
+            on_error(match e {
+                wgpu::Error::OutOfMemory { .. } => Trouble::Memory,
+                e => Trouble::Other(e.to_string()),
+            });
+        }));
+        device.set_device_lost_callback(move |reason, message| {
+            on_lost(Trouble::Other(format!("device lost ({reason:?}) {message}")));
+        });
         Ok(Gpu {
             name: info.name,
             is_software: info.device_type == wgpu::DeviceType::Cpu,
@@ -151,7 +164,12 @@ impl Gpu {
     /// Whether the device still works; errors that nobody waited for end up here.
     pub fn check(&self) -> Result<()> {
         match self.trouble.lock().unwrap_or_else(|e| e.into_inner()).as_ref() {
-            Some(what) => Err(Error::DevicesLost(format!("{}: {what}", self.name))),
+            Some(Trouble::Other(what)) => Err(Error::DevicesLost(format!("{}: {what}", self.name))),
+            Some(Trouble::Memory) => Err(Error::Usage(format!(
+                "{}: its memory does not hold the scene and one tile with all its channels: choose a smaller --tile \
+                 (`spectile plan` says what is needed)",
+                self.name
+            ))),
             None => Ok(()),
         }
     }

@@ -48,7 +48,8 @@ pub fn read<T: bytemuck::Pod>(gpu: &Gpu, source: &wgpu::Buffer, size: u64) -> Re
     let submission = gpu.queue.submit([encoder.finish()]);
     map(&staging);
     wait(gpu, submission)?;
-    let view = staging.slice(..size).get_mapped_range().map_err(|e| Error::DevicesLost(format!("{}: {e}", gpu.name)))?;
+    let view =
+        staging.slice(..size).get_mapped_range().map_err(|e| Error::DevicesLost(format!("{}: {e}", gpu.name)))?;
     Ok(bytemuck::pod_collect_to_vec(&view))
 }
 

@@ -135,12 +135,35 @@ mod tests {
     #[test]
     fn structs_match_the_wgsl() {
         same_layout!(Frame {
-            camera_position, seed_low, camera_forward, seed_high, camera_right, aperture_radius, camera_up,
-            focus_distance, half_size, film_size, max_bounces, roulette_start, emitter_count, environment_pick,
-            environment_spectrum, max_records, channels, stratum_bits
+            camera_position,
+            seed_low,
+            camera_forward,
+            seed_high,
+            camera_right,
+            aperture_radius,
+            camera_up,
+            focus_distance,
+            half_size,
+            film_size,
+            max_bounces,
+            roulette_start,
+            emitter_count,
+            environment_pick,
+            environment_spectrum,
+            max_records,
+            channels,
+            stratum_bits
         });
         same_layout!(Wave {
-            path_count, pixel_count, samples, sample_begin, pixel_begin, tile_width, tile_pixels, epoch, epoch_mask
+            path_count,
+            pixel_count,
+            samples,
+            sample_begin,
+            pixel_begin,
+            tile_width,
+            tile_pixels,
+            epoch,
+            epoch_mask
         });
         same_layout!(Step { bounce });
         same_layout!(Emitter { primitive, spectrum, pick, area });

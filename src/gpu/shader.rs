@@ -187,7 +187,8 @@ mod tests {
 
     #[test]
     fn directives_choose_repeat_and_count() {
-        let text = "a\n#if X\nb\n#repeat N i\nc$i $(4+i)\n#if Y\nd\n#else\ne\n#endif\n#end\n#else\nf\n#endif\n$WORKGROUP";
+        let text =
+            "a\n#if X\nb\n#repeat N i\nc$i $(4+i)\n#if Y\nd\n#else\ne\n#endif\n#end\n#else\nf\n#endif\n$WORKGROUP";
         let module = Module { name: "m", text };
         let compose_with = |x: u32, n: u32| {
             let mut defines = Defines::default();

@@ -72,17 +72,17 @@ pub fn feature_lines(prepared: &Prepared, waves: &WavePlan) -> Vec<FeatureLine> 
         line("area lights", f.emitters, format!("{} records of 8 bytes a path", bounces)),
         line("environment", f.environment, "one light to choose from".into()),
         line("spheres, disks, cylinders", f.shapes, format!("{}, a test per primitive", module(s::SHAPES))),
-        line("next-event estimation", f.emitters || f.environment, format!("{}, a shadow ray a bounce", module(s::LIGHT))),
+        line(
+            "next-event estimation",
+            f.emitters || f.environment,
+            format!("{}, a shadow ray a bounce", module(s::LIGHT)),
+        ),
         line("thin lens", f.thin_lens, "a pair of random numbers a path".into()),
         line("orthographic camera", f.orthographic, "its own camera rays".into()),
         line("Gaussian filter", f.gaussian, "an inverse error function a path".into()),
         line("Russian roulette", f.roulette, "4 bytes a path, a load and a store a bounce".into()),
         line("Owen-scrambled Sobol", !f.independent, "nets in every epoch instead of independent numbers".into()),
-        line(
-            "wavelength strata",
-            f.strata,
-            format!("tables x {}", 1u64 << prepared.tables.stratum_bits),
-        ),
+        line("wavelength strata", f.strata, format!("tables x {}", 1u64 << prepared.tables.stratum_bits)),
         line("exact spectral knots", f.knots, "a search per lookup and channel".into()),
         line(
             "spectra in registers",

@@ -120,7 +120,8 @@ impl Prepared {
     }
 
     pub fn bounce_modules(&self) -> Vec<Module> {
-        let mut modules = vec![shader::TYPES, shader::RNG, shader::GEOMETRY, shader::FRAME, shader::SCENE, shader::TRIANGLE];
+        let mut modules =
+            vec![shader::TYPES, shader::RNG, shader::GEOMETRY, shader::FRAME, shader::SCENE, shader::TRIANGLE];
         if self.features.shapes {
             modules.push(shader::SHAPES);
         }
@@ -231,7 +232,10 @@ fn spectral_tables(scene: &Scene) -> Result<(SpectralTables, SpectrumIds)> {
     };
     let (factors, sources) = (number(factors.collect()), number(sources.collect()));
     if curves.len() > MAX_SPECTRA {
-        return Err(Error::input(&scene.file, format!("{} spectra in use, at most {MAX_SPECTRA} are supported", curves.len())));
+        return Err(Error::input(
+            &scene.file,
+            format!("{} spectra in use, at most {MAX_SPECTRA} are supported", curves.len()),
+        ));
     }
     Ok((SpectralTables::build(&curves, &scene.channels), SpectrumIds { factors, sources, names }))
 }

@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use serde_json::json;
@@ -13,7 +12,7 @@ use crate::gpu::layout::Counters;
 use crate::gpu::self_test;
 use crate::render::plan;
 use crate::render::prepare::Prepared;
-use crate::render::worker::{Collected, Profile, UnitRect, Worker};
+use crate::render::worker::{Collected, Interrupt, Profile, UnitRect, Worker, check_interrupt};
 use crate::scene::Scene;
 use crate::{Error, Result, files, format};
 
@@ -59,6 +58,8 @@ pub struct Status {
     pub samples_next: u32,
     /// Units of the current epoch merged, of all.
     pub units: (u32, u32),
+    /// Units that the device has rendered, of all epochs.
+    pub device_units: u64,
     pub paths: u64,
     pub rays: u64,
     pub elapsed: Duration,
@@ -81,6 +82,7 @@ pub enum Event<'a> {
 /// What a render did.
 pub struct Summary {
     pub status: Status,
+    /// If asked for, and if the device has timestamps.
     pub profile: Option<Profile>,
     /// Seconds until the device was ready, and seconds spent merging.
     pub setup_s: f64,
@@ -101,40 +103,68 @@ pub fn epoch_samples(index: u32, full: u32) -> u32 {
     }
 }
 
-/// Set by a signal handler: the signal's number asks for an orderly end.
-pub type Interrupt = AtomicUsize;
+/// Samples per pixel at the end of the first epoch that has `wanted`; `None` where u32 does not count that far.
+pub fn whole_epochs(wanted: u32, full: u32) -> Option<u32> {
+    if wanted < full { wanted.checked_next_power_of_two() } else { wanted.checked_next_multiple_of(full) }
+}
+
+impl StopRule {
+    /// The samples per pixel at which a render with full epochs of `full` samples stops; `None`: only time does.
+    pub fn samples_limit(&self, full: u32) -> Result<Option<u32>> {
+        let wanted = match self {
+            StopRule { samples: None, time: None } => DEFAULT_SAMPLES,
+            StopRule { samples: None, .. } => return Ok(None),
+            StopRule { samples: Some(wanted), .. } => *wanted,
+        };
+        let too_many =
+            || Error::Usage(format!("--spp {wanted}: the most that whole epochs make is {}", u32::MAX / full * full));
+        whole_epochs(wanted, full).ok_or_else(too_many).map(Some)
+    }
+}
 
 /// Renders `job` into a new cube. Errors leave the cube with every unit merged so far.
-pub fn run(job: &Job, interrupt: &Interrupt, observe: &mut dyn FnMut(Event) -> Result<()>) -> Result<Summary> {
+pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event) -> Result<()>) -> Result<Summary> {
     let started = Instant::now();
     plan::check(&job.scene)?;
+    let samples_limit = job.stop.samples_limit(job.scene.integrator.epoch)?;
+    let tile = plan::tile_size(&job.scene, job.tile);
+    let header = plan::header(&job.scene, tile, job.seed);
+    Cube::check_target(&job.output, &header, job.overwrite)?;
+    if let Some(preview) = &job.preview {
+        files::check_target(&preview.file)?;
+    }
     let gpu = Gpu::open()?;
     observe(Event::Device(&gpu.name))?;
     let prepared = Arc::new(Prepared::new(&job.scene, job.seed)?);
     if prepared.accel.degenerate > 0 {
-        let what = format!("{} triangles without area in f32 were left out: no ray can meet them", prepared.accel.degenerate);
+        let what =
+            format!("{} triangles without area in f32 were left out: no ray can meet them", prepared.accel.degenerate);
         observe(Event::Warning(what))?;
     }
-    let tile = plan::tile_size(&job.scene, job.tile);
     self_test::run(&gpu)?;
     let mut worker = Worker::new(gpu, prepared, tile, None)?;
+    worker.watch(interrupt);
     if job.profile {
         worker.enable_profile();
     }
+    check_interrupt(interrupt)?;
     // Only now is anything written: whatever can be refused has been.
-    let cube = Cube::create(&job.output, plan::header(&job.scene, tile, job.seed), job.overwrite)?;
-    let mut render = Render::new(job, &cube, &worker, started);
-    let result = render.epochs(&mut worker, interrupt, observe);
-    let exposure = render.write_preview()?;
-    render.write_run_facts()?;
-    render.report_counters(observe)?;
+    let cube = Cube::create(&job.output, header, job.overwrite)?;
+    let mut render = Render::new(job, &cube, &worker, samples_limit, started);
+    // What ended the epochs is the error to report, whatever else fails for the same reason.
+    let result = render.epochs(&mut worker, observe);
+    let preview = render.write_preview();
+    let facts = render.write_run_facts();
+    let warned = render.report_counters(observe);
     result?;
+    facts?;
+    warned?;
     Ok(Summary {
-        profile: job.profile.then_some(worker.profile),
+        profile: (job.profile && worker.gpu.timestamps).then_some(worker.profile),
         setup_s: render.setup_s,
         merge_s: render.merge_s,
         device_bytes: worker.device_bytes(),
-        exposure,
+        exposure: preview?,
         counters: render.counters,
         status: render.status,
     })
@@ -143,6 +173,8 @@ pub fn run(job: &Job, interrupt: &Interrupt, observe: &mut dyn FnMut(Event) -> R
 struct Render<'a> {
     job: &'a Job,
     cube: &'a Cube,
+    /// Samples per pixel at which to stop, the end of an epoch.
+    samples_limit: Option<u32>,
     started: Instant,
     setup_s: f64,
     merge_s: f64,
@@ -154,12 +186,13 @@ struct Render<'a> {
 }
 
 impl<'a> Render<'a> {
-    fn new(job: &'a Job, cube: &'a Cube, worker: &Worker, started: Instant) -> Self {
+    fn new(job: &'a Job, cube: &'a Cube, worker: &Worker, samples_limit: Option<u32>, started: Instant) -> Self {
         let status = Status {
             device: worker.gpu.name.clone(),
             samples: 0,
             samples_next: 0,
             units: (0, cube.grid().count()),
+            device_units: 0,
             paths: 0,
             rays: 0,
             elapsed: Duration::ZERO,
@@ -170,27 +203,35 @@ impl<'a> Render<'a> {
         };
         let setup_s = started.elapsed().as_secs_f64();
         let counters = Counters::default();
-        Render { job, cube, started, setup_s, merge_s: 0.0, status, counters, first_bad: None, last_preview: None }
+        Render {
+            job,
+            cube,
+            samples_limit,
+            started,
+            setup_s,
+            merge_s: 0.0,
+            status,
+            counters,
+            first_bad: None,
+            last_preview: None,
+        }
     }
 
     /// One epoch after another until a stop rule is met.
-    fn epochs(&mut self, worker: &mut Worker, interrupt: &Interrupt, observe: &mut dyn FnMut(Event) -> Result<()>) -> Result<()> {
+    fn epochs(&mut self, worker: &mut Worker, observe: &mut dyn FnMut(Event) -> Result<()>) -> Result<()> {
         let full = self.job.scene.integrator.epoch;
-        let samples_wanted = match self.job.stop {
-            StopRule { samples: None, time: None } => Some(DEFAULT_SAMPLES),
-            rule => rule.samples,
-        };
         for epoch in 0.. {
             let n = epoch_samples(epoch, full);
-            if samples_wanted.is_some_and(|wanted| self.status.samples >= wanted) || self.too_late(n) {
+            if self.samples_limit.is_some_and(|limit| self.status.samples >= limit) || self.too_late(n) {
                 return Ok(());
             }
-            self.status.samples_next = self.status.samples.checked_add(n).ok_or_else(|| {
-                Error::Usage(format!("more than {} samples per pixel cannot be counted", u32::MAX))
-            })?;
-            self.epoch(worker, epoch, n, samples_wanted, interrupt, observe)?;
+            self.status.samples_next =
+                self.status.samples.checked_add(n).ok_or_else(|| {
+                    Error::Usage(format!("more than {} samples per pixel cannot be counted", u32::MAX))
+                })?;
+            self.epoch(worker, epoch, n, observe)?;
             self.status.samples += n;
-            self.update_estimate(samples_wanted)?;
+            self.update_estimate()?;
             observe(Event::Epoch(&self.status))?;
         }
         unreachable!("epochs go on until a stop rule ends them")
@@ -215,30 +256,16 @@ impl<'a> Render<'a> {
         worker: &mut Worker,
         epoch: u32,
         n: u32,
-        samples_wanted: Option<u32>,
-        interrupt: &Interrupt,
         observe: &mut dyn FnMut(Event) -> Result<()>,
     ) -> Result<()> {
         let grid = self.cube.grid();
         self.status.units = (0, grid.count());
         let tiles: Vec<u32> = (0..grid.count()).collect();
         for group in tiles.chunks(worker.plan.units_at_once(n)) {
-            let signal = interrupt.load(Ordering::SeqCst);
-            if signal != 0 {
-                return Err(Error::Interrupted { signal: signal as i32 });
-            }
             let units: Vec<UnitRect> = group.iter().map(|&tile| self.unit_rect(tile)).collect();
-            worker.submit(&units, epoch, n, &mut |c| self.merge(&c, epoch, n, samples_wanted, observe))?;
-            self.note_idle(worker);
+            worker.submit(&units, epoch, n, &mut |c| self.merge(&c, epoch, n, observe))?;
         }
-        worker.collect(&mut |c| self.merge(&c, epoch, n, samples_wanted, observe))?;
-        self.note_idle(worker);
-        Ok(())
-    }
-
-    fn note_idle(&mut self, worker: &Worker) {
-        self.status.idle_s = worker.idle_s;
-        self.status.busy_s = self.rendering_s() - worker.idle_s;
+        worker.collect(&mut |c| self.merge(&c, epoch, n, observe))
     }
 
     /// A tile in the coordinates of the full film.
@@ -254,7 +281,6 @@ impl<'a> Render<'a> {
         collected: &Collected,
         epoch: u32,
         n: u32,
-        samples_wanted: Option<u32>,
         observe: &mut dyn FnMut(Event) -> Result<()>,
     ) -> Result<()> {
         let counters = collected.counters;
@@ -276,6 +302,9 @@ impl<'a> Render<'a> {
             self.first_bad = Some([pixel[0], pixel[1], epoch, counters.bad_sample - 1]);
         }
 
+        // Before merging, which the device need not wait for.
+        self.status.idle_s = collected.idle_s;
+        self.status.busy_s = self.rendering_s() - collected.idle_s;
         let began = Instant::now();
         let grid = self.cube.grid();
         let unit_len = collected.means.len() / collected.units.len();
@@ -284,12 +313,13 @@ impl<'a> Render<'a> {
             let tile = grid.tile_at(unit[0] - x, unit[1] - y);
             self.cube.merge_unit(tile, n, mean)?;
             self.status.units.0 += 1;
+            self.status.device_units += 1;
             self.status.paths += grid.rect(tile).pixels() * u64::from(n);
         }
         self.merge_s += began.elapsed().as_secs_f64();
         self.status.rays += u64::from(counters.rays);
         self.status.elapsed = self.started.elapsed();
-        self.status.remaining = self.remaining(samples_wanted);
+        self.status.remaining = self.remaining();
         if self.last_preview.is_none_or(|last| last.elapsed() >= PREVIEW_INTERVAL) {
             self.write_preview()?;
         }
@@ -297,26 +327,23 @@ impl<'a> Render<'a> {
     }
 
     /// Time until the last epoch ends, from the paths still to trace.
-    fn remaining(&self, samples_wanted: Option<u32>) -> Option<Duration> {
-        let full = self.job.scene.integrator.epoch;
-        let left = samples_wanted.map(|wanted| {
-            let pixels: u64 = self.cube.header().size.iter().map(|&s| u64::from(s)).product();
-            let end = if wanted >= full { wanted.next_multiple_of(full) } else { wanted.next_power_of_two() };
-            let total = pixels * u64::from(end);
-            self.rendering_s() / self.status.paths.max(1) as f64 * total.saturating_sub(self.status.paths) as f64
+    fn remaining(&self) -> Option<Duration> {
+        let left = self.samples_limit.map(|limit| {
+            let total = self.cube.header().size.iter().map(|&s| f64::from(s)).product::<f64>() * f64::from(limit);
+            self.rendering_s() * (total / self.status.paths.max(1) as f64 - 1.0)
         });
         let until = self.job.stop.time.map(|limit| limit.as_secs_f64() - self.status.elapsed.as_secs_f64());
         let seconds = [left, until].into_iter().flatten().reduce(f64::min)?;
-        Some(Duration::from_secs_f64(seconds.max(0.0)))
+        Duration::try_from_secs_f64(seconds.max(0.0)).ok()
     }
 
-    fn update_estimate(&mut self, samples_wanted: Option<u32>) -> Result<()> {
+    fn update_estimate(&mut self) -> Result<()> {
         if self.status.samples >= 2 * self.job.scene.integrator.epoch {
             let estimates = self.cube.error_estimate()?;
             self.status.error_estimate = estimates.into_iter().filter(|e| !e.is_nan()).reduce(f64::max);
         }
         self.status.elapsed = self.started.elapsed();
-        self.status.remaining = self.remaining(samples_wanted);
+        self.status.remaining = self.remaining();
         Ok(())
     }
 
@@ -367,7 +394,7 @@ fn describe_rect(unit: &UnitRect) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::epoch_samples;
+    use super::{StopRule, epoch_samples, whole_epochs};
 
     #[test]
     fn epochs_double_up_to_a_full_one() {
@@ -375,5 +402,22 @@ mod tests {
         assert_eq!(sizes(64, 9), [1, 1, 2, 4, 8, 16, 32, 64, 64]);
         assert_eq!(sizes(1, 3), [1, 1, 1]);
         assert_eq!(sizes(2, 4), [1, 1, 2, 2]);
+    }
+
+    #[test]
+    fn limits_are_ends_of_epochs() {
+        for full in [1, 2, 64, 1024] {
+            let mut end = 0;
+            for epoch in 0..20 {
+                let begin = end;
+                end += epoch_samples(epoch, full);
+                for wanted in begin + 1..=end {
+                    assert_eq!(whole_epochs(wanted, full), Some(end), "{wanted} in epochs of {full}");
+                }
+            }
+        }
+        let limit = |samples| StopRule { samples: Some(samples), time: None }.samples_limit(64);
+        assert_eq!(limit(u32::MAX - 63).ok(), Some(Some(u32::MAX - 63)));
+        assert!(limit(u32::MAX).unwrap_err().to_string().contains("4294967232"));
     }
 }

@@ -60,14 +60,17 @@ impl WavePlan {
         }
         // Measured: on lavapipe 16 k to 64 k paths are alike, fewer pay for dispatches and more for cache misses; a GPU
         // wants a few hundred thousand threads in flight. Many channels lengthen evaluation: keep a dispatch near 200 ms.
-        let wanted: u64 = if limits.software { (1 << 15).min((1 << 26) / channels) } else { (1 << 20).min((1 << 31) / channels) };
+        let wanted: u64 =
+            if limits.software { (1 << 15).min((1 << 26) / channels) } else { (1 << 20).min((1 << 31) / channels) };
         let bindable = limits.binding / (RECORD_BYTES * records).max(STATE_BYTES);
         let mut paths = wanted.max(256).min(bindable);
         if let Some(max) = limits.max_paths {
             paths = paths.min(u64::from(max));
         }
         if paths == 0 {
-            return Err(Error::Usage("a single path exceeds what this device binds: lower integrator.max_bounces".into()));
+            return Err(Error::Usage(
+                "a single path exceeds what this device binds: lower integrator.max_bounces".into(),
+            ));
         }
         // One invocation of `evaluate` walks all samples of a pixel.
         let samples = (u64::from(LOOP_LIMIT) / (records + 1)).clamp(1, 64).min(paths);
@@ -122,13 +125,21 @@ impl WavePlan {
 
     /// Bytes of one saved path, all its records included.
     pub fn path_bytes(&self) -> u64 {
-        STATE_BYTES + HEAD_BYTES + QUEUE_BYTES + RECORD_BYTES * u64::from(self.max_records) + self.throughput_bytes().min(THROUGHPUT_BYTES)
+        STATE_BYTES
+            + HEAD_BYTES
+            + QUEUE_BYTES
+            + RECORD_BYTES * u64::from(self.max_records)
+            + self.throughput_bytes().min(THROUGHPUT_BYTES)
     }
 
     /// How many units to submit together in an epoch of `samples` samples per pixel.
     pub fn units_at_once(&self, samples: u32) -> usize {
         let per_unit = u64::from(self.tile_pixels()) * u64::from(samples);
-        if samples > self.samples { 1 } else { (u64::from(self.paths) / per_unit).clamp(1, u64::from(self.units)) as usize }
+        if samples > self.samples {
+            1
+        } else {
+            (u64::from(self.paths) / per_unit).clamp(1, u64::from(self.units)) as usize
+        }
     }
 
     /// The waves of `units` units of one epoch, in the order in which they must run.

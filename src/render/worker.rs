@@ -1,6 +1,8 @@
 //! One device at work: generate, evaluate, transfer. The names are the method's own.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use crate::gpu::adapter::Gpu;
@@ -18,6 +20,22 @@ pub type UnitRect = [u32; 4];
 
 /// Staging buffers: the next unit computes while the last one is merged.
 const SLOTS: usize = 2;
+
+/// Waves under way at most. A GPU's take milliseconds, and some must be left to compute while a unit is merged; on the
+/// processor one takes up to a second, and whoever interrupts waits for all of them.
+const WAVES_AHEAD: usize = 32;
+const WAVES_AHEAD_SOFTWARE: usize = 2;
+
+/// Set by a signal handler: the signal's number asks for an orderly end, 0 does not.
+pub type Interrupt = AtomicUsize;
+
+/// [`Error::Interrupted`] once a signal has asked for the end.
+pub fn check_interrupt(interrupt: &Interrupt) -> Result<()> {
+    match interrupt.load(Ordering::SeqCst) {
+        0 => Ok(()),
+        signal => Err(Error::Interrupted { signal: signal as i32 }),
+    }
+}
 
 /// Device time of the passes, seconds, where the adapter has timestamps.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -41,9 +59,12 @@ pub struct Worker {
     timestamps: Option<Timestamps>,
     slots: Vec<Slot>,
     next_slot: usize,
-    idle_since: Instant,
-    /// Seconds in which nothing was submitted.
-    pub idle_s: f64,
+    waves: VecDeque<wgpu::SubmissionIndex>,
+    interrupt: Arc<Interrupt>,
+    /// Since when nothing is under way; `None` before the first unit.
+    idle_since: Option<Instant>,
+    /// Seconds without work between the first unit and the last.
+    idle_s: f64,
 }
 
 /// A pass with its bind groups.
@@ -85,6 +106,8 @@ pub struct Collected<'a> {
     /// [unit][row of the full tile][column][channel]; slots outside a unit's rectangle hold zeros.
     pub means: &'a [f32],
     pub counters: Counters,
+    /// Seconds in which the device had nothing to do, so far.
+    pub idle_s: f64,
 }
 
 impl Worker {
@@ -136,7 +159,9 @@ impl Worker {
             timestamps,
             slots,
             next_slot: 0,
-            idle_since: Instant::now(),
+            waves: VecDeque::new(),
+            interrupt: Arc::default(),
+            idle_since: None,
             idle_s: 0.0,
         })
     }
@@ -146,8 +171,13 @@ impl Worker {
         self.timestamps = self.gpu.timestamps.then(|| Timestamps::new(&self.gpu));
     }
 
+    /// Ends the work of [`Worker::submit`] with an error as soon as `interrupt` is set.
+    pub fn watch(&mut self, interrupt: &Arc<Interrupt>) {
+        self.interrupt = Arc::clone(interrupt);
+    }
+
     /// Starts one epoch of `units`; their means arrive through [`Worker::collect`]. Collects what used the same staging
-    /// buffer before, if anything.
+    /// buffer before, if anything, and returns when all but the last waves are done.
     pub fn submit(
         &mut self,
         units: &[UnitRect],
@@ -158,14 +188,22 @@ impl Worker {
         let slot = self.next_slot;
         self.next_slot = (slot + 1) % SLOTS;
         self.collect_slot(slot, collected)?;
-        if self.is_idle() {
-            self.idle_s += self.idle_since.elapsed().as_secs_f64();
+        if let Some(since) = self.idle_since.take() {
+            self.idle_s += since.elapsed().as_secs_f64();
         }
 
         let buffers = &self.path_buffers;
         self.gpu.queue.write_buffer(&buffers.units, 0, bytemuck::cast_slice(units));
+        let ahead = if self.gpu.is_software { WAVES_AHEAD_SOFTWARE } else { WAVES_AHEAD };
         for wave in self.plan.waves(units.len() as u32, epoch, epoch_samples) {
-            self.submit_wave(&wave)?;
+            check_interrupt(&self.interrupt)?;
+            while self.waves.len() >= ahead
+                && let Some(oldest) = self.waves.pop_front()
+            {
+                buffer::wait(&self.gpu, oldest)?;
+            }
+            let submission = self.submit_wave(&wave)?;
+            self.waves.push_back(submission);
         }
 
         let mut encoder = self.encoder("transfer");
@@ -192,8 +230,8 @@ impl Worker {
     fn collect_slot(&mut self, slot: usize, collected: &mut dyn FnMut(Collected) -> Result<()>) -> Result<()> {
         let Some(pending) = self.slots[slot].pending.take() else { return Ok(()) };
         buffer::wait(&self.gpu, pending.submission)?;
-        if self.is_idle() {
-            self.idle_since = Instant::now();
+        if self.slots.iter().all(|slot| slot.pending.is_none()) {
+            self.idle_since = Some(Instant::now());
         }
         let size = self.unit_bytes() * pending.units.len() as u64;
         let staging = &self.slots[slot].staging;
@@ -206,6 +244,7 @@ impl Worker {
                 units: &pending.units,
                 means: bytemuck::cast_slice(&view[..size as usize]),
                 counters,
+                idle_s: self.idle_s,
             })?;
         }
         staging.unmap();
@@ -217,10 +256,6 @@ impl Worker {
         self.scene_bytes + self.plan.device_bytes()
     }
 
-    fn is_idle(&self) -> bool {
-        self.slots.iter().all(|slot| slot.pending.is_none())
-    }
-
     fn unit_bytes(&self) -> u64 {
         u64::from(self.plan.tile_pixels()) * u64::from(self.plan.channels) * 4
     }
@@ -230,7 +265,7 @@ impl Worker {
     }
 
     /// Generate: camera rays, then a bounce at a time. Evaluate: all channels along the saved paths.
-    fn submit_wave(&mut self, wave: &Wave) -> Result<()> {
+    fn submit_wave(&mut self, wave: &Wave) -> Result<wgpu::SubmissionIndex> {
         self.gpu.queue.write_buffer(&self.path_buffers.wave, 0, bytemuck::bytes_of(wave));
         let mut encoder = self.encoder("wave");
         encoder.clear_buffer(&self.path_buffers.queue_lengths, 0, None);
@@ -255,15 +290,20 @@ impl Worker {
         }
         let submission = self.gpu.queue.submit([encoder.finish()]);
         if let Some(timestamps) = &self.timestamps {
-            buffer::wait(&self.gpu, submission)?;
+            buffer::wait(&self.gpu, submission.clone())?;
             let [generate, evaluate] = timestamps.read(&self.gpu)?;
             self.profile.generate_s += generate;
             self.profile.evaluate_s += evaluate;
         }
-        Ok(())
+        Ok(submission)
     }
 
-    fn begin<'e>(&self, encoder: &'e mut wgpu::CommandEncoder, label: &'static str, index: u32) -> wgpu::ComputePass<'e> {
+    fn begin<'e>(
+        &self,
+        encoder: &'e mut wgpu::CommandEncoder,
+        label: &'static str,
+        index: u32,
+    ) -> wgpu::ComputePass<'e> {
         encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some(label),
             timestamp_writes: self.timestamps.as_ref().map(|t| wgpu::ComputePassTimestampWrites {
@@ -317,7 +357,12 @@ impl PathBuffers {
             records: buffer::empty(gpu, "records", plan.record_bytes(), storage),
             throughputs: plan.roulette.then(|| buffer::empty(gpu, "throughputs", plan.throughput_bytes(), storage)),
             queue: buffer::empty(gpu, "queue", plan.queue_bytes(), storage),
-            queue_lengths: buffer::empty(gpu, "queue_lengths", 4 * wave::steps(prepared.frame.max_bounces).len() as u64, storage),
+            queue_lengths: buffer::empty(
+                gpu,
+                "queue_lengths",
+                4 * wave::steps(prepared.frame.max_bounces).len() as u64,
+                storage,
+            ),
             counters: buffer::empty(gpu, "counters", size_of::<Counters>() as u64, storage),
             means: buffer::empty(gpu, "means", plan.mean_bytes(), storage),
         }

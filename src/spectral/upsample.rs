@@ -29,8 +29,7 @@ struct Observer {
 }
 
 static OBSERVER: LazyLock<Observer> = LazyLock::new(|| {
-    let bars: Vec<DVec3> =
-        columns::<4>(CIE1931).map(|[_, x, y, z]| DVec3::new(x, y, z)).collect();
+    let bars: Vec<DVec3> = columns::<4>(CIE1931).map(|[_, x, y, z]| DVec3::new(x, y, z)).collect();
     let (nm, value) = columns::<2>(D65).map(|[nm, v]| (nm, v)).unzip();
     let d65 = Curve::Linear { nm, value, outside: Outside::Hold };
     let d65: Vec<f64> = (FIRST_NM..=LAST_NM).map(|nm| d65.eval(f64::from(nm))).collect();

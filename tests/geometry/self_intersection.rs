@@ -41,9 +41,11 @@ fn convex_bodies_do_not_shadow_themselves() {
             _ => disk(center, turn * DVec3::Z, size),
         };
         // Flat bodies also at a few degrees.
-        let direction = if case % 2 == 0 { random.direction() } else { (u + 0.05 * size * (turn * DVec3::Z)).normalize() };
+        let direction =
+            if case % 2 == 0 { random.direction() } else { (u + 0.05 * size * (turn * DVec3::Z)).normalize() };
         let scene = convex_furnace(body, center, size, direction, 1.0);
-        let mut e = device::render(&scene, 1, 32, Settings { tile: [48, 48], seed: case as u64, ..Settings::default() });
+        let mut e =
+            device::render(&scene, 1, 32, Settings { tile: [48, 48], seed: case as u64, ..Settings::default() });
         e.assert_clean();
         for (i, value) in e.means.remove(0).iter().enumerate() {
             assert!((value - 1.0).abs() < 1e-5, "case {case}, pixel {i}: {value}");
