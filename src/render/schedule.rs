@@ -98,7 +98,7 @@ pub struct Summary {
 pub fn epoch_samples(index: u32, full: u32) -> u32 {
     match index {
         0 => 1,
-        i if i - 1 >= full.ilog2() => full,
+        i if i > full.ilog2() => full,
         i => 1 << (i - 1),
     }
 }
