@@ -48,12 +48,13 @@ pub fn check_target(path: &Path) -> Result<()> {
     }
 }
 
-/// Bytes that this user may still write to the file system of `folder`; `None` where that cannot be asked.
+/// Bytes that this user may still write to the file system of `folder`; `None` where that cannot be asked, or where the
+/// file system does not say how large it is.
 pub fn free_bytes(folder: &Path) -> Option<u64> {
     #[cfg(unix)]
     {
         let stat = rustix::fs::statvfs(folder).ok()?;
-        Some(stat.f_bavail.saturating_mul(stat.f_frsize))
+        (stat.f_blocks > 0).then(|| stat.f_bavail.saturating_mul(stat.f_frsize))
     }
     #[cfg(not(unix))]
     {

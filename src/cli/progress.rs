@@ -105,9 +105,10 @@ impl<'a> Reporter<'a> {
             Event::Progress(status) => {
                 self.merged = true;
                 if let Some(bar) = &self.bar {
+                    // The message first: each of these may draw.
+                    bar.set_message(self.describe(status, status.samples_next));
                     bar.set_length(u64::from(status.units.1));
                     bar.set_position(u64::from(status.units.0));
-                    bar.set_message(self.describe(status, status.samples_next));
                 } else if self.last_line.is_some_and(|last| last.elapsed() >= LINE_AT_LEAST_EVERY) {
                     let (done, all) = status.units;
                     self.last_line = Some(Instant::now());

@@ -42,15 +42,25 @@ impl Header {
         u64::from(self.tile[0]) * u64::from(self.tile[1]) * self.channels.len() as u64 * 4
     }
 
-    /// Bytes on disk of the finished cube, with one more tile for the files aside. Files take whole blocks of 4 KiB.
+    /// Bytes on disk of the finished cube, with one more tile for the files aside. Files take whole blocks of 4 KiB,
+    /// and folders one.
     pub fn store_bytes(&self) -> u64 {
+        const BLOCK_BYTES: u64 = 4096;
+        // Metadata and coordinates of nine arrays, the facts of a few runs, and their folders.
+        const FIXED_BLOCKS: u64 = 56;
+        let in_blocks = |bytes: u64| bytes.div_ceil(BLOCK_BYTES) * BLOCK_BYTES;
         let channels = self.channels.len() as u64;
         let pixels = u64::from(self.tile[0]) * u64::from(self.tile[1]);
         let blocks = self.grid().tile_blocks().map(u64::from);
         let files = [pixels * channels * 4, pixels * 12, blocks[0] * blocks[1] * channels * 4, 4, channels * 16 + 64];
-        let tile: u64 = files.iter().map(|bytes| bytes.div_ceil(4096) * 4096).sum();
+        // Each tile has a folder of `preview`, each row of tiles one of every array.
+        let tile = files.into_iter().map(in_blocks).sum::<u64>() + BLOCK_BYTES;
         let [columns, rows] = self.grid().tiles().map(u64::from);
-        tile.saturating_mul(columns * rows + 1)
+        // Names stand on a line each; centres, bounds and integrals are four doubles.
+        let names: u64 = self.channels.names.iter().map(|name| name.len() as u64 + 16).sum();
+        let coordinates = 32 * channels + 8 * (u64::from(self.size[0]) + u64::from(self.size[1]));
+        let metadata = FIXED_BLOCKS * BLOCK_BYTES + in_blocks(names) + in_blocks(coordinates) + 4 * rows * BLOCK_BYTES;
+        tile.saturating_mul(columns * rows + 1).saturating_add(metadata)
     }
 
     /// Checks what a cube relies on, [`super::Cube::create`] included; the message says which value is wrong and what is allowed.

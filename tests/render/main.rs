@@ -1,0 +1,279 @@
+//! `render`, `plan` and `devices` as users meet them: the real binary, in fresh directories, on the device that is
+//! there.
+
+mod json;
+mod outcome;
+mod running;
+mod sizes;
+mod wrong;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use std::sync::{Mutex, MutexGuard};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+use spectile::cube::Cube;
+use tempfile::TempDir;
+
+/// Long enough for anything here on a busy machine; what takes longer hangs.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A grey wall and floor under a lamp; 24 x 20 pixels, 5 channels.
+const SCENE: &str = r#"
+[camera.perspective]
+position = [0.0, 0.2, 3.0]
+look_at = [0.0, 0.0, 0.0]
+up = [0.0, 1.0, 0.0]
+fov = 50.0
+
+[film]
+width = 24
+height = 20
+
+[channels]
+equal = { from = 400.0, to = 700.0, count = 5 }
+
+[integrator]
+max_bounces = 3
+
+[spectra.lamp]
+samples = [[400, 1.0], [700, 2.0]]
+
+[materials.grey.diffuse]
+reflectance = 0.5
+
+[materials.black.black]
+
+[[objects]]
+quad = { corner = [-1, -1, -1], edge_u = [2, 0, 0], edge_v = [0, 2, 0] }
+material = "grey"
+
+[[objects]]
+quad = { corner = [-1, -1, -1], edge_u = [0, 0, 2], edge_v = [2, 0, 0] }
+material = "grey"
+
+[[objects]]
+quad = { corner = [-0.3, 1, -0.5], edge_u = [0.6, 0, 0], edge_v = [0, 0, 0.6] }
+material = "black"
+emission = "lamp"
+"#;
+
+/// The scene so that no render of it ends by itself before a test does.
+const ENDLESS: &[&str] = &["--spp", "1000000000"];
+
+/// One at a time: times are measured, and two cores gain nothing from more.
+fn turn() -> MutexGuard<'static, ()> {
+    static TURN: Mutex<()> = Mutex::new(());
+    TURN.lock().unwrap_or_else(|e| e.into_inner())
+}
+
+/// A fresh folder with `scene.toml`, and the turn to use the device.
+struct Place {
+    folder: TempDir,
+    _turn: MutexGuard<'static, ()>,
+}
+
+impl Place {
+    fn new() -> Place {
+        Place::of(SCENE)
+    }
+
+    fn of(scene: &str) -> Place {
+        let turn = turn();
+        let folder = tempfile::tempdir().expect("a folder");
+        fs::write(folder.path().join("scene.toml"), scene).expect("written");
+        Place { folder, _turn: turn }
+    }
+
+    fn path(&self) -> &Path {
+        self.folder.path()
+    }
+
+    fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_spectile"));
+        // The Vulkan loader wants one, and would say so on stderr.
+        command.env("XDG_RUNTIME_DIR", self.path());
+        command.current_dir(self.path()).args(arguments);
+        command
+    }
+
+    fn run(&self, arguments: &[&str]) -> Output {
+        self.command(arguments).output().expect("the binary runs")
+    }
+
+    /// Stdout and stderr of a run that must succeed.
+    fn success(&self, arguments: &[&str]) -> (String, String) {
+        let output = self.run(arguments);
+        assert!(output.status.success(), "{arguments:?}: {:?} {}", output.status, text(&output.stderr));
+        (text(&output.stdout), text(&output.stderr))
+    }
+
+    /// Renders scene.toml into `name`, and opens it.
+    fn render(&self, name: &str, more: &[&str]) -> Cube {
+        self.success(&[&["render", "scene.toml", "-o", name, "--quiet"], more].concat());
+        self.cube(name)
+    }
+
+    fn cube(&self, name: &str) -> Cube {
+        Cube::open(&self.path().join(name)).expect("a cube")
+    }
+
+    /// The JSON events of a run that must succeed.
+    fn events(&self, arguments: &[&str]) -> Vec<Value> {
+        events(&self.success(&[arguments, &["--json"]].concat()).0)
+    }
+
+    /// Starts a render into `name` that somebody must stop.
+    fn start(&self, name: &str, more: &[&str]) -> Running {
+        let mut command = self.command(&[&["render", "scene.toml", "-o", name], ENDLESS, more].concat());
+        Running(command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the binary starts"))
+    }
+}
+
+/// A process that does not outlive its test.
+struct Running(std::process::Child);
+
+impl Running {
+    #[cfg(unix)]
+    fn signal(&self, name: &str) {
+        let kill = format!("kill -{name} {}", self.0.id());
+        // It may have ended already.
+        let _ = Command::new("sh").args(["-c", &kill]).stderr(Stdio::null()).status().expect("a shell");
+    }
+
+    /// Exit code and stderr, which come soon.
+    fn ends(&mut self) -> (Option<i32>, String) {
+        let status = wait_for("the end", || self.0.try_wait().expect("a child"));
+        let mut stderr = Vec::new();
+        std::io::Read::read_to_end(&mut self.0.stderr.take().expect("piped"), &mut stderr).expect("read");
+        (status.code(), text(&stderr))
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        // It may have ended already.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// Asks again and again until there is an answer.
+fn wait_for<T>(what: &str, mut ask: impl FnMut() -> Option<T>) -> T {
+    let began = Instant::now();
+    loop {
+        if let Some(answer) = ask() {
+            return answer;
+        }
+        assert!(began.elapsed() < PATIENCE, "waited too long for {what}");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).expect("UTF-8")
+}
+
+fn events(stdout: &str) -> Vec<Value> {
+    stdout.lines().map(|line| serde_json::from_str(line).expect("a JSON object a line")).collect()
+}
+
+/// Every file of a cube outside `.spectile`, by its path in it.
+fn arrays(cube: &Cube) -> BTreeMap<String, Vec<u8>> {
+    fn walk(root: &Path, folder: &Path, found: &mut BTreeMap<String, Vec<u8>>) {
+        for entry in fs::read_dir(folder).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            let name = path.strip_prefix(root).expect("inside").to_str().expect("UTF-8").to_owned();
+            if path.is_dir() {
+                if name != ".spectile" {
+                    walk(root, &path, found);
+                }
+            } else {
+                found.insert(name, fs::read(&path).expect("read"));
+            }
+        }
+    }
+    let mut found = BTreeMap::new();
+    walk(cube.path(), cube.path(), &mut found);
+    found
+}
+
+/// Samples per pixel, the same in all tiles.
+fn samples(cube: &Cube) -> u32 {
+    let progress = cube.progress().expect("progress");
+    assert_eq!((progress.tiles, progress.samples[0]), (progress.tiles_started, progress.samples[1]));
+    progress.samples[0]
+}
+
+fn spectrum(cube: &Cube, x: u32, y: u32) -> Vec<f32> {
+    cube.spectrum(x, y).expect("inside").expect("rendered")
+}
+
+/// Width, height and pixels of a PNG file.
+fn png(path: &Path) -> ([u32; 2], Vec<u8>) {
+    let file = std::io::BufReader::new(fs::File::open(path).expect("a file"));
+    let mut reader = png::Decoder::new(file).read_info().expect("a PNG");
+    let mut pixels = vec![0; reader.output_buffer_size().expect("a size")];
+    let info = reader.next_frame(&mut pixels).expect("pixels");
+    ([info.width, info.height], pixels)
+}
+
+#[test]
+fn plan_says_what_a_render_takes() {
+    let place = Place::new();
+    let (text, stderr) = place.success(&["plan", "scene.toml", "--spp", "100"]);
+    assert_eq!(stderr, "");
+    for expected in
+        ["24 x 20 pixels x 5 channels", "thin lens", "left out", "device", "disk", "for 128 samples per pixel"]
+    {
+        assert!(text.contains(expected), "{expected}: {text}");
+    }
+    let done =
+        place.events(&["plan", "scene.toml", "--size", "64x32", "--tile", "16", "--spp", "8"]).pop().expect("done");
+    assert_eq!((&done["tiles"], &done["samples"]), (&Value::from(8), &Value::from(8)));
+    let feature = |name: &str| {
+        let features = done["features"].as_array().expect("features");
+        features.iter().find(|f| f["name"] == name).unwrap_or_else(|| panic!("{name}"))["used"].as_bool()
+    };
+    assert_eq!(
+        (feature("area lights"), feature("environment"), feature("thin lens")),
+        (Some(true), Some(false), Some(false))
+    );
+    // Nothing is written, and the cube will take what was said, in whole blocks.
+    assert_eq!(fs::read_dir(place.path()).expect("list").count(), 1);
+    for (size, channels) in [("64x32", "5"), ("8x8", "1"), ("40x40", "3000")] {
+        let count = format!("channels.equal.count={channels}");
+        let scene = ["scene.toml", "--size", size, "--tile", "16", "--spp", "8", "--set", &count];
+        let planned =
+            place.events(&[&["plan"], &scene[..]].concat()).pop().expect("done")["disk_bytes"].as_u64().expect("bytes");
+        place.success(&[&["render"], &scene[..], &["-o", "cube.zarr", "--quiet", "--overwrite"]].concat());
+        let taken = blocks(&place.path().join("cube.zarr"));
+        assert!((taken..taken + taken / 2).contains(&planned), "{size}: {planned} planned, {taken} taken");
+    }
+}
+
+/// Bytes that a folder takes where files take whole blocks of 4 KiB and folders one.
+fn blocks(folder: &Path) -> u64 {
+    let entries = fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path());
+    let each = entries.map(|path| match path.is_dir() {
+        true => blocks(&path),
+        false => fs::metadata(&path).expect("a file").len().div_ceil(4096) * 4096,
+    });
+    each.sum::<u64>() + 4096
+}
+
+#[test]
+fn devices_lists_what_there_is() {
+    let place = Place::new();
+    let (text, stderr) = place.success(&["devices"]);
+    assert!(stderr.is_empty() && text.contains("can render") && text.contains("self-test passed"), "{text}{stderr}");
+    let events = place.events(&["devices"]);
+    let done = events.last().expect("done");
+    assert_eq!(done["adapters"].as_u64(), Some(events.len() as u64 - 1));
+    let chosen = events.iter().find(|e| e["event"] == "device" && e["name"] == done["chosen"]).expect("listed");
+    assert!(chosen["unusable"].is_null() && chosen["max_binding"].as_u64().is_some_and(|b| b >= 128 << 20));
+    assert!(text.contains(chosen["name"].as_str().expect("a name")));
+}
