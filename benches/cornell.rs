@@ -11,7 +11,7 @@ use std::sync::Arc;
 use rustix::time::{ClockId, clock_gettime};
 use spectile::Result;
 use spectile::cube::Cube;
-use spectile::gpu::adapter::Gpu;
+use spectile::gpu::adapter::{Gpu, Selection};
 use spectile::render::prepare::Prepared;
 use spectile::render::schedule::{self, Event, Job, StopRule};
 use spectile::render::worker::Worker;
@@ -116,6 +116,7 @@ fn render(scene: &Scene, samples: u32, seed: u64, output: &Path) -> Result<(Cube
         stop: StopRule { samples: Some(samples), time: None },
         preview: None,
         profile: false,
+        devices: Selection::Count(1),
     };
     let (mut began, mut peak) = (None, 0);
     let summary = schedule::run(&job, &Arc::default(), &mut |event| {

@@ -21,9 +21,10 @@ pub struct Args {
 
 pub fn run(_args: &Args, output: &Output) -> Result<()> {
     let adapters = adapter::list();
-    for facts in &adapters {
+    for (position, facts) in adapters.iter().enumerate() {
         output.event("device", serde_json::to_value(facts).expect("plain values"))?;
-        let mut text = format!("{}\n  {} through {}, {}\n", facts.name, facts.kind, facts.backend, facts.driver);
+        let mut text =
+            format!("{position}: {}\n  {} through {}, {}\n", facts.name, facts.kind, facts.backend, facts.driver);
         text += &format!(
             "  one binding shows {}, one buffer holds {}; timestamps: {}\n",
             format_bytes(facts.max_binding),

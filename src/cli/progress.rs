@@ -127,7 +127,7 @@ impl<'a> Reporter<'a> {
     }
 
     fn describe(&self, status: &Status, samples: u32) -> String {
-        let rate = |count: u64| HumanCount((count as f64 / status.busy_s.max(1e-9)) as u64).to_string();
+        let rate = |count: u64| HumanCount((count as f64 / status.rendering_s.max(1e-9)) as u64).to_string();
         let mut text = format!("{samples} samples/pixel  {} paths/s  {} rays/s", rate(status.paths), rate(status.rays));
         if let Some(error) = status.error_estimate {
             let rough = if status.samples / self.epoch < ROUGH_BELOW { " (rough)" } else { "" };
@@ -220,22 +220,29 @@ fn describe_profile(summary: &Summary) -> String {
         summary.merge_s,
         per_path(summary.merge_s)
     );
-    text + &format!("idle      {:8.3} s\n", status.idle_s)
+    for device in &status.devices {
+        text += &format!("idle      {:8.3} s  {}\n", device.idle_s, device.name);
+    }
+    text
 }
 
 /// The fields of `progress`, `epoch` and `done`; docs/json.md lists them.
 fn fields(status: &Status) -> Value {
+    let devices = status
+        .devices
+        .iter()
+        .map(|d| json!({ "name": d.name, "units": d.units, "busy_s": d.busy_s, "idle_s": d.idle_s }));
     json!({
         "samples": status.samples,
         "samples_next": status.samples_next,
         "units": status.units.0,
         "units_total": status.units.1,
         "paths": status.paths,
-        "paths_per_s": status.paths as f64 / status.busy_s.max(1e-9),
+        "paths_per_s": status.paths as f64 / status.rendering_s.max(1e-9),
         "rays": status.rays,
         "error_estimate": status.error_estimate,
         "remaining_s": status.remaining.map(|d| d.as_secs_f64()),
-        "devices": [{ "name": status.device, "units": status.device_units, "busy_s": status.busy_s, "idle_s": status.idle_s }],
+        "devices": devices.collect::<Vec<_>>(),
     })
 }
 

@@ -7,6 +7,7 @@ use super::Output;
 use super::progress::Reporter;
 use super::scene::SceneArgs;
 use crate::Result;
+use crate::gpu::adapter::Selection;
 use crate::render::schedule::{self, Job, Preview, StopRule};
 
 /// Render a scene into a cube
@@ -57,6 +58,15 @@ pub struct Args {
     #[command(flatten)]
     pub scene: SceneArgs,
 
+    /// Devices to render on: all, a number, or positions as `spectile devices` lists them
+    ///
+    /// `all` takes every GPU, and software devices only where there is no GPU. A number takes so many of those; on a machine
+    /// with fewer they share them. Positions are separated by commas: 0,2 (a single one: 0,). The devices share the picture,
+    /// each takes the next tile when it is done with its last; how many there are changes no bit of the cube as long as they
+    /// are of one kind.
+    #[arg(long, value_name = "all|N|LIST", default_value = "all")]
+    pub devices: Selection,
+
     /// Keep a picture of the cube as it grows (PNG, 8-bit sRGB)
     #[arg(long, value_name = "FILE.png")]
     pub preview: Option<PathBuf>,
@@ -97,6 +107,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         stop: StopRule { samples: args.spp, time: args.time },
         preview: args.preview.clone().map(|file| Preview { file, exposure: args.exposure }),
         profile: args.profile,
+        devices: args.devices.clone(),
         scene,
     };
     reporter.start(&job)?;

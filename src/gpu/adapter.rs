@@ -18,6 +18,7 @@ pub struct AdapterFacts {
     pub max_binding: u64,
     pub max_buffer: u64,
     pub timestamps: bool,
+    pub is_software: bool,
     /// Why Spectile cannot use it.
     pub unusable: Option<String>,
 }
@@ -94,31 +95,120 @@ fn facts(adapter: &wgpu::Adapter) -> AdapterFacts {
         max_binding: limits.max_storage_buffer_binding_size,
         max_buffer: limits.max_buffer_size,
         timestamps: adapter.features().contains(wgpu::Features::TIMESTAMP_QUERY),
+        is_software: info.device_type == wgpu::DeviceType::Cpu,
         unusable,
     }
 }
 
 /// Every adapter of this machine, GPUs first.
 pub fn list() -> Vec<AdapterFacts> {
-    let mut adapters = adapters(&instance());
+    sorted_adapters(&instance()).iter().map(facts).collect()
+}
+
+/// GPUs first, each through as many backends as list it; the order is the same in every Instance.
+fn sorted_adapters(instance: &wgpu::Instance) -> Vec<wgpu::Adapter> {
+    let mut adapters = adapters(instance);
     adapters.sort_by_key(|a| rank(&a.get_info()));
-    adapters.iter().map(facts).collect()
+    adapters
+}
+
+/// Which devices to render on.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub enum Selection {
+    /// Every GPU, each once; software devices only where there is no GPU.
+    #[default]
+    All,
+    /// So many of those; more than there are share them.
+    Count(usize),
+    /// Positions in [`list`].
+    List(Vec<usize>),
+}
+
+impl std::str::FromStr for Selection {
+    type Err = String;
+
+    /// `all`, a count, or a list of positions such as `0,2` (a single one: `0,`).
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let number = |text: &str| text.trim().parse::<usize>().ok();
+        let list = || text.split(',').filter(|part| !part.trim().is_empty()).map(number).collect::<Option<Vec<_>>>();
+        let parsed = match text {
+            "all" => Some(Selection::All),
+            text if text.contains(',') => list().filter(|list| !list.is_empty()).map(Selection::List),
+            text => number(text).filter(|&n| (1..=MAX_DEVICES).contains(&n)).map(Selection::Count),
+        };
+        parsed.ok_or_else(|| {
+            format!("devices are `all`, a number from 1 to {MAX_DEVICES}, or positions as `spectile devices` lists them, such as 0,2")
+        })
+    }
+}
+
+/// More devices than this on one machine are a typing error.
+const MAX_DEVICES: usize = 64;
+
+impl Selection {
+    /// Positions in `listed`. Errors: no usable adapter, or a position that is not there or not usable.
+    fn choose(&self, listed: &[AdapterFacts]) -> Result<Vec<usize>> {
+        let all = usable_once(listed);
+        match self {
+            Selection::List(positions) => {
+                for &position in positions {
+                    let unusable = match listed.get(position) {
+                        None => Some("there is no such adapter".to_owned()),
+                        Some(facts) => facts.unusable.clone(),
+                    };
+                    if let Some(why) = unusable {
+                        return Err(Error::NoDevice(format!(
+                            "device {position}: {why}; `spectile devices` lists what there is"
+                        )));
+                    }
+                }
+                Ok(positions.clone())
+            }
+            _ if all.is_empty() => {
+                let refused = listed.iter().filter_map(|f| Some((&f.name, f.unusable.as_ref()?)));
+                let reasons: String = refused.map(|(name, why)| format!("; {name}: {why}")).collect();
+                Err(Error::NoDevice(format!(
+                    "no adapter that can run Spectile{reasons}: install a Vulkan driver for your GPU, or the software driver \
+                     (Debian/Ubuntu: apt-get install mesa-vulkan-drivers libvulkan1)"
+                )))
+            }
+            Selection::All => Ok(all),
+            Selection::Count(count) => Ok((0..*count).map(|i| all[i % all.len()]).collect()),
+        }
+    }
+}
+
+/// Usable adapters: every GPU, through the first backend that lists it; if there is none, every software adapter.
+fn usable_once(listed: &[AdapterFacts]) -> Vec<usize> {
+    let of = |software: bool| -> Vec<usize> {
+        let usable = |facts: &AdapterFacts| facts.unusable.is_none() && facts.is_software == software;
+        let backend_of = |name: &str| listed.iter().find(|f| usable(f) && f.name == name).map(|f| &f.backend);
+        (0..listed.len())
+            .filter(|&i| usable(&listed[i]) && backend_of(&listed[i].name) == Some(&listed[i].backend))
+            .collect()
+    };
+    let gpus = of(false);
+    if gpus.is_empty() { of(true) } else { gpus }
 }
 
 impl Gpu {
     /// Opens the best usable adapter: a GPU where there is one, else the software driver.
     pub fn open() -> Result<Gpu> {
+        Ok(Self::open_all(&Selection::Count(1))?.remove(0))
+    }
+
+    /// Opens the devices of a selection, each through its own wgpu Instance. At least one.
+    pub fn open_all(selection: &Selection) -> Result<Vec<Gpu>> {
+        let listed = list();
+        let chosen = selection.choose(&listed)?;
+        chosen.into_iter().map(|index| Self::open_index(index, &listed[index].name)).collect()
+    }
+
+    /// Opens adapter `index` of [`list`], which must still be called `name`.
+    fn open_index(index: usize, name: &str) -> Result<Gpu> {
         let instance = instance();
-        let mut adapters = adapters(&instance);
-        adapters.sort_by_key(|a| rank(&a.get_info()));
-        let refused: Vec<_> = adapters.iter().map(facts).filter_map(|f| Some((f.name, f.unusable?))).collect();
-        let Some(adapter) = adapters.into_iter().find(|a| facts(a).unusable.is_none()) else {
-            let reasons: String = refused.iter().map(|(name, why)| format!("; {name}: {why}")).collect();
-            return Err(Error::NoDevice(format!(
-                "no adapter that can run Spectile{reasons}: install a Vulkan driver for your GPU, or the software driver \
-                 (Debian/Ubuntu: apt-get install mesa-vulkan-drivers libvulkan1)"
-            )));
-        };
+        let adapter = sorted_adapters(&instance).into_iter().nth(index).filter(|a| a.get_info().name == name);
+        let adapter = adapter.ok_or_else(|| Error::NoDevice(format!("{name}: is not there any more")))?;
         let info = adapter.get_info();
         let wanted = wgpu::Features::TIMESTAMP_QUERY;
         let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
@@ -172,5 +262,57 @@ impl Gpu {
             ))),
             None => Ok(()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn adapter(name: &str, backend: &str, is_software: bool, unusable: Option<&str>) -> AdapterFacts {
+        AdapterFacts {
+            name: name.into(),
+            backend: backend.into(),
+            kind: String::new(),
+            driver: String::new(),
+            max_binding: 0,
+            max_buffer: 0,
+            timestamps: false,
+            is_software,
+            unusable: unusable.map(str::to_owned),
+        }
+    }
+
+    #[test]
+    fn selections_are_read_or_explained() {
+        assert_eq!("all".parse(), Ok(Selection::All));
+        assert_eq!("3".parse(), Ok(Selection::Count(3)));
+        assert_eq!("0,2".parse(), Ok(Selection::List(vec![0, 2])));
+        assert_eq!("1,".parse(), Ok(Selection::List(vec![1])));
+        for bad in ["", "0", "65", "-1", "two", ",", "0,x", "1.5"] {
+            assert!(bad.parse::<Selection>().unwrap_err().contains("spectile devices"), "{bad}");
+        }
+    }
+
+    /// Two equal GPUs and a third, each listed by two backends, one of them unusable in one; a software device.
+    #[test]
+    fn every_gpu_counts_once_and_software_only_stands_in() {
+        let listed = [
+            adapter("A", "vulkan", false, None),
+            adapter("A", "vulkan", false, None),
+            adapter("B", "vulkan", false, Some("too small")),
+            adapter("A", "dx12", false, None),
+            adapter("A", "dx12", false, None),
+            adapter("B", "dx12", false, None),
+            adapter("soft", "vulkan", true, None),
+        ];
+        assert_eq!(Selection::All.choose(&listed).unwrap(), [0, 1, 5]);
+        assert_eq!(Selection::Count(2).choose(&listed).unwrap(), [0, 1]);
+        assert_eq!(Selection::Count(4).choose(&listed).unwrap(), [0, 1, 5, 0]);
+        assert_eq!(Selection::List(vec![6, 1]).choose(&listed).unwrap(), [6, 1]);
+        assert_eq!(Selection::List(vec![2]).choose(&listed).unwrap_err().exit_code(), 3);
+        assert_eq!(Selection::List(vec![7]).choose(&listed).unwrap_err().exit_code(), 3);
+        assert_eq!(Selection::All.choose(&listed[6..]).unwrap(), [0]);
+        assert_eq!(Selection::All.choose(&[]).unwrap_err().exit_code(), 3);
     }
 }

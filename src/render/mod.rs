@@ -2,7 +2,9 @@
 
 pub mod lights;
 pub mod plan;
+pub mod pool;
 pub mod prepare;
+pub mod queue;
 pub mod rng;
 pub mod schedule;
 pub mod wave;

@@ -1,18 +1,21 @@
-//! The render loop: epochs of the whole image, units in the order of their tiles, one device.
+//! The render: epochs of the whole image, decided one after the other; devices that pull their units; what is known so far.
 
+use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::mpsc::{self, Receiver};
+use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 use serde_json::json;
 
 use crate::cube::Cube;
-use crate::gpu::adapter::Gpu;
+use crate::gpu::adapter::{Gpu, Selection};
 use crate::gpu::layout::Counters;
-use crate::gpu::self_test;
 use crate::render::plan;
+use crate::render::pool::{Merged, Pool, Report};
 use crate::render::prepare::Prepared;
-use crate::render::worker::{Collected, Interrupt, Profile, UnitRect, Worker, check_interrupt};
+use crate::render::queue::Queue;
+use crate::render::worker::{Interrupt, Profile, check_interrupt};
 use crate::scene::Scene;
 use crate::{Error, Result, files, format};
 
@@ -47,28 +50,37 @@ pub struct Job {
     pub stop: StopRule,
     pub preview: Option<Preview>,
     pub profile: bool,
+    pub devices: Selection,
 }
 
 /// How far a render is.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Status {
-    pub device: String,
     /// Samples per pixel in the whole image, and when the current epoch will be done.
     pub samples: u32,
     pub samples_next: u32,
     /// Units of the current epoch merged, of all.
     pub units: (u32, u32),
-    /// Units that the device has rendered, of all epochs.
-    pub device_units: u64,
     pub paths: u64,
     pub rays: u64,
     pub elapsed: Duration,
-    /// Seconds in which the device had work, and had not.
-    pub busy_s: f64,
-    pub idle_s: f64,
+    /// Seconds since the first device was ready.
+    pub rendering_s: f64,
     /// The largest error estimate of a channel, from two full epochs on.
     pub error_estimate: Option<f64>,
     pub remaining: Option<Duration>,
+    pub devices: Vec<DeviceStatus>,
+}
+
+/// What one device did.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DeviceStatus {
+    pub name: String,
+    /// Units that it has rendered, of all epochs.
+    pub units: u64,
+    /// Seconds in which it had work, and had not.
+    pub busy_s: f64,
+    pub idle_s: f64,
 }
 
 /// What a render tells while it goes on.
@@ -82,12 +94,12 @@ pub enum Event<'a> {
 /// What a render did.
 pub struct Summary {
     pub status: Status,
-    /// If asked for, and if the device has timestamps.
+    /// Sums over the devices that have timestamps, if asked for.
     pub profile: Option<Profile>,
-    /// Seconds until the device was ready, and seconds spent merging.
+    /// Seconds until the first device was ready, and seconds that the devices' threads spent merging.
     pub setup_s: f64,
     pub merge_s: f64,
-    /// Scene and buffers on the device, bytes.
+    /// Scene and buffers on all devices, bytes.
     pub device_bytes: u64,
     /// EV of the last preview written.
     pub exposure: Option<f64>,
@@ -133,52 +145,89 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
     if let Some(preview) = &job.preview {
         files::check_target(&preview.file)?;
     }
-    let gpu = Gpu::open()?;
-    observe(Event::Device(&gpu.name))?;
+    let gpus = Gpu::open_all(&job.devices)?;
+    for gpu in &gpus {
+        observe(Event::Device(&gpu.name))?;
+    }
+    if gpus.iter().any(|gpu| gpu.name != gpus[0].name) {
+        let what =
+            "the devices are of different kinds: the cube is right, but its last bits depend on which rendered what";
+        observe(Event::Warning(what.into()))?;
+    }
     let prepared = Arc::new(Prepared::new(&job.scene, job.seed)?);
     if prepared.accel.degenerate > 0 {
         let what =
             format!("{} triangles without area in f32 were left out: no ray can meet them", prepared.accel.degenerate);
         observe(Event::Warning(what))?;
     }
-    self_test::run(&gpu)?;
-    let mut worker = Worker::new(gpu, prepared, tile, None)?;
-    worker.watch(interrupt);
-    if job.profile {
-        worker.enable_profile();
-    }
-    check_interrupt(interrupt)?;
-    // Only now is anything written: whatever can be refused has been.
-    let cube = Cube::create(&job.output, header, job.overwrite)?;
-    let mut render = Render::new(job, &cube, &worker, samples_limit, started);
+
+    let (queue, cube) = (Queue::new(header.grid().count()), OnceLock::new());
+    let pool = Pool {
+        prepared: &prepared,
+        queue: &queue,
+        cube: &cube,
+        tile,
+        full_epoch: job.scene.integrator.epoch,
+        profile: job.profile,
+        interrupt,
+    };
+    let names = gpus.iter().map(|gpu| gpu.name.clone()).collect();
+    let mut render = Render::new(job, names, header.grid().count(), samples_limit, started);
+    let result = std::thread::scope(|threads| {
+        let (sender, reports) = mpsc::channel();
+        for (device, gpu) in gpus.into_iter().enumerate() {
+            let (pool, sender) = (&pool, sender.clone());
+            threads.spawn(move || pool.work(device, gpu, &sender));
+        }
+        drop(sender);
+        let result = render.wait_for_devices(&reports, observe).and_then(|()| {
+            check_interrupt(interrupt)?;
+            // Only now is anything written: whatever can be refused has been.
+            let made = Cube::create(&job.output, header, job.overwrite)?;
+            render.epochs(cube.get_or_init(|| made), &queue, &reports, observe)
+        });
+        // At the end nobody has a unit any more; after an error those under way are dropped.
+        queue.close();
+        reports.iter().for_each(|(_, report)| render.note_profile(report));
+        result
+    });
     // What ended the epochs is the error to report, whatever else fails for the same reason.
-    let result = render.epochs(&mut worker, observe);
-    let preview = render.write_preview();
-    let facts = render.write_run_facts();
+    let Some(cube) = cube.get() else { return Err(result.err().unwrap_or_else(no_cube)) };
+    let preview = render.write_preview(cube);
+    let facts = render.write_run_facts(cube);
     let warned = render.report_counters(observe);
     result?;
     facts?;
     warned?;
     Ok(Summary {
-        profile: (job.profile && worker.gpu.timestamps).then_some(worker.profile),
+        profile: render.profile,
         setup_s: render.setup_s,
         merge_s: render.merge_s,
-        device_bytes: worker.device_bytes(),
+        device_bytes: render.device_bytes,
         exposure: preview?,
         counters: render.counters,
         status: render.status,
     })
 }
 
+fn no_cube() -> Error {
+    Error::Internal("the render ended without a cube".into())
+}
+
 struct Render<'a> {
     job: &'a Job,
-    cube: &'a Cube,
     /// Samples per pixel at which to stop, the end of an epoch.
     samples_limit: Option<u32>,
     started: Instant,
     setup_s: f64,
     merge_s: f64,
+    device_bytes: u64,
+    profile: Option<Profile>,
     status: Status,
+    /// Devices that have not left.
+    active: usize,
+    /// Units merged of the current epoch and of those after it.
+    merged: VecDeque<u32>,
     counters: Counters,
     /// Column, row, epoch and sample of the first bad sample, for the report.
     first_bad: Option<[u32; 4]>,
@@ -186,55 +235,101 @@ struct Render<'a> {
 }
 
 impl<'a> Render<'a> {
-    fn new(job: &'a Job, cube: &'a Cube, worker: &Worker, samples_limit: Option<u32>, started: Instant) -> Self {
-        let status = Status {
-            device: worker.gpu.name.clone(),
-            samples: 0,
-            samples_next: 0,
-            units: (0, cube.grid().count()),
-            device_units: 0,
-            paths: 0,
-            rays: 0,
-            elapsed: Duration::ZERO,
-            busy_s: 0.0,
-            idle_s: 0.0,
-            error_estimate: None,
-            remaining: None,
-        };
-        let setup_s = started.elapsed().as_secs_f64();
-        let counters = Counters::default();
+    fn new(job: &'a Job, names: Vec<String>, tiles: u32, samples_limit: Option<u32>, started: Instant) -> Self {
+        let devices: Vec<_> =
+            names.into_iter().map(|name| DeviceStatus { name, units: 0, busy_s: 0.0, idle_s: 0.0 }).collect();
         Render {
             job,
-            cube,
             samples_limit,
             started,
-            setup_s,
+            setup_s: 0.0,
             merge_s: 0.0,
-            status,
-            counters,
+            device_bytes: 0,
+            profile: None,
+            active: devices.len(),
+            status: Status {
+                samples: 0,
+                samples_next: 0,
+                units: (0, tiles),
+                paths: 0,
+                rays: 0,
+                elapsed: Duration::ZERO,
+                rendering_s: 0.0,
+                error_estimate: None,
+                remaining: None,
+                devices,
+            },
+            merged: VecDeque::new(),
+            counters: Counters::default(),
             first_bad: None,
             last_preview: None,
         }
     }
 
+    /// Waits until every device holds the scene, or has left.
+    fn wait_for_devices(
+        &mut self,
+        reports: &Receiver<(usize, Report)>,
+        observe: &mut dyn FnMut(Event) -> Result<()>,
+    ) -> Result<()> {
+        let mut ready = 0;
+        while ready < self.active {
+            let (device, report) = reports.recv().map_err(|_| no_cube())?;
+            match report {
+                Report::Ready { bytes } => {
+                    if ready == 0 {
+                        self.setup_s = self.started.elapsed().as_secs_f64();
+                    }
+                    ready += 1;
+                    self.device_bytes += bytes;
+                }
+                report => self.left(device, report, observe)?,
+            }
+        }
+        Ok(())
+    }
+
     /// One epoch after another until a stop rule is met.
-    fn epochs(&mut self, worker: &mut Worker, observe: &mut dyn FnMut(Event) -> Result<()>) -> Result<()> {
+    fn epochs(
+        &mut self,
+        cube: &Cube,
+        queue: &Queue,
+        reports: &Receiver<(usize, Report)>,
+        observe: &mut dyn FnMut(Event) -> Result<()>,
+    ) -> Result<()> {
         let full = self.job.scene.integrator.epoch;
         for epoch in 0.. {
             let n = epoch_samples(epoch, full);
             if self.samples_limit.is_some_and(|limit| self.status.samples >= limit) || self.too_late(n) {
                 return Ok(());
             }
+            queue.allow(self.decided(epoch));
             self.status.samples_next =
                 self.status.samples.checked_add(n).ok_or_else(|| {
                     Error::Usage(format!("more than {} samples per pixel cannot be counted", u32::MAX))
                 })?;
-            self.epoch(worker, epoch, n, observe)?;
+            self.status.units.0 = self.merged.front().copied().unwrap_or(0);
+            while self.status.units.0 < self.status.units.1 {
+                let (device, report) = reports.recv().map_err(|_| no_cube())?;
+                match report {
+                    Report::Merged(merged) => self.note_merged(cube, epoch, device, merged, observe)?,
+                    report => self.left(device, report, observe)?,
+                }
+            }
+            self.merged.pop_front();
             self.status.samples += n;
-            self.update_estimate()?;
+            self.update_estimate(cube)?;
             observe(Event::Epoch(&self.status))?;
         }
         unreachable!("epochs go on until a stop rule ends them")
+    }
+
+    /// How many epochs may be rendered while `epoch` is the current one. Where only the number of samples decides, all
+    /// are: then no device waits for another at an epoch's end.
+    fn decided(&self, epoch: u32) -> u32 {
+        let (None, Some(limit)) = (self.job.stop.time, self.samples_limit) else { return epoch + 1 };
+        let full = self.job.scene.integrator.epoch;
+        if limit < full { limit.ilog2() + 1 } else { full.ilog2() + limit / full }
     }
 
     fn rendering_s(&self) -> f64 {
@@ -251,106 +346,94 @@ impl<'a> Render<'a> {
         self.started.elapsed().as_secs_f64() + predicted > limit.as_secs_f64()
     }
 
-    fn epoch(
-        &mut self,
-        worker: &mut Worker,
-        epoch: u32,
-        n: u32,
-        observe: &mut dyn FnMut(Event) -> Result<()>,
-    ) -> Result<()> {
-        let grid = self.cube.grid();
-        self.status.units = (0, grid.count());
-        let tiles: Vec<u32> = (0..grid.count()).collect();
-        for group in tiles.chunks(worker.plan.units_at_once(n)) {
-            let units: Vec<UnitRect> = group.iter().map(|&tile| self.unit_rect(tile)).collect();
-            worker.submit(&units, epoch, n, &mut |c| self.merge(&c, epoch, n, observe))?;
+    /// A device has left. The others go on without it, if it was lost and there are others.
+    fn left(&mut self, device: usize, report: Report, observe: &mut dyn FnMut(Event) -> Result<()>) -> Result<()> {
+        let Report::Left { result } = report else { return Ok(()) };
+        self.active -= 1;
+        match result {
+            Err(Error::DevicesLost(what) | Error::NoDevice(what)) if self.active > 0 => {
+                let device = device + 1;
+                observe(Event::Warning(format!("device {device} is lost, {} go on without it: {what}", self.active)))
+            }
+            Err(error) => Err(error),
+            Ok(_) => Err(Error::Internal("a device ended its work before the render did".into())),
         }
-        worker.collect(&mut |c| self.merge(&c, epoch, n, observe))
     }
 
-    /// A tile in the coordinates of the full film.
-    fn unit_rect(&self, tile: u32) -> UnitRect {
-        let rect = self.cube.grid().rect(tile);
-        let [x, y] = self.cube.header().origin;
-        [x + rect.x0, y + rect.y0, x + rect.x1, y + rect.y1]
-    }
-
-    /// Merges the means of a group of units into the cube.
-    fn merge(
+    /// A group of units is in the cube.
+    fn note_merged(
         &mut self,
-        collected: &Collected,
-        epoch: u32,
-        n: u32,
+        cube: &Cube,
+        current: u32,
+        device: usize,
+        merged: Merged,
         observe: &mut dyn FnMut(Event) -> Result<()>,
     ) -> Result<()> {
-        let counters = collected.counters;
-        if counters.overflow > 0 {
-            return Err(Error::Usage(format!(
-                "{} rays met more primitives than can be tested, in {} or nearby: too many triangles overlap in one place; \
-                 remove duplicates",
-                counters.overflow,
-                describe_rect(&collected.units[0]),
-            )));
+        let ahead = (merged.group.epoch - current) as usize;
+        if self.merged.len() <= ahead {
+            self.merged.resize(ahead + 1, 0);
         }
-        self.counters.non_finite += counters.non_finite;
-        self.counters.negative += counters.negative;
-        if counters.bad_sample > 0 && self.first_bad.is_none() {
-            let [width, height] = self.cube.header().tile;
-            let unit = collected.units[(counters.bad_slot / (width * height)) as usize];
-            let in_tile = counters.bad_slot % (width * height);
-            let pixel = [unit[0] + in_tile % width, unit[1] + in_tile / width];
-            self.first_bad = Some([pixel[0], pixel[1], epoch, counters.bad_sample - 1]);
+        self.merged[ahead] += merged.group.tiles.len() as u32;
+        self.status.units.0 = self.merged[0];
+        self.counters.non_finite += merged.counters.non_finite;
+        self.counters.negative += merged.counters.negative;
+        if let (Some([x, y, sample]), None) = (merged.bad, self.first_bad) {
+            self.first_bad = Some([x, y, merged.group.epoch, sample]);
         }
-
-        // Before merging, which the device need not wait for.
-        self.status.idle_s = collected.idle_s;
-        self.status.busy_s = self.rendering_s() - collected.idle_s;
-        let began = Instant::now();
-        let grid = self.cube.grid();
-        let unit_len = collected.means.len() / collected.units.len();
-        for (unit, mean) in collected.units.iter().zip(collected.means.chunks(unit_len)) {
-            let [x, y] = self.cube.header().origin;
-            let tile = grid.tile_at(unit[0] - x, unit[1] - y);
-            self.cube.merge_unit(tile, n, mean)?;
-            self.status.units.0 += 1;
-            self.status.device_units += 1;
-            self.status.paths += grid.rect(tile).pixels() * u64::from(n);
-        }
-        self.merge_s += began.elapsed().as_secs_f64();
-        self.status.rays += u64::from(counters.rays);
-        self.status.elapsed = self.started.elapsed();
-        self.status.remaining = self.remaining();
+        self.merge_s += merged.merge_s;
+        self.status.paths += merged.paths;
+        self.status.rays += u64::from(merged.counters.rays);
+        self.update_clock();
+        let rendering_s = self.status.rendering_s;
+        let of_device = &mut self.status.devices[device];
+        of_device.units += merged.group.tiles.len() as u64;
+        of_device.idle_s = merged.idle_s;
+        of_device.busy_s = rendering_s - merged.idle_s;
         if self.last_preview.is_none_or(|last| last.elapsed() >= PREVIEW_INTERVAL) {
-            self.write_preview()?;
+            self.write_preview(cube)?;
         }
         observe(Event::Progress(&self.status))
+    }
+
+    /// What a device measured, when it has ended.
+    fn note_profile(&mut self, report: Report) {
+        if let Report::Left { result: Ok(Some(of_device)) } = report {
+            let sum = self.profile.get_or_insert_default();
+            sum.generate_s += of_device.generate_s;
+            sum.evaluate_s += of_device.evaluate_s;
+        }
+    }
+
+    fn update_clock(&mut self) {
+        self.status.elapsed = self.started.elapsed();
+        self.status.rendering_s = self.rendering_s();
+        self.status.remaining = self.remaining();
     }
 
     /// Time until the last epoch ends, from the paths still to trace.
     fn remaining(&self) -> Option<Duration> {
         let left = self.samples_limit.map(|limit| {
-            let total = self.cube.header().size.iter().map(|&s| f64::from(s)).product::<f64>() * f64::from(limit);
-            self.rendering_s() * (total / self.status.paths.max(1) as f64 - 1.0)
+            let pixels: f64 = self.job.scene.film.cube_size().iter().map(|&s| f64::from(s)).product();
+            self.rendering_s() * (pixels * f64::from(limit) / self.status.paths.max(1) as f64 - 1.0)
         });
         let until = self.job.stop.time.map(|limit| limit.as_secs_f64() - self.status.elapsed.as_secs_f64());
         let seconds = [left, until].into_iter().flatten().reduce(f64::min)?;
         Duration::try_from_secs_f64(seconds.max(0.0)).ok()
     }
 
-    fn update_estimate(&mut self) -> Result<()> {
+    fn update_estimate(&mut self, cube: &Cube) -> Result<()> {
         if self.status.samples >= 2 * self.job.scene.integrator.epoch {
-            let estimates = self.cube.error_estimate()?;
+            let estimates = cube.error_estimate()?;
             self.status.error_estimate = estimates.into_iter().filter(|e| !e.is_nan()).reduce(f64::max);
         }
-        self.status.elapsed = self.started.elapsed();
-        self.status.remaining = self.remaining();
+        self.update_clock();
         Ok(())
     }
 
     /// Writes the preview, if one is wanted, and says at which exposure.
-    fn write_preview(&mut self) -> Result<Option<f64>> {
+    fn write_preview(&mut self, cube: &Cube) -> Result<Option<f64>> {
         let Some(preview) = &self.job.preview else { return Ok(None) };
-        let picture = self.cube.preview()?;
+        let picture = cube.preview()?;
         let exposure = preview.exposure.unwrap_or_else(|| picture.auto_exposure());
         format::png::write(&preview.file, &picture, exposure)?;
         self.last_preview = Some(Instant::now());
@@ -358,9 +441,11 @@ impl<'a> Render<'a> {
     }
 
     /// Facts about this process, which are not part of what the cube is.
-    fn write_run_facts(&self) -> Result<()> {
+    fn write_run_facts(&self, cube: &Cube) -> Result<()> {
+        let devices =
+            self.status.devices.iter().map(|d| json!({ "name": d.name, "units": d.units, "idle_seconds": d.idle_s }));
         let facts = json!({
-            "device": self.status.device,
+            "devices": devices.collect::<Vec<_>>(),
             "seconds": self.started.elapsed().as_secs_f64(),
             "setup_seconds": self.setup_s,
             "merge_seconds": self.merge_s,
@@ -371,7 +456,7 @@ impl<'a> Render<'a> {
             "negative_samples": self.counters.negative,
             "version": env!("CARGO_PKG_VERSION"),
         });
-        let folder = self.cube.path().join(".spectile");
+        let folder = cube.path().join(".spectile");
         let file: &Path = &folder.join(format!("run-{}.json", files::random_suffix()));
         files::write_atomically(file, format!("{facts:#}\n").as_bytes())
     }
@@ -386,10 +471,6 @@ impl<'a> Render<'a> {
              with the scene"
         )))
     }
-}
-
-fn describe_rect(unit: &UnitRect) -> String {
-    format!("pixels {}..{} x {}..{}", unit[0], unit[2], unit[1], unit[3])
 }
 
 #[cfg(test)]

@@ -230,7 +230,7 @@ impl Worker {
     fn collect_slot(&mut self, slot: usize, collected: &mut dyn FnMut(Collected) -> Result<()>) -> Result<()> {
         let Some(pending) = self.slots[slot].pending.take() else { return Ok(()) };
         buffer::wait(&self.gpu, pending.submission)?;
-        if self.slots.iter().all(|slot| slot.pending.is_none()) {
+        if self.is_idle() {
             self.idle_since = Some(Instant::now());
         }
         let size = self.unit_bytes() * pending.units.len() as u64;
@@ -249,6 +249,11 @@ impl Worker {
         }
         staging.unmap();
         Ok(())
+    }
+
+    /// Whether nothing is under way.
+    pub fn is_idle(&self) -> bool {
+        self.slots.iter().all(|slot| slot.pending.is_none())
     }
 
     /// Scene and buffers on the device, bytes.

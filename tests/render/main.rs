@@ -4,6 +4,7 @@
 mod json;
 mod outcome;
 mod running;
+mod several;
 mod sizes;
 mod wrong;
 
