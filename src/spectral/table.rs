@@ -18,8 +18,7 @@ struct Line {
     slope: f64,
 }
 
-/// The tables of a scene. Spectrum ids are positions in `curves` as given to [`SpectralTables::build`], after
-/// reordering: see `id`.
+/// The tables of a scene. Spectrum ids number the curves given to [`SpectralTables::build`] in another order: see `ids`.
 #[derive(Debug)]
 pub struct SpectralTables {
     /// Each channel has 2^stratum_bits strata.
