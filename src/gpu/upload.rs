@@ -63,8 +63,9 @@ impl SceneBuffers {
         let frame = buffer::empty(gpu, "frame", size_of_val(&prepared.frame) as u64, usage);
         gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&prepared.frame));
         named.push(("frame".into(), frame));
+        let limits = gpu.device.limits();
         let mut add = |name: &str, bytes: &[u8]| {
-            check_size(name, bytes.len() as u64, &gpu.limits)?;
+            check_size(name, bytes.len() as u64, &limits)?;
             named.push((name.to_owned(), buffer::storage(gpu, name, bytes)));
             Ok::<_, Error>(())
         };
