@@ -168,15 +168,14 @@ fn generate_bounce(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     let direction = cosine_hemisphere(normal, u_bsdf);
 #if ROULETTE
     if (step.bounce + 1u >= frame.roulette_start) {
-        let survival = clamp(material.albedo, 0.05, 1.0);
-        if (u_choice.y >= survival) {
+        if (u_choice.y >= material.albedo) {
             if (overflow) {
                 atomicAdd(&counters[COUNTER_OVERFLOW], 1u);
             }
             end_path(list, 2u * step.bounce + 2u);
             return;
         }
-        scale /= survival;
+        scale /= material.albedo;
     }
     throughputs[path] = scale;
 #endif

@@ -348,6 +348,13 @@ fn overwrite_replaces_cubes_and_nothing_else() {
     assert!(refusal(false).contains("exists already"));
     assert!(refusal(true).contains("is a file"));
     fs::remove_file(&path).expect("removed");
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("nowhere", &path).expect("linked");
+        assert!(refusal(false).contains("exists already"));
+        assert!(refusal(true).contains("a link to nothing"));
+        fs::remove_file(&path).expect("removed");
+    }
 
     // A cube, alone and with somebody's notes in it.
     let old = patterned(folder.path(), "cube.zarr", header([16, 16], [8, 8], 3));

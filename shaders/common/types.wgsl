@@ -99,7 +99,8 @@ struct Emitter {
 const EMITS_BOTH_SIDES: u32 = 0x80000000u;
 const SPECTRUM_MASK: u32 = 0xffffu;
 
-// `factor`: spectrum of the throughput, NONE where nothing is scattered. `albedo`: its largest value over the channels.
+// `factor`: spectrum of the throughput, NONE where nothing is scattered. `albedo`: its largest value over the channels,
+// rounded up to a step of the random numbers, so that it is the probability with which roulette lets a path go on.
 struct Material {
     factor: u32,
     two_sided: u32,

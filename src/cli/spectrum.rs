@@ -11,8 +11,8 @@ use crate::{Error, Result};
 
 /// Print the spectrum of one pixel as CSV
 ///
-/// One line a channel, in the order of the cube: the centre of the channel in nm and its mean spectral radiance in W m-2
-/// sr-1 nm-1, with as many digits as bring back the stored number exactly.
+/// A header, then one line a channel, in the order of the cube: the centre of the channel in nm and its mean spectral
+/// radiance in W m-2 sr-1 nm-1, with as many digits as bring back the stored number exactly.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = "\
 Examples:
@@ -41,12 +41,13 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         let what = format!("pixel {} {} has no samples yet; try again when its tile is rendered", args.x, args.y);
         return Err(Error::Usage(format!("{}: {what}", args.cube.display())));
     };
-    let samples = cube.samples(cube.grid().tile_at(args.x, args.y))?;
-    let title = format!("{}, column {}, row {}, {samples} samples", args.cube.display(), args.x, args.y);
     if let Some(path) = &args.plot {
+        let samples = cube.samples(cube.grid().tile_at(args.x, args.y))?;
+        let title = format!("{}, column {}, row {}, {samples} samples", args.cube.display(), args.x, args.y);
         write_atomically(path, plot::spectrum(cube.channels(), &spectrum, &title)?.as_bytes())?;
     }
-    let mut csv = format!("# {title}\n# radiance in W m-2 sr-1 nm-1, mean over the channel\nwavelength_nm,radiance\n");
+    // The header stands first: many readers of CSV know no comments.
+    let mut csv = "wavelength_nm,radiance\n".to_owned();
     for (k, radiance) in spectrum.iter().enumerate() {
         // Debug, not Display: 1e-30 instead of thirty zeros. Writing to a string cannot fail.
         let _ = writeln!(csv, "{},{radiance:?}", cube.channels().centre(k));

@@ -358,6 +358,9 @@ fn check_removable(path: &Path) -> Result<()> {
     let refuse = |what: String| {
         Error::Usage(format!("{}: --overwrite replaces nothing but Spectile cubes: {what}", path.display()))
     };
+    if !path.exists() {
+        return Err(refuse("this is a link to nothing".into()));
+    }
     let group = read_group(path).map_err(|error| match error {
         Error::Storage { what, .. } => refuse(format!("this {what}")),
         error => error,

@@ -1,5 +1,6 @@
 //! The scene on a device: one immutable copy, large arrays in windows below the binding limit.
 
+use crate::files::format_bytes;
 use crate::gpu::adapter::Gpu;
 use crate::gpu::buffer;
 use crate::render::prepare::{Prepared, WindowList, Windows};
@@ -36,32 +37,56 @@ pub fn windows(prepared: &Prepared, binding: u64) -> Result<Windows> {
     })
 }
 
+/// Refuses what is not spread over windows and exceeds one binding.
+fn check_size(name: &str, bytes: u64, limits: &wgpu::Limits) -> Result<()> {
+    let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+    if bytes <= most {
+        return Ok(());
+    }
+    let (what, help) = match name {
+        "spectra" | "knot_starts" | "knots" => ("the spectra of the scene", "fewer channels or fewer spectra"),
+        "emitters" | "emitter_cdf" => ("the emitting triangles of the scene", "a coarser mesh where it emits"),
+        _ => ("the materials of the scene", "fewer of them"),
+    };
+    Err(Error::Usage(format!(
+        "{what} take {} and this device binds at most {}: use {help}",
+        format_bytes(bytes),
+        format_bytes(most)
+    )))
+}
+
 impl SceneBuffers {
+    /// Uploads the scene. Errors: spectra, materials or emitters that exceed one binding.
     pub fn new(gpu: &Gpu, prepared: &Prepared, windows: &Windows) -> Result<SceneBuffers> {
         let mut named = Vec::new();
-        let mut add = |name: String, buffer: wgpu::Buffer| named.push((name, buffer));
         let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
         let frame = buffer::empty(gpu, "frame", size_of_val(&prepared.frame) as u64, usage);
         gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&prepared.frame));
-        add("frame".into(), frame);
-        add("materials".into(), buffer::storage(gpu, "materials", &prepared.materials));
-        add("emitters".into(), buffer::storage(gpu, "emitters", &prepared.emitters));
-        add("emitter_cdf".into(), buffer::storage(gpu, "emitter_cdf", &prepared.picks.cdf));
+        named.push(("frame".into(), frame));
+        let limits = gpu.device.limits();
+        let mut add = |name: &str, bytes: &[u8]| {
+            check_size(name, bytes.len() as u64, &limits)?;
+            named.push((name.to_owned(), buffer::storage(gpu, name, bytes)));
+            Ok::<_, Error>(())
+        };
+        add("materials", bytemuck::cast_slice(&prepared.materials))?;
+        add("emitters", bytemuck::cast_slice(&prepared.emitters))?;
+        add("emitter_cdf", bytemuck::cast_slice(&prepared.picks.cdf))?;
         let mut add_windows = |name: &str, list: WindowList, bytes: &[u8], element: u64| {
             for i in 0..u64::from(list.count) {
                 let size = u64::from(list.size) * element;
                 let end = ((i + 1) * size).min(bytes.len() as u64);
-                let label = format!("{name}_{i}");
-                add(label.clone(), buffer::storage(gpu, &label, &bytes[(i * size) as usize..end as usize]));
+                add(&format!("{name}_{i}"), &bytes[(i * size) as usize..end as usize])?;
             }
+            Ok::<_, Error>(())
         };
-        add_windows("nodes", windows.nodes, bytemuck::cast_slice(&prepared.accel.nodes), NODE_BYTES);
+        add_windows("nodes", windows.nodes, bytemuck::cast_slice(&prepared.accel.nodes), NODE_BYTES)?;
         let primitives = bytemuck::cast_slice(&prepared.accel.primitives);
-        add_windows("primitives", windows.primitives, primitives, PRIMITIVE_BYTES);
-        add("spectra".into(), buffer::storage(gpu, "spectra", &prepared.tables.strata));
+        add_windows("primitives", windows.primitives, primitives, PRIMITIVE_BYTES)?;
+        add("spectra", bytemuck::cast_slice(&prepared.tables.strata))?;
         if prepared.features.knots {
-            add("knot_starts".into(), buffer::storage(gpu, "knot_starts", &prepared.tables.knot_starts));
-            add("knots".into(), buffer::storage(gpu, "knots", &prepared.tables.knots));
+            add("knot_starts", bytemuck::cast_slice(&prepared.tables.knot_starts))?;
+            add("knots", bytemuck::cast_slice(&prepared.tables.knots))?;
         }
         let bytes = named.iter().map(|(_, b)| b.size()).sum();
         Ok(SceneBuffers { named, bytes })
@@ -70,5 +95,20 @@ impl SceneBuffers {
     /// The binding for the variable `name`, if it is one of the scene's.
     pub fn find(&self, name: &str) -> Option<wgpu::BufferBinding<'_>> {
         self.named.iter().find(|(n, _)| n == name).map(|(_, b)| b.as_entire_buffer_binding())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::check_size;
+
+    #[test]
+    fn what_exceeds_a_binding_is_bad_input() {
+        let limits =
+            wgpu::Limits { max_storage_buffer_binding_size: 128 << 20, max_buffer_size: 2 << 30, ..Default::default() };
+        assert!(check_size("knots", 128 << 20, &limits).is_ok());
+        let error = check_size("knots", (128 << 20) + 8, &limits).expect_err("too large");
+        assert_eq!(error.exit_code(), 2);
+        assert!(error.to_string().contains("spectra"), "{error}");
     }
 }

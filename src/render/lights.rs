@@ -78,7 +78,7 @@ fn intervals(environment: f64, weights: &[f64]) -> (Vec<f32>, Vec<f64>) {
 }
 
 /// Random numbers on the device have 24 bits.
-const STEPS: f64 = 16_777_216.0;
+pub(super) const STEPS: f64 = 16_777_216.0;
 
 /// q of DESIGN section 6 for `powers[light][channel]`.
 fn probabilities(powers: &[Vec<f64>]) -> Vec<f64> {

@@ -138,7 +138,7 @@ pub fn check(scene: &Scene) -> Result<()> {
     Ok(())
 }
 
-/// Spectra whose tables miss the bounds of DESIGN section 7, or nothing.
+/// The spectra in use, and how exactly their tables hold them.
 pub fn table_bounds(prepared: &Prepared) -> Value {
     let each = prepared.spectrum_names.iter().zip(&prepared.tables.bounds).skip(1);
     each.map(|(name, b)| json!({ "name": name, "pointwise": b.pointwise, "mean": b.mean })).collect()

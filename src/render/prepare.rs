@@ -3,7 +3,7 @@
 use crate::accel::{Accel, MAX_MATERIALS};
 use crate::gpu::layout::{EMITS_BOTH_SIDES, Emitter, Frame, Material, NONE};
 use crate::gpu::shader::{self, Defines, Module};
-use crate::render::lights::{LightPicks, light_picks};
+use crate::render::lights::{LightPicks, STEPS, light_picks};
 use crate::scene::{Bsdf, Filter, Projection, Sampler, Scene, Sides};
 use crate::spectral::Curve;
 use crate::spectral::table::SpectralTables;
@@ -250,7 +250,8 @@ fn material(scene: &Scene, m: &crate::scene::Material, factor: impl Fn(usize) ->
             (if albedo > 0.0 { factor(reflectance) } else { NONE }, albedo)
         }
     };
-    Material { factor, two_sided: u32::from(m.two_sided), albedo: albedo as f32, unused: 0 }
+    let survival = (albedo * STEPS).ceil() / STEPS;
+    Material { factor, two_sided: u32::from(m.two_sided), albedo: survival as f32, unused: 0 }
 }
 
 fn features(scene: &Scene, accel: &Accel, tables: &SpectralTables, spectra: usize) -> Features {

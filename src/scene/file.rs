@@ -30,8 +30,9 @@ const TOP: Keys = Keys::new(&[
 const INTEGRATOR: Keys =
     Keys::new(&["max_bounces", "russian_roulette_start", "sampler", "wavelengths", "evaluator", "epoch"]);
 const ENVIRONMENT: Keys = Keys::new(&["radiance", "up", "rotate_degrees", "scale"]).later(&["map"]);
-/// Evaluations walk all vertices of a path in one loop, whose iterations are bounded (DESIGN section 7).
-const MAX_BOUNCES: u32 = 16_384;
+/// Evaluations walk all records of a path, two a bounce and one more, in one loop of at most 32,768 iterations (DESIGN
+/// section 7).
+const MAX_BOUNCES: u32 = 16_383;
 const MAX_EPOCH: u32 = 1024;
 
 /// Reads the scene in `file`. `overrides` are the `--set` arguments: a dotted key and the text of a TOML value; a bare

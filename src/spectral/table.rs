@@ -5,8 +5,9 @@ use super::{Channels, Curve};
 
 /// Pointwise bound relative to the channel's peak (DESIGN section 7).
 pub const POINTWISE_BOUND: f64 = 1e-4;
-/// Most entries (strata x channels) per spectrum.
+/// Most entries (strata x channels) per spectrum, and of all spectra together: 96 MiB, less than what every device binds.
 const MAX_ENTRIES: usize = 1 << 18;
+const MAX_ENTRIES_IN_ALL: usize = 12 << 20;
 /// More strata than this would leave too few bits for the place within one.
 const MAX_STRATUM_BITS: u32 = 12;
 
@@ -17,8 +18,7 @@ struct Line {
     slope: f64,
 }
 
-/// The tables of a scene. Spectrum ids are positions in `curves` as given to [`SpectralTables::build`], after
-/// reordering: see `id`.
+/// The tables of a scene. Spectrum ids number the curves given to [`SpectralTables::build`] in another order: see `ids`.
 #[derive(Debug)]
 pub struct SpectralTables {
     /// Each channel has 2^stratum_bits strata.
@@ -51,7 +51,9 @@ impl SpectralTables {
     /// Tables for `curves` over `channels`, in the order given (spectra that need knots move to the end).
     pub fn build(curves: &[&Curve], channels: &Channels) -> SpectralTables {
         let channels_padded = channels.len().next_multiple_of(4);
-        let max_bits = (MAX_ENTRIES / channels_padded).max(1).ilog2().min(MAX_STRATUM_BITS);
+        // All spectra have as many strata as the one that needs most.
+        let entries = MAX_ENTRIES.min(MAX_ENTRIES_IN_ALL / curves.len().max(1));
+        let max_bits = (entries / channels_padded).max(1).ilog2().min(MAX_STRATUM_BITS);
         let needed: Vec<Option<(u32, Bounds)>> = curves.iter().map(|c| strata_needed(c, channels, max_bits)).collect();
         let stratum_bits = needed.iter().flatten().map(|n| n.0).max().unwrap_or(0);
 
@@ -301,18 +303,23 @@ mod tests {
 
     fn check(curve: &Curve, channels: &Channels) {
         let tables = SpectralTables::build(&[&Curve::Constant(1.0), curve], channels);
+        check_curve(&tables, 1, curve, channels);
+    }
+
+    /// What `tables` hold at position `at` is `curve`, within the bounds.
+    fn check_curve(tables: &SpectralTables, at: usize, curve: &Curve, channels: &Channels) {
         for k in 0..channels.len() {
             let [from, to] = channels.bounds[k];
             let peak = curve.max(from, to);
             for i in 0..4096u32 {
                 let mu = (i << 20) + (1 << 19);
                 let nm = channels.wavelength(k, f64::from(mu) / 4_294_967_296.0);
-                let got = f64::from(lookup(&tables, 1, k, mu));
+                let got = f64::from(lookup(tables, at, k, mu));
                 let allowed = (1.01 * POINTWISE_BOUND + 3e-7) * peak + 1e-30;
                 assert!((got - curve.eval(nm)).abs() <= allowed, "channel {k} at {nm}: {got} {}", curve.eval(nm));
                 assert!(got >= 0.0);
             }
-            let (mean, exact) = (device_mean(&tables, 1, k), curve.mean(from, to));
+            let (mean, exact) = (device_mean(tables, at, k), curve.mean(from, to));
             assert!((mean - exact).abs() <= 1e-5 * exact, "channel {k}: mean {mean} instead of {exact}");
         }
     }
@@ -347,6 +354,23 @@ mod tests {
                 assert_eq!(lookup(&tables, 2, k, mu).to_bits(), c.to_bits());
             }
         }
+    }
+
+    /// Strata that one spectrum wants are paid for by all of them.
+    #[test]
+    fn many_spectra_do_not_outgrow_a_binding() {
+        let channels = Channels::equal(380.0, 780.0, 1000);
+        let zigzag: Vec<_> = (0..212).map(|j| (380.0 + 1.9 * j as f64 + 0.01, 0.5 + 0.08 * f64::from(j % 2))).collect();
+        let zigzag = table(&zigzag, Outside::Hold);
+        let alone = SpectralTables::build(&[&zigzag], &channels);
+        assert!(!alone.has_knots() && alone.stratum_bits > 5, "{} bits", alone.stratum_bits);
+        let mut curves = vec![&zigzag];
+        let constant = Curve::Constant(0.5);
+        curves.resize(400, &constant);
+        let tables = SpectralTables::build(&curves, &channels);
+        assert!(size_of_val(tables.strata.as_slice()) <= 8 * MAX_ENTRIES_IN_ALL);
+        check_curve(&tables, 0, &zigzag, &channels);
+        assert_eq!(lookup(&tables, 399, 999, 12345), 0.5);
     }
 
     /// Channels that share their edges with the table's nodes need no strata.

@@ -76,6 +76,7 @@ pub fn render(scene: &Scene, epochs: u32, samples: u32, settings: Settings) -> E
                 counters.overflow += collected.counters.overflow;
                 counters.non_finite += collected.counters.non_finite;
                 counters.negative += collected.counters.negative;
+                counters.rays += collected.counters.rays;
                 let unit_size = (tw * th) as usize * channels;
                 for (unit, means) in collected.units.iter().zip(collected.means.chunks(unit_size)) {
                     for y in unit[1]..unit[3] {

@@ -4,6 +4,7 @@ use glam::{DVec2, DVec3};
 use spectile::scene::{Filter, Projection, Shape, Sides};
 use spectile::spectral::{Channels, Curve};
 
+use crate::device::{Settings, render};
 use crate::scene_builder::*;
 use crate::statistics::*;
 use crate::{assert_exact, measure, table};
@@ -101,6 +102,27 @@ fn roulette_reaches_the_limit() {
         let expected = 1.0 / (1.0 - rho);
         let bound = Bound { resolution: 0.008, allowance: rho.powi(bounces as i32) + expected * ORIGIN_OFFSET };
         assert_estimates("roulette", &measure(scene, 1, 5), &[expected], bound);
+    }
+}
+
+/// Roulette survives with the albedo, however small: in a closed cavity of ρ a path that survives S times traces
+/// 2 S + 2 rays, and S is geometric with mean ρ / (1 - ρ) and variance ρ / (1 - ρ)².
+#[test]
+fn roulette_survives_with_the_albedo() {
+    for rho in [0.01, 0.3] {
+        let scene = Builder::new()
+            .camera(look(DVec3::ZERO, DVec3::ONE, DVec3::Y, narrow()))
+            .film(16, 16, Filter::Box)
+            .glowing(sphere(DVec3::ZERO, 1.0), rho, 1.0, Sides::Both)
+            .bounces(60)
+            .roulette(1)
+            .build();
+        let rendered = render(&scene, 1, 64, Settings::default());
+        let paths = 16.0 * 16.0 * 64.0;
+        let expected = paths * 2.0 / (1.0 - rho);
+        let deviation = 2.0 * (paths * rho).sqrt() / (1.0 - rho);
+        let rays = f64::from(rendered.counters.rays);
+        assert!((rays - expected).abs() < 4.0 * deviation, "{rho}: {rays} rays instead of {expected}");
     }
 }
 
