@@ -144,7 +144,7 @@ impl Plan<'_> {
             "path_bytes": self.waves.path_bytes(),
             "device_scene_bytes": memory.scene,
             "device_wave_bytes": memory.waves,
-            "host_scene_bytes": memory.host_scene,
+            "host_scene_bytes": memory.scene,
             "disk_bytes": memory.disk,
             "device": self.measured.as_ref().map(|m| m.device.clone()),
             "paths_per_s": self.measured.as_ref().map(|m| m.paths_per_s),
@@ -191,7 +191,7 @@ impl Plan<'_> {
             self.waves.paths,
             self.waves.path_bytes()
         );
-        text += &format!("host      {} for the scene, 1 MiB to merge\n", format_bytes(memory.host_scene));
+        text += &format!("host      {} for the scene, 1 MiB to merge\n", format_bytes(memory.scene));
         text += &format!("disk      {}\n", format_bytes(memory.disk));
         match (&self.measured, self.predicted_s()) {
             (Some(m), Some(seconds)) => {

@@ -69,7 +69,7 @@ pub fn feature_lines(prepared: &Prepared, waves: &WavePlan) -> Vec<FeatureLine> 
     let line = |name, used, effect: String| FeatureLine { name, used, effect };
     use crate::gpu::shader as s;
     vec![
-        line("area lights", f.emitters, format!("{} records of 8 bytes a path", bounces)),
+        line("area lights", f.emitters, format!("{bounces} records of 8 bytes a path")),
         line("environment", f.environment, "one light to choose from".into()),
         line("spheres, disks, cylinders", f.shapes, format!("{}, a test per primitive", module(s::SHAPES))),
         line(
@@ -100,12 +100,10 @@ pub fn feature_lines(prepared: &Prepared, waves: &WavePlan) -> Vec<FeatureLine> 
 /// Memory of a render, bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Memory {
-    /// Scene on the device: BVH, primitives, materials, lights, spectra.
+    /// The flattened scene, on the host and on every device: BVH, primitives, materials, lights, spectra.
     pub scene: u64,
     /// Path buffers, means and staging on the device.
     pub waves: u64,
-    /// On the host, anonymous: the scene as parsed and flattened, apart from the cube's mapped files.
-    pub host_scene: u64,
     /// The finished cube.
     pub disk: u64,
 }
@@ -121,7 +119,7 @@ pub fn memory(prepared: &Prepared, waves: &WavePlan, header: &Header) -> Memory 
         + size_of_val(prepared.tables.strata.as_slice())
         + size_of_val(prepared.tables.knots.as_slice())
         + size_of_val(prepared.tables.knot_starts.as_slice());
-    Memory { scene: scene as u64, waves: waves.device_bytes(), host_scene: scene as u64, disk: header.store_bytes() }
+    Memory { scene: scene as u64, waves: waves.device_bytes(), disk: header.store_bytes() }
 }
 
 /// Waves for a device that is not there: what a GPU of common limits would get.

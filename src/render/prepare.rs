@@ -114,7 +114,7 @@ impl Prepared {
         d
     }
 
-    /// The modules of `generate_camera` and `generate_bounce`.
+    /// The modules of each pass, the pass itself last.
     pub fn camera_modules(&self) -> Vec<Module> {
         vec![shader::TYPES, shader::RNG, shader::GEOMETRY, shader::FRAME, shader::GENERATE_CAMERA]
     }

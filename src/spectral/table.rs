@@ -54,8 +54,8 @@ impl SpectralTables {
         // All spectra have as many strata as the one that needs most.
         let entries = MAX_ENTRIES.min(MAX_ENTRIES_IN_ALL / curves.len().max(1));
         let max_bits = (entries / channels_padded).max(1).ilog2().min(MAX_STRATUM_BITS);
-        let needed: Vec<Option<(u32, Bounds)>> = curves.iter().map(|c| strata_needed(c, channels, max_bits)).collect();
-        let stratum_bits = needed.iter().flatten().map(|n| n.0).max().unwrap_or(0);
+        let needed: Vec<Option<u32>> = curves.iter().map(|c| strata_needed(c, channels, max_bits)).collect();
+        let stratum_bits = needed.iter().flatten().copied().max().unwrap_or(0);
 
         // The stratified first, the knotted after them.
         let stratified: Vec<usize> = (0..curves.len()).filter(|&i| needed[i].is_some()).collect();
@@ -152,26 +152,16 @@ impl Bounds {
     }
 }
 
-/// Stratum bits that keep the bounds in every channel, or `None` where `max_bits` do not.
-fn strata_needed(curve: &Curve, channels: &Channels, max_bits: u32) -> Option<(u32, Bounds)> {
-    let mut bits = 0;
-    let mut worst = Bounds::default();
+/// Stratum bits that keep the pointwise bound in every channel, or `None` where `max_bits` do not.
+fn strata_needed(curve: &Curve, channels: &Channels, max_bits: u32) -> Option<u32> {
     // What satisfied the channels so far is where the next channel starts.
-    for k in 0..channels.len() {
-        loop {
+    (0..channels.len()).try_fold(0, |least, k| {
+        let keeps_bound = |bits: &u32| {
             let lines = fit_channel(curve, channels, k, 1 << bits);
-            let bounds = channel_bounds(curve, channels, k, &lines);
-            if bounds.pointwise <= POINTWISE_BOUND {
-                worst = worst.max(bounds);
-                break;
-            }
-            bits += 1;
-            if bits > max_bits {
-                return None;
-            }
-        }
-    }
-    Some((bits, worst))
+            channel_bounds(curve, channels, k, &lines).pointwise <= POINTWISE_BOUND
+        };
+        (least..=max_bits).find(keeps_bound)
+    })
 }
 
 fn fit_channel(curve: &Curve, channels: &Channels, k: usize, strata: usize) -> Vec<Line> {
