@@ -10,6 +10,7 @@ mod scene_builder;
 use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3};
+use scene_builder::closed_forms::{self, Case, form_factors, patch, patch_under_squares};
 use scene_builder::*;
 use spectile::reference::{Estimate, render, render_image};
 use spectile::scene::{Filter, Projection, Scene, Shape, Sides};
@@ -158,22 +159,9 @@ fn closed_cavities_of_other_shapes() {
     }
 }
 
-/// Kirchhoff: in a closed isothermal cavity of grey walls, ε B emitted and 1 - ε reflected, L = B(λ, T) for any mix of
-/// emissivities, in every channel; 10 um, 300 K: 9.924033e-3.
 #[test]
 fn isothermal_cavity_is_black() {
-    let planck = |scale| Curve::Blackbody { kelvin: 300.0, scale };
-    let channels = Channels::from_bounds(vec![[3e3, 5e3], [8e3, 12e3], [9_999.0, 10_001.0], [14e3, 20e3]], None);
-    let expected: Vec<f64> = channels.bounds.iter().map(|b| planck(1.0).mean(b[0], b[1])).collect();
-    assert!((expected[2] - 9.924033e-3).abs() < 1e-8);
-    let scene = Builder::new()
-        .camera(look(0.5 * DVec3::ONE, DVec3::new(0.9, 0.8, 0.0), DVec3::Y, narrow()))
-        .channels(channels)
-        .bounces(200)
-        .glowing(room(DVec3::ZERO, DVec3::ONE), 0.8, planck(0.2), Sides::Front)
-        .glowing(sphere(DVec3::new(0.7, 0.7, 0.7), 0.2), 0.4, planck(0.6), Sides::Front)
-        .glowing(disk(DVec3::new(0.3, 0.5, 0.2), DVec3::Z, 0.2), 0.1, planck(0.9), Sides::Both)
-        .build();
+    let (scene, expected) = closed_forms::isothermal_cavity(200);
     assert_z(&one_pixel(&scene, 20_000, 7), &expected, 0.01);
 }
 
@@ -182,36 +170,8 @@ fn isothermal_cavity_is_black() {
 /// Disks of radius 1e5 one metre apart stand for infinite plates: 1e-10 of the hemisphere is missing.
 #[test]
 fn parallel_grey_plates() {
-    let um = 1e3;
-    let channels =
-        Channels::from_bounds(vec![[3.0 * um, 5.0 * um], [9.999 * um, 10.001 * um], [8.0 * um, 14.0 * um]], None);
-    for (e, kelvin, published, seed) in [
-        ([0.9, 0.8], [400.0, 300.0], [0.03163354, 0.01426593], 10),
-        ([0.5, 0.5], [400.0, 300.0], [0.02568353, 0.01780378], 11),
-        ([0.1, 0.9], [900.0, 300.0], [0.04199965, 0.01313159], 12),
-    ] {
-        let planck = |i: usize| Curve::Blackbody { kelvin: kelvin[i], scale: e[i] };
-        // The plate looked at, and the other one.
-        for (plate, published) in published.into_iter().enumerate() {
-            let (this, other) = (plate, 1 - plate);
-            let expected: Vec<f64> = (channels.bounds.iter())
-                .map(|[from, to]| {
-                    let (own, opposite) = (planck(this).mean(*from, *to), planck(other).mean(*from, *to));
-                    (own + (1.0 - e[this]) * opposite) / (1.0 - (1.0 - e[0]) * (1.0 - e[1]))
-                })
-                .collect();
-            assert!((expected[1] - published).abs() < 1e-8, "the published digits at 10 um");
-            let height = plate as f64;
-            let camera = look(DVec3::new(0.0, 0.0, 0.5), DVec3::new(0.1, 0.0, height), DVec3::Y, narrow());
-            let scene = Builder::new()
-                .camera(camera)
-                .channels(channels.clone())
-                .bounces(100)
-                .glowing(disk(DVec3::ZERO, DVec3::Z, 1e5), 1.0 - e[0], planck(0), Sides::Front)
-                .glowing(disk(DVec3::Z, DVec3::NEG_Z, 1e5), 1.0 - e[1], planck(1), Sides::Front)
-                .build();
-            assert_z(&one_pixel(&scene, 50_000, seed), &expected, 0.005);
-        }
+    for Case { scene, expected, seed } in closed_forms::grey_plates(1e5, 100) {
+        assert_z(&one_pixel(&scene, 50_000, seed), &expected, 0.005);
     }
 }
 
@@ -271,12 +231,7 @@ fn irradiance_of_a_disk() {
     for (h, published, seed) in [(1.0, 1.570796, 30), (2.0, 0.628319, 31), (10.0, 0.0311049, 32)] {
         let expected = PI / (1.0 + h * h);
         assert!((expected - published).abs() < 1e-6 * published.max(1.0), "the published digits");
-        let base = || {
-            Builder::new()
-                .camera(look(DVec3::new(0.0, 0.05, 0.05), DVec3::ZERO, DVec3::X, narrow()))
-                .diffuse(disk(DVec3::ZERO, DVec3::Z, 0.01), 1.0)
-                .lamp(disk(h * DVec3::Z, DVec3::NEG_Z, 1.0), 1.0, Sides::Front)
-        };
+        let base = || patch().lamp(disk(h * DVec3::Z, DVec3::NEG_Z, 1.0), 1.0, Sides::Front);
         assert_z(&one_pixel(&base().build(), 60_000, seed), &[expected / PI], 0.01);
         // A screen hides the half at x > 0, by symmetry half of E.
         let screen = quad(DVec3::new(0.0, -9.0, 0.5 * h), 9.0 * DVec3::X, 18.0 * DVec3::Y);
@@ -291,83 +246,29 @@ fn irradiance_of_a_disk() {
 #[test]
 fn irradiance_of_a_sphere() {
     for (distance, seed) in [(1.5, 40), (4.0, 41)] {
-        let scene = Builder::new()
-            .camera(look(DVec3::new(0.0, 0.05, 0.05), DVec3::ZERO, DVec3::X, narrow()))
-            .diffuse(disk(DVec3::ZERO, DVec3::Z, 0.01), 1.0)
-            .lamp(sphere(distance * DVec3::Z, 1.0), 2.0, Sides::Front)
-            .build();
+        let scene = patch().lamp(sphere(distance * DVec3::Z, 1.0), 2.0, Sides::Front).build();
         assert_z(&one_pixel(&scene, 60_000, seed), &[2.0 / (distance * distance)], 0.01);
     }
 }
 
-/// A patch facing a centred square of side 2a at h = 1: F = (2/π) · 2 · X/√(1+X²) atan(X/√(1+X²)), X = a/h.
 #[test]
 fn irradiance_of_a_square() {
-    for (side, published, seed) in [(2.0f64, 0.554126, 50), (1.0, 0.239456, 51)] {
-        let x = 0.5 * side;
-        let slope = x / (1.0 + x * x).sqrt();
-        let expected = 4.0 / PI * slope * slope.atan();
-        assert!((expected - published).abs() < 1e-6, "the published digits");
-        let corner = DVec3::new(-x, x, 1.0);
-        let scene = Builder::new()
-            .camera(look(DVec3::new(0.0, 0.05, 0.05), DVec3::ZERO, DVec3::X, narrow()))
-            .diffuse(disk(DVec3::ZERO, DVec3::Z, 0.01), 1.0)
-            .lamp(quad(corner, side * DVec3::X, side * DVec3::NEG_Y), 1.0, Sides::Front)
-            .build();
-        assert_z(&one_pixel(&scene, 60_000, seed), &[expected], 0.01);
+    for Case { scene, expected, seed } in patch_under_squares() {
+        assert_z(&one_pixel(&scene, 60_000, seed), &expected, 0.01);
     }
 }
 
-/// A one-pixel orthographic camera averages over a unit square (or a disk inside its 2 x 2 view): F₁₂ directly.
 #[test]
 fn form_factors_between_areas() {
-    let above = |centre: DVec3, half: f64| {
-        let projection = Projection::Orthographic { half_size: DVec2::splat(half) };
-        look(centre + 0.25 * DVec3::Z, centre, DVec3::Y, projection)
-    };
-    let floor = || quad(DVec3::ZERO, DVec3::X, DVec3::Y);
-    let middle = DVec3::new(0.5, 0.5, 0.0);
-
-    for (distance, expected, seed) in [(1.0, 0.199825, 60), (0.5, 0.415253, 61)] {
-        let scene = Builder::new()
-            .camera(above(middle, 0.5))
-            .diffuse(floor(), 1.0)
-            .lamp(quad(distance * DVec3::Z, DVec3::Y, DVec3::X), 1.0, Sides::Front)
-            .build();
-        assert_z(&one_pixel(&scene, 60_000, seed), &[expected], 0.01);
-    }
-
-    let wall = quad(DVec3::ZERO, DVec3::Y, DVec3::Z);
-    let scene = Builder::new().camera(above(middle, 0.5)).diffuse(floor(), 1.0).lamp(wall, 1.0, Sides::Front).build();
-    assert_z(&one_pixel(&scene, 60_000, 62), &[0.200044], 0.01);
-
-    for (radius, expected, seed) in [(1.0, 0.381966, 63), (2.0, 0.763932, 64)] {
-        let scene = Builder::new()
-            .camera(above(DVec3::ZERO, 1.0))
-            .diffuse(disk(DVec3::ZERO, DVec3::Z, 1.0), 1.0)
-            .lamp(disk(DVec3::Z, DVec3::NEG_Z, radius), 1.0, Sides::Front)
-            .build();
-        // The disk fills π/4 of the view; beyond it nothing is seen.
-        assert_z(&one_pixel(&scene, 60_000, seed), &[expected * PI / 4.0], 0.01);
+    for Case { scene, expected, seed } in form_factors() {
+        assert_z(&one_pixel(&scene, 60_000, seed), &expected, 0.01);
     }
 }
 
-/// Lights of disjoint spectra and very different power: each channel has its own light's closed form.
 #[test]
 fn lights_of_disjoint_spectra() {
-    let low = table(&[400.0, 500.0, 500.0, 600.0], &[1e6, 1e6, 0.0, 0.0]);
-    let high = table(&[400.0, 500.0, 500.0, 600.0], &[0.0, 0.0, 1e-3, 1e-3]);
-    let scene = Builder::new()
-        .camera(look(DVec3::new(0.0, 0.05, 0.05), DVec3::ZERO, DVec3::X, narrow()))
-        .channels(Channels::equal(400.0, 600.0, 2))
-        .diffuse(disk(DVec3::ZERO, DVec3::Z, 0.01), 1.0)
-        .lamp(disk(2.0 * DVec3::Z, DVec3::NEG_Z, 0.5), low, Sides::Front)
-        .lamp(disk(DVec3::Z, DVec3::Z, 0.1), high, Sides::Both)
-        .build();
-    // The near disk, r = 0.1 at 1 m, hides the far one, r = 0.5 at 2 m, within r = 0.2 of its plane.
-    let seen = |r: f64, h: f64| r * r / (r * r + h * h);
-    let expected = [1e6 * (seen(0.5, 2.0) - seen(0.2, 2.0)), 1e-3 * seen(0.1, 1.0)];
-    assert_z(&one_pixel(&scene, 200_000, 70), &expected, 0.01);
+    let Case { scene, expected, seed } = closed_forms::lights_of_disjoint_spectra();
+    assert_z(&one_pixel(&scene, 200_000, seed), &expected, 0.01);
 }
 
 // ---- Sides, cameras, film

@@ -2,9 +2,10 @@
 
 use glam::{DVec2, DVec3};
 use spectile::scene::{Filter, Projection, Shape, Sides};
-use spectile::spectral::{Channels, Curve};
+use spectile::spectral::Channels;
 
 use crate::device::{Settings, render};
+use crate::scene_builder::closed_forms::{self, Case};
 use crate::scene_builder::*;
 use crate::statistics::*;
 use crate::{assert_exact, measure, table};
@@ -159,22 +160,9 @@ fn closed_cavities_of_other_shapes() {
     }
 }
 
-/// Kirchhoff: in a closed isothermal cavity of grey walls, ε B emitted and 1 - ε reflected, L = B(λ, T) in every channel
-/// for any mix of emissivities; 10 um, 300 K: 9.924033e-3.
 #[test]
 fn isothermal_cavity_is_black() {
-    let planck = |scale| Curve::Blackbody { kelvin: 300.0, scale };
-    let channels = Channels::from_bounds(vec![[3e3, 5e3], [8e3, 12e3], [9_999.0, 10_001.0], [14e3, 20e3]], None);
-    let expected: Vec<f64> = channels.bounds.iter().map(|b| planck(1.0).mean(b[0], b[1])).collect();
-    assert!((expected[2] - 9.924033e-3).abs() < 1e-8);
-    let scene = Builder::new()
-        .camera(look(0.5 * DVec3::ONE, DVec3::new(0.9, 0.8, 0.0), DVec3::Y, narrow()))
-        .channels(channels)
-        .bounces(100)
-        .glowing(room(DVec3::ZERO, DVec3::ONE), 0.8, planck(0.2), Sides::Front)
-        .glowing(sphere(DVec3::new(0.7, 0.7, 0.7), 0.2), 0.4, planck(0.6), Sides::Front)
-        .glowing(disk(DVec3::new(0.3, 0.5, 0.2), DVec3::Z, 0.2), 0.1, planck(0.9), Sides::Both)
-        .build();
+    let (scene, expected) = closed_forms::isothermal_cavity(100);
     // Five events of ρ = 0.8, twice that for corners; 1e-5 for the tables.
     let bound = Bound { resolution: 0.005, allowance: 10.0 * ORIGIN_OFFSET + 1e-5 };
     assert_estimates("isothermal", &measure(scene, 4, 8), &expected, bound);
@@ -183,34 +171,10 @@ fn isothermal_cavity_is_black() {
 /// Disks of radius 1,000 one metre apart stand for infinite plates: 1e-6 of the hemisphere is missing.
 #[test]
 fn parallel_grey_plates() {
-    let channels = Channels::from_bounds(vec![[3e3, 5e3], [9_999.0, 10_001.0], [8e3, 14e3]], None);
-    for (e, kelvin, published, seed) in [
-        ([0.9, 0.8], [400.0, 300.0], [0.03163354, 0.01426593], 10),
-        ([0.5, 0.5], [400.0, 300.0], [0.02568353, 0.01780378], 11),
-        ([0.1, 0.9], [900.0, 300.0], [0.04199965, 0.01313159], 12),
-    ] {
-        let planck = |i: usize| Curve::Blackbody { kelvin: kelvin[i], scale: e[i] };
-        // The plate looked at, and the other one.
-        for (plate, published) in published.into_iter().enumerate() {
-            let (this, other) = (plate, 1 - plate);
-            let expected: Vec<f64> = (channels.bounds.iter())
-                .map(|[from, to]| {
-                    let (own, opposite) = (planck(this).mean(*from, *to), planck(other).mean(*from, *to));
-                    (own + (1.0 - e[this]) * opposite) / (1.0 - (1.0 - e[0]) * (1.0 - e[1]))
-                })
-                .collect();
-            assert!((expected[1] - published).abs() < 1e-8, "the published digits at 10 um");
-            let scene = Builder::new()
-                .camera(look(DVec3::new(0.0, 0.0, 0.5), DVec3::new(0.1, 0.0, plate as f64), DVec3::Y, narrow()))
-                .channels(channels.clone())
-                .bounces(24)
-                .glowing(disk(DVec3::ZERO, DVec3::Z, 1e3), 1.0 - e[0], planck(0), Sides::Front)
-                .glowing(disk(DVec3::Z, DVec3::NEG_Z, 1e3), 1.0 - e[1], planck(1), Sides::Front)
-                .build();
-            // Two ways of missing 1e-6, r₁¹² r₂¹² = 6e-8 beyond 24 bounces, and the tables.
-            let bound = Bound { resolution: 0.005, allowance: 2e-5 };
-            assert_estimates("plates", &measure(scene, 2, seed), &expected, bound);
-        }
+    for Case { scene, expected, seed } in closed_forms::grey_plates(1e3, 24) {
+        // Two ways of missing 1e-6, r₁¹² r₂¹² = 6e-8 beyond 24 bounces, and the tables.
+        let bound = Bound { resolution: 0.005, allowance: 2e-5 };
+        assert_estimates("plates", &measure(scene, 2, seed), &expected, bound);
     }
 }
 

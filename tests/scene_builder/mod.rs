@@ -2,6 +2,8 @@
 // Each test binary that includes this module uses a part of it.
 #![allow(dead_code)]
 
+pub mod closed_forms;
+
 use glam::{DVec2, DVec3};
 use spectile::scene::{
     Bsdf, Camera, Emission, Environment, Film, Filter, Integrator, Material, Mesh, Object, Projection, Sampler, Scene,
