@@ -8,9 +8,9 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use rustix::time::{ClockId, clock_gettime};
+use nix::time::{ClockId, clock_gettime};
 use spectile::Result;
-use spectile::cube::Cube;
+use spectile::cube::{Cube, Existing};
 use spectile::gpu::adapter::{Gpu, Selection};
 use spectile::render::prepare::Prepared;
 use spectile::render::schedule::{self, Event, Job, StopRule};
@@ -43,8 +43,8 @@ fn cornell(channels: usize) -> Scene {
 
 /// CPU time of all threads of this process, seconds.
 fn cpu_seconds() -> f64 {
-    let t = clock_gettime(ClockId::ProcessCPUTime);
-    t.tv_sec as f64 + t.tv_nsec as f64 * 1e-9
+    let t = clock_gettime(ClockId::CLOCK_PROCESS_CPUTIME_ID).expect("a clock");
+    t.tv_sec() as f64 + t.tv_nsec() as f64 * 1e-9
 }
 
 /// Anonymous memory of this process, bytes (Linux).
@@ -110,7 +110,8 @@ fn render(scene: &Scene, samples: u32, seed: u64, output: &Path) -> Result<(Cube
     let job = Job {
         scene: scene.clone(),
         output: output.to_owned(),
-        overwrite: false,
+        existing: Existing::Refuse,
+        tiles: None,
         seed,
         tile: None,
         stop: StopRule { samples: Some(samples), time: None },

@@ -2,7 +2,7 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use serde_json::Map;
-use spectile::cube::{Cube, Header};
+use spectile::cube::{Existing, Header, Writer};
 use spectile::spectral::Channels;
 
 fn merge(criterion: &mut Criterion) {
@@ -17,11 +17,21 @@ fn merge(criterion: &mut Criterion) {
             attributes: Map::new(),
         };
         let path = folder.path().join(format!("{channels}.zarr"));
-        let cube = Cube::create(&path, header, false).expect("cube");
+        let cube = Writer::open(&path, &header, Existing::Refuse, 0..1, &mut |what| panic!("{what}")).expect("cube");
         let unit: Vec<f32> = (0..64 * 64 * channels).map(|i| (i % 1009) as f32).collect();
-        cube.merge_unit(0, 1, &unit).expect("first unit");
-        criterion.bench_function(&format!("merge 64x64x{channels}"), |bencher| {
-            bencher.iter(|| cube.merge_unit(0, 1, &unit).expect("merged"));
+        let mut samples = 0;
+        let mut merge = || {
+            cube.merge_unit(0, samples, 1, &unit).expect("merged");
+            samples += 1;
+        };
+        merge();
+        criterion.bench_function(&format!("merge 64x64x{channels}"), |bencher| bencher.iter(&mut merge));
+        cube.flush().expect("committed");
+        criterion.bench_function(&format!("merge and commit 64x64x{channels}"), |bencher| {
+            bencher.iter(|| {
+                merge();
+                cube.flush().expect("committed");
+            });
         });
     }
 }

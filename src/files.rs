@@ -9,10 +9,15 @@ use std::path::{Path, PathBuf};
 
 use crate::{Error, Result};
 
-/// 16 hex digits that no other process or call draws, for names of files that are still being written.
-pub fn random_suffix() -> String {
+/// A number that no other process or call draws, for names of files that are still being written.
+pub fn random_number() -> u64 {
     // The standard library seeds its hash keys from the operating system's randomness.
-    format!("{:016x}", RandomState::new().build_hasher().finish())
+    RandomState::new().build_hasher().finish()
+}
+
+/// [`random_number`] as 16 hex digits.
+pub fn random_suffix() -> String {
+    format!("{:016x}", random_number())
 }
 
 /// A hidden sibling of `path` under a random name: same folder, hence same file system, hence renamed in one step.
@@ -37,6 +42,35 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
     })
 }
 
+/// Waits until the names in a folder are on disk.
+pub fn sync_folder(folder: &Path) -> std::io::Result<()> {
+    // Other systems open no folders, and keep names by themselves.
+    if cfg!(unix) { fs::File::open(folder)?.sync_all() } else { Ok(()) }
+}
+
+/// Writes a new file and waits until it and its name are on disk.
+pub fn write_durably(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let mut file = fs::File::create_new(path)?;
+    file.write_all(bytes)?;
+    file.sync_all()?;
+    sync_folder(parent(path))
+}
+
+/// Makes a folder and those above it where they are missing, so that they survive a power cut.
+pub fn make_folder_durably(folder: &Path) -> std::io::Result<()> {
+    if folder.is_dir() {
+        return Ok(());
+    }
+    let above = parent(folder);
+    make_folder_durably(above)?;
+    match fs::create_dir(folder) {
+        // Another process was quicker; its entry may not be on disk yet.
+        Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {}
+        result => result?,
+    }
+    sync_folder(above)
+}
+
 /// Refuses early a target of [`write_atomically`] that has no folder, or is one.
 pub fn check_target(path: &Path) -> Result<()> {
     if path.is_dir() {
@@ -53,14 +87,23 @@ pub fn check_target(path: &Path) -> Result<()> {
 pub fn free_bytes(folder: &Path) -> Option<u64> {
     #[cfg(unix)]
     {
-        let stat = rustix::fs::statvfs(folder).ok()?;
-        (stat.f_blocks > 0).then(|| stat.f_bavail.saturating_mul(stat.f_frsize))
+        let stat = nix::sys::statvfs::statvfs(folder).ok()?;
+        // The types of these differ from system to system.
+        #[allow(clippy::unnecessary_cast, clippy::useless_conversion)]
+        (stat.blocks() > 0).then(|| (stat.blocks_available() as u64).saturating_mul(stat.fragment_size() as u64))
     }
     #[cfg(not(unix))]
     {
         let _ = folder;
         None
     }
+}
+
+/// Bytes of this machine's memory; `None` where that cannot be asked.
+pub fn memory_bytes() -> Option<u64> {
+    let text = fs::read_to_string("/proc/meminfo").ok()?;
+    let total = text.lines().find_map(|line| line.strip_prefix("MemTotal:"))?;
+    total.trim().strip_suffix(" kB")?.parse::<u64>().ok()?.checked_mul(1024)
 }
 
 /// The folder that holds `path`, `.` for a bare name.

@@ -7,9 +7,9 @@ use std::io::Read;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-use common::{Random, create, header, pattern, patterned, unit};
+use common::{Random, Written, create, header, pattern, patterned, unit};
 use serde_json::Value;
-use spectile::cube::{Cube, Header};
+use spectile::cube::Header;
 use spectile::spectral::Channels;
 use tempfile::tempdir;
 
@@ -47,7 +47,7 @@ fn only_object(stdout: &str) -> Value {
 }
 
 /// Three epochs of noise over 3 of 4 tiles.
-fn noisy(folder: &Path, name: &str, seed: u64) -> Cube {
+fn noisy(folder: &Path, name: &str, seed: u64) -> Written {
     let cube = create(folder, name, Header { epoch: 2, ..header([20, 13], [16, 8], 3) });
     let mut random = Random(seed);
     for tile in 0..3 {

@@ -4,8 +4,8 @@ mod common;
 
 use std::fs;
 
-use common::{Random, create, header, pattern, patterned, unit};
-use spectile::cube::{Cube, Header, Rect, compare};
+use common::{Random, Written, create, header, pattern, patterned, unit};
+use spectile::cube::{Cube, Existing, Header, Rect, compare};
 use spectile::spectral::Channels;
 use tempfile::tempdir;
 
@@ -182,7 +182,6 @@ fn epochs_are_merged_whole() {
     cube.merge_unit(0, 4, &unit).expect("merged");
     assert!(cube.merge_unit(0, 32, &unit).is_err());
     cube.merge_unit(0, 64, &unit).expect("merged");
-    assert!(cube.merge_unit(1, 1, &unit).is_err(), "no such tile");
     assert!(cube.merge_unit(0, 64, &unit[1..]).is_err(), "too short");
     assert_eq!(cube.samples(0).expect("samples"), 128);
 }
@@ -314,15 +313,24 @@ fn a_tile_whose_files_contradict_each_other_is_not_merged() {
     let folder = tempdir().expect("folder");
     let cube = patterned(folder.path(), "torn.zarr", header([8, 8], [8, 8], 2));
     let unit = unit(&cube, 0, pattern);
-    fs::remove_file(cube.path().join("radiance/c/0/0/0")).expect("removed");
-    assert!(
-        cube.merge_unit(0, 1, &unit).unwrap_err().to_string().contains("is missing, although tile 0 has 1 samples")
-    );
-    let sums = cube.path().join(".spectile/sums/0");
-    let mut bytes = fs::read(&sums).expect("read");
-    bytes[20] ^= 1;
-    fs::write(&sums, bytes).expect("written");
-    assert!(cube.merge_unit(0, 1, &unit).unwrap_err().to_string().contains("checksum"));
+    let refusal = || {
+        let error = cube.merge_unit(0, 1, &unit).unwrap_err();
+        assert_eq!(error.exit_code(), 5);
+        error.to_string()
+    };
+    let radiance = cube.path().join("radiance/c/0/0/0");
+    let sound = fs::read(&radiance).expect("read");
+    let mut damaged = sound.clone();
+    damaged[77] ^= 1;
+    fs::write(&radiance, &damaged).expect("written");
+    assert!(refusal().contains("is damaged: it is not what the journal says"), "{}", refusal());
+    fs::remove_file(&radiance).expect("removed");
+    assert!(refusal().contains("is missing, although the journal has it"), "{}", refusal());
+    fs::write(&radiance, &sound).expect("written");
+    cube.merge_unit(0, 1, &unit).expect("sound again");
+    // Somebody else has merged meanwhile: this process has lost its lock.
+    fs::write(cube.path().join("samples/c/0/0"), 1u32.to_le_bytes()).expect("written");
+    assert!(refusal().contains("tile 0 has 2 samples per pixel where 1 were expected"), "{}", refusal());
 }
 
 #[test]
@@ -330,7 +338,8 @@ fn overwrite_replaces_cubes_and_nothing_else() {
     let folder = tempdir().expect("folder");
     let path = folder.path().join("cube.zarr");
     let refusal = |overwrite| {
-        let error = Cube::create(&path, header([8, 8], [8, 8], 2), overwrite).err().expect("refused");
+        let existing = if overwrite { Existing::Replace } else { Existing::Refuse };
+        let error = Written::open(&path, header([8, 8], [8, 8], 2), existing).err().expect("refused");
         assert_eq!(error.exit_code(), 2);
         error.to_string()
     };
@@ -363,7 +372,11 @@ fn overwrite_replaces_cubes_and_nothing_else() {
     fs::write(path.join("notes.txt"), "x").expect("written");
     assert!(refusal(true).contains("notes.txt"));
     fs::remove_file(path.join("notes.txt")).expect("removed");
-    let new = Cube::create(&path, header([8, 8], [8, 8], 2), true).expect("replaced");
+    let replace = || Written::open(&path, header([8, 8], [8, 8], 2), Existing::Replace);
+    let error = replace().err().expect("in use");
+    assert!(error.exit_code() == 5 && error.to_string().contains("tiles 0..4 are in use"), "{error}");
+    drop(old);
+    let new = replace().expect("replaced");
     assert_eq!(new.samples(0).expect("samples"), 0);
     assert!(new.chunk(0).expect("chunk").is_none() && new.spectrum(0, 0).expect("read").is_none());
     assert_eq!(mapped.spectrum(9, 9)[2], pattern(9, 9, 2), "what is mapped stays readable");
@@ -391,10 +404,10 @@ fn impossible_cubes_are_refused_before_anything_is_made() {
         (Header { size: [1 << 24; 2], tile: [1024; 2], ..good() }, "free there"),
     ];
     for (header, expected) in bad {
-        let error = Cube::create(&folder.path().join("bad.zarr"), header, false).err().expect("refused");
+        let error = Written::open(&folder.path().join("bad.zarr"), header, Existing::Refuse).err().expect("refused");
         assert!(error.to_string().contains(expected) && error.exit_code() == 2, "{error}");
     }
-    let nowhere = Cube::create(&folder.path().join("no/where.zarr"), good(), false).err().expect("refused");
+    let nowhere = Written::open(&folder.path().join("no/where.zarr"), good(), Existing::Refuse).err().expect("refused");
     assert!(nowhere.to_string().contains("there is no folder"), "{nowhere}");
     assert_eq!(fs::read_dir(folder.path()).expect("list").count(), 0);
 }
@@ -431,10 +444,10 @@ fn threads_may_merge_into_one_cube() {
     std::thread::scope(|scope| {
         for worker in 0..4 {
             let cube = &cube;
-            // Two workers share each tile; none of their units may get lost.
+            // A tile is on one device at a time; none of the units may get lost.
             scope.spawn(move || {
                 for round in 0..20u32 {
-                    let tile = (worker / 2) * 4 + round % 4;
+                    let tile = 2 * worker + round % 2;
                     cube.merge_unit(tile, 1, &unit(cube, tile, |_, _, _| 2.0)).expect("merged");
                 }
             });

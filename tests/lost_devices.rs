@@ -8,7 +8,7 @@ use std::time::Duration;
 use glam::{DVec2, DVec3};
 use scene_builder::*;
 use spectile::Error;
-use spectile::cube::Cube;
+use spectile::cube::{Existing, Writer};
 use spectile::gpu::adapter::{Gpu, Selection};
 use spectile::render::plan;
 use spectile::render::pool::{Pool, Report};
@@ -39,8 +39,12 @@ fn render(doom: Option<Duration>) -> (Vec<Vec<f32>>, bool) {
     let scene = scene();
     let prepared = Arc::new(Prepared::new(&scene, 3).expect("a scene"));
     let header = plan::header(&scene, TILE, 3);
-    let (queue, cube, interrupt) = (Queue::new(header.grid().count()), OnceLock::new(), Arc::default());
-    cube.set(Cube::create(&folder.path().join("cube.zarr"), header, false).expect("a cube")).ok();
+    let (queue, cube, interrupt) = (Queue::new(), OnceLock::new(), Arc::default());
+    let tiles = 0..header.grid().count();
+    queue.fill(tiles.clone().map(|tile| (tile, 0)), 1);
+    let path = folder.path().join("cube.zarr");
+    let opened = Writer::open(&path, &header, Existing::Refuse, tiles, &mut |what| panic!("{what}"));
+    cube.set(opened.expect("a cube")).ok();
     let pool = Pool {
         prepared: &prepared,
         queue: &queue,
@@ -78,7 +82,7 @@ fn render(doom: Option<Duration>) -> (Vec<Vec<f32>>, bool) {
                 }
                 Report::Merged(units) => {
                     merged += units.group.tiles.len() as u32;
-                    if merged == EPOCHS * cube.get().expect("a cube").grid().count() {
+                    if merged == EPOCHS * cube.get().expect("a cube").cube().grid().count() {
                         queue.close();
                     }
                 }
@@ -90,7 +94,9 @@ fn render(doom: Option<Duration>) -> (Vec<Vec<f32>>, bool) {
             }
         }
     });
-    let cube = cube.get().expect("a cube");
+    let writer = cube.get().expect("a cube");
+    writer.flush().expect("committed");
+    let cube = writer.cube();
     let chunks = (0..cube.grid().count()).map(|t| cube.chunk(t).expect("a chunk").expect("rendered").values().to_vec());
     (chunks.collect(), lost)
 }

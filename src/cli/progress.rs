@@ -89,7 +89,7 @@ impl<'a> Reporter<'a> {
             json!({
                 "scene": job.scene.file, "scene_digest": job.scene.digest, "output": job.output, "seed": job.seed,
                 "size": [width, height], "channels": channels, "tile": tile, "disk_bytes": disk,
-                "samples_asked": job.stop.samples, "samples_limit": samples_limit,
+                "tiles": job.tiles.as_ref().map(|tiles| [tiles.start, tiles.end]), "samples_asked": job.stop.samples, "samples_limit": samples_limit,
                 "time_limit_s": job.stop.time.map(|t| t.as_secs_f64()),
             }),
         )
@@ -113,6 +113,16 @@ impl<'a> Reporter<'a> {
                     let (done, all) = status.units;
                     self.last_line = Some(Instant::now());
                     self.line(&format!("{done}/{all} units of {}", self.describe(status, status.samples_next)));
+                }
+                self.emit("progress", fields(status))
+            }
+            Event::Asked(status) => {
+                let (done, all) = status.units;
+                let line = format!("{done}/{all} units of {}", self.describe(status, status.samples_next));
+                match &self.bar {
+                    Some(bar) => bar.println(line),
+                    // Asked for, so said under --quiet too.
+                    None => say(&line),
                 }
                 self.emit("progress", fields(status))
             }
@@ -150,7 +160,12 @@ impl<'a> Reporter<'a> {
                 say(&self.interrupted(job)?);
                 return Err(error);
             }
-            Err(error) => return Err(error),
+            Err(error) => {
+                if self.merged && matches!(error, Error::DevicesLost(_) | Error::Storage { .. }) {
+                    say("what is merged is kept: the same command with --resume goes on from there");
+                }
+                return Err(error);
+            }
         };
         let status = &summary.status;
         let mut done = fields(status);
@@ -189,7 +204,7 @@ impl<'a> Reporter<'a> {
         let samples = if least == most { most.to_string() } else { format!("{least} to {most}") };
         Ok(format!(
             "interrupted: {output} keeps every unit merged so far, {samples} samples/pixel in {tiles_started} of {tiles} tiles \
-             (`spectile info {output}` says more)"
+             (--resume goes on from there, `spectile info {output}` says more)"
         ))
     }
 }

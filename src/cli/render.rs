@@ -7,6 +7,7 @@ use super::Output;
 use super::progress::Reporter;
 use super::scene::SceneArgs;
 use crate::Result;
+use crate::cube::Existing;
 use crate::gpu::adapter::Selection;
 use crate::render::schedule::{self, Job, Preview, StopRule};
 
@@ -18,12 +19,18 @@ use crate::render::schedule::{self, Job, Preview, StopRule};
 ///
 /// Rendering stops at the first limit reached, --spp or --time, always at the end of an epoch of the whole picture;
 /// without a limit, after 64 samples per pixel. Noise falls with the square root of the samples: four times the samples
-/// halve the error. Ctrl-C keeps everything merged so far.
+/// halve the error.
+///
+/// What is merged is committed to disk once a second. Ctrl-C keeps everything merged so far, and so do a kill, a power
+/// cut or a full disk, up to the last commit: the same command with --resume goes on from there, and ends with the same
+/// bytes. SIGUSR1 commits what is merged and prints a line on how far the render is.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = "\
 Examples:
   spectile render scene.toml -o cube.zarr --spp 256
   spectile render scene.toml -o cube.zarr --time 10m --preview now.png
+  spectile render scene.toml -o cube.zarr --spp 1024 --resume             go on, after an end or to more samples
+  spectile render scene.toml -o cube.zarr --spp 256 --tiles 0..500        one of several processes on one cube
   spectile render scene.toml -o quick.zarr --size 128x128 --set channels.equal.count=30")]
 pub struct Args {
     /// The cube to make, a folder
@@ -49,11 +56,28 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
 
+    /// Go on with OUT.zarr, which an earlier render of the same scene and settings has begun
+    ///
+    /// To finish what was interrupted, or to add samples. Every tile is compared with its checksums first; one that is
+    /// damaged is rendered again, with a warning. Everything that decides the values must be as it was (scene, --set, --size,
+    /// --tile, --seed); limits, devices, memory and preview may differ.
+    #[arg(long, conflicts_with = "overwrite")]
+    pub resume: bool,
+
     /// Replace OUT.zarr if it exists
     ///
-    /// Only a Spectile cube is ever replaced; any other folder or file is refused.
+    /// Only a Spectile cube that nobody works on is ever replaced; any other folder or file is refused.
     #[arg(long)]
     pub overwrite: bool,
+
+    /// Render only the tiles A to B - 1, numbered row by row from 0
+    ///
+    /// Several processes, also on several machines with a shared file system, may render disjoint tiles of one cube: the
+    /// first makes it, the others join, and nothing has to be put together at the end. A tile that another process works
+    /// on is refused, one that is finished is left as it is. `spectile info` lists the tiles that are missing. The limit
+    /// is --spp, since --time would end the tiles at different samples.
+    #[arg(long, value_name = "A..B", value_parser = parse_tiles, conflicts_with_all = ["time", "overwrite"])]
+    pub tiles: Option<std::ops::Range<u32>>,
 
     #[command(flatten)]
     pub scene: SceneArgs,
@@ -101,7 +125,13 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     }
     let job = Job {
         output: args.output.clone(),
-        overwrite: args.overwrite,
+        existing: match (args.resume, args.overwrite, &args.tiles) {
+            (true, ..) => Existing::Resume,
+            (_, true, _) => Existing::Replace,
+            (.., Some(_)) => Existing::Join,
+            _ => Existing::Refuse,
+        },
+        tiles: args.tiles.clone(),
         seed: args.seed,
         tile: args.scene.tile,
         stop: StopRule { samples: args.spp, time: args.time },
@@ -128,9 +158,25 @@ fn parse_time(text: &str) -> std::result::Result<Duration, String> {
     if seconds > 0.0 { Duration::try_from_secs_f64(seconds).map_err(|_| explain()) } else { Err(explain()) }
 }
 
+/// A half-open range of tiles.
+fn parse_tiles(text: &str) -> std::result::Result<std::ops::Range<u32>, String> {
+    let number = |text: &str| text.trim().parse::<u32>().ok();
+    let range = text.split_once("..").and_then(|(from, to)| Some(number(from)?..number(to)?));
+    range.filter(|range| range.start < range.end).ok_or_else(|| "tiles are A..B with A < B, such as 0..100".into())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn tiles_are_half_open_ranges() {
+        assert_eq!(parse_tiles("0..100"), Ok(0..100));
+        assert_eq!(parse_tiles("7 .. 8"), Ok(7..8));
+        for bad in ["", "5", "5..5", "6..5", "-1..5", "0...5", "0..x", "0..=5", "..5"] {
+            assert!(parse_tiles(bad).unwrap_err().contains("0..100"), "{bad}");
+        }
+    }
 
     #[test]
     fn times_have_units() {

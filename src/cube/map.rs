@@ -45,6 +45,11 @@ impl Chunk {
         bytemuck::cast_slice(&self.map)
     }
 
+    /// The file as it is.
+    pub(super) fn bytes(&self) -> &[u8] {
+        &self.map
+    }
+
     /// The pixels of the picture in this tile.
     pub fn rect(&self) -> Rect {
         self.rect

@@ -1,13 +1,10 @@
-//! Merging a unit into its tile.
+//! Merging a unit into its tile: the arithmetic, and all that is derived from the new mean.
 
-use std::fs::File;
 use std::io::Write;
 
-use super::aside::Batch;
-use super::estimate::TileSums;
 use super::grid::Rect;
+use super::journal::Record;
 use super::map::Chunk;
-use super::store::Cube;
 use super::{BLOCK, Grid};
 use crate::spectral::colour::Projection;
 use crate::{Error, Result};
@@ -15,67 +12,33 @@ use crate::{Error, Result};
 /// The most bytes of a new chunk held in memory before they are written, unless one pixel alone is longer.
 const BUFFER_BYTES: usize = 1 << 20;
 
-impl Cube {
-    /// Merges the mean of `n_unit` samples per pixel into a tile, with all that is derived from it.
-    ///
-    /// `unit` is [tile_h][tile_w][K], the full tile size; what lies beyond the edge of the picture is not looked at and
-    /// stored as NaN. The first unit of a tile is stored bit for bit; later ones as
-    /// m + (unit - m) · n_unit / (n + n_unit) in f64, rounded to f32, so that a constant stays exact. The first `epoch`
-    /// samples may come in any portions that add up to it, then every unit is one whole epoch.
-    ///
-    /// On an error the tile is what it was; only a failure among the last renames may leave a derived array behind.
-    pub fn merge_unit(&self, tile: u32, n_unit: u32, unit: &[f32]) -> Result<()> {
-        let grid = self.grid();
-        let channels = self.channels().len();
-        if tile >= grid.count() || unit.len() != grid.tile_pixels() * channels {
-            let (count, pixels) = (grid.count(), grid.tile_pixels());
-            let expected = format!("one of {count} tiles and {pixels} x {channels} values");
-            return Err(Error::Internal(format!("tile {tile} with {} values where there are {expected}", unit.len())));
-        }
-        let _held = self.hold(tile);
-        let old_sums = self.sums(tile)?;
-        let n_old = old_sums.as_ref().map_or(0, |sums| sums.samples);
-        let samples = self.check_portion(n_old, n_unit)?;
-        let old = if n_old > 0 { self.chunk(tile)? } else { None };
-        if n_old > 0 && old.is_none() {
-            let what = format!("is missing, although tile {tile} has {n_old} samples");
-            return Err(Error::storage(&self.chunk_path(tile), what));
-        }
-
-        let mut fold = Fold::new(grid, grid.rect(tile), channels, &self.projection);
-        let weight = f64::from(n_unit) / f64::from(samples);
-        let mut batch = Batch::new(self.aside_folder());
-        batch.write(self.chunk_path(tile), |file| fold.run(old.as_ref(), unit, weight, file))?;
-        if let Some(k) = fold.square.iter().position(|v| !v.is_finite()) {
-            return Err(Error::Internal(format!(
-                "a unit of tile {tile} holds a value in channel {k} that is not finite"
-            )));
-        }
-
-        let sums = fold.sums(old_sums, samples, self.header().epoch);
-        batch.write_bytes(self.preview_path(tile), bytemuck::cast_slice(&fold.preview))?;
-        batch.write_bytes(self.overview_path(tile), bytemuck::cast_slice(&fold.overview))?;
-        batch.write_bytes(self.sums_path(tile), &sums.to_bytes())?;
-        batch.write_bytes(self.samples_path(tile), &samples.to_le_bytes())?;
-        batch.commit()
-    }
-
-    /// The samples per pixel after a unit, if it may follow those merged.
-    fn check_portion(&self, n_old: u32, n_unit: u32) -> Result<u32> {
-        let epoch = self.header().epoch;
-        let fits = if n_old < epoch { n_unit >= 1 && n_unit <= epoch - n_old } else { n_unit == epoch };
-        match n_old.checked_add(n_unit) {
-            Some(samples) if fits => Ok(samples),
-            Some(_) => Err(Error::Internal(format!(
-                "a unit of {n_unit} samples cannot follow {n_old} where an epoch has {epoch}: epochs are merged whole"
-            ))),
-            None => Err(Error::Usage(format!("more than {} samples per pixel cannot be counted", u32::MAX))),
-        }
+/// The samples per pixel after a unit, if it may follow those merged.
+pub(super) fn check_portion(n_before: u32, n_unit: u32, epoch: u32) -> Result<u32> {
+    let fits = if n_before < epoch { n_unit >= 1 && n_unit <= epoch - n_before } else { n_unit == epoch };
+    match n_before.checked_add(n_unit) {
+        Some(samples) if fits => Ok(samples),
+        Some(_) => Err(Error::Internal(format!(
+            "a unit of {n_unit} samples cannot follow {n_before} where an epoch has {epoch}: epochs are merged whole"
+        ))),
+        None => Err(Error::Usage(format!("more than {} samples per pixel cannot be counted", u32::MAX))),
     }
 }
 
+/// Merges `unit`, the mean of `n_unit` samples, into `mean`, that of `n_before`, as [`super::Writer::merge_unit`] does.
+pub fn merge_means(mean: &mut [f32], n_before: u32, unit: &[f32], n_unit: u32) {
+    let weight = f64::from(n_unit) / (f64::from(n_before) + f64::from(n_unit));
+    for (mean, &new) in mean.iter_mut().zip(unit) {
+        *mean = merged(f64::from(*mean), f64::from(new), weight);
+    }
+}
+
+/// The new running mean. This form, and not a weighted sum: a zero difference changes nothing, whatever the weight.
+fn merged(old: f64, new: f64, weight: f64) -> f32 {
+    (old + (new - old) * weight) as f32
+}
+
 /// One pass over the pixels of a unit: the new chunk streams out, and all that is derived from it is gathered.
-struct Fold<'a> {
+pub(super) struct Fold<'a> {
     grid: Grid,
     rect: Rect,
     channels: usize,
@@ -83,17 +46,17 @@ struct Fold<'a> {
     /// Σ over pixels of (unit - old mean)².
     distance: Vec<f64>,
     /// Σ over pixels of (new mean)².
-    square: Vec<f64>,
+    pub square: Vec<f64>,
     /// [tile_h][tile_w][3].
-    preview: Vec<f32>,
+    pub preview: Vec<f32>,
     /// Sums of the blocks in the current row of blocks, [blocks_x][K].
     block_sums: Vec<f64>,
     /// [K][blocks_y][blocks_x].
-    overview: Vec<f32>,
+    pub overview: Vec<f32>,
 }
 
 impl<'a> Fold<'a> {
-    fn new(grid: Grid, rect: Rect, channels: usize, projection: &'a Projection) -> Self {
+    pub fn new(grid: Grid, rect: Rect, channels: usize, projection: &'a Projection) -> Self {
         let [blocks_x, blocks_y] = grid.tile_blocks().map(|n| n as usize);
         Fold {
             grid,
@@ -109,7 +72,13 @@ impl<'a> Fold<'a> {
     }
 
     /// Folds `unit` into `old` with the weight n_unit / (n_old + n_unit) and writes the new chunk.
-    fn run(&mut self, old: Option<&Chunk>, unit: &[f32], weight: f64, file: &mut File) -> std::io::Result<()> {
+    pub fn run(
+        &mut self,
+        old: Option<&Chunk>,
+        unit: &[f32],
+        weight: f64,
+        file: &mut impl Write,
+    ) -> std::io::Result<()> {
         let channels = self.channels;
         let [tile_width, tile_height] = self.grid.tile.map(|n| n as usize);
         let [width, height] = [self.rect.width(), self.rect.height()].map(|n| n as usize);
@@ -174,30 +143,27 @@ impl<'a> Fold<'a> {
         }
     }
 
-    /// The sums of the tile after this unit: Welford's M2 += δ² B / (B + 1), δ the distance of the new epoch from the
-    /// mean of the B epochs before it. The portions of the first epoch are one epoch together.
-    fn sums(&self, old: Option<TileSums>, samples: u32, epoch: u32) -> TileSums {
+    /// Per channel, Σ M2 and Σ mean² of the tile after this unit: Welford's M2 += δ² B / (B + 1), δ the distance of the
+    /// new epoch from the mean of the B epochs before it. The portions of the first epoch are one epoch together.
+    pub fn sums(&mut self, old: Option<&Record>, epoch: u32) -> (Vec<f64>, Vec<f64>) {
         let mut spread = vec![0.0; self.channels];
         if let Some(old) = old
             && old.samples >= epoch
         {
             let before = f64::from(old.samples / epoch);
-            spread = old.spread;
-            for (spread, distance) in spread.iter_mut().zip(&self.distance) {
-                *spread += distance * (before / (before + 1.0));
+            for ((spread, old), distance) in spread.iter_mut().zip(&old.spread).zip(&self.distance) {
+                *spread = old + distance * (before / (before + 1.0));
             }
         }
-        TileSums { samples, spread, square: self.square.clone() }
+        (spread, std::mem::take(&mut self.square))
     }
 }
 
 /// The new running mean of one pixel, and δ² of every channel added to `distance`.
 fn merge_pixel(old: &[f32], new: &[f32], weight: f64, mean: &mut [f32], distance: &mut [f64]) {
     for (((&old, &new), mean), distance) in old.iter().zip(new).zip(mean).zip(distance) {
-        let old = f64::from(old);
-        let difference = f64::from(new) - old;
-        // This form, and not a weighted sum: a zero difference changes nothing, whatever the weight.
-        *mean = (old + difference * weight) as f32;
-        *distance += difference * difference;
+        let (old, new) = (f64::from(old), f64::from(new));
+        *mean = merged(old, new, weight);
+        *distance += (new - old) * (new - old);
     }
 }

@@ -42,25 +42,74 @@ impl Header {
         u64::from(self.tile[0]) * u64::from(self.tile[1]) * self.channels.len() as u64 * 4
     }
 
-    /// Bytes on disk of the finished cube, with one more tile for the files aside. Files take whole blocks of 4 KiB,
-    /// and folders one.
+    /// Bytes on disk of the finished cube.
     pub fn store_bytes(&self) -> u64 {
+        self.bytes_with_tiles(self.grid().count().into())
+    }
+
+    /// Bytes on disk of a cube that has so many of its tiles. Files take whole blocks of 4 KiB, and folders one.
+    pub(super) fn bytes_with_tiles(&self, tiles: u64) -> u64 {
         const BLOCK_BYTES: u64 = 4096;
         // Metadata and coordinates of nine arrays, the facts of a few runs, and their folders.
-        const FIXED_BLOCKS: u64 = 56;
+        const FIXED_BLOCKS: u64 = 60;
         let in_blocks = |bytes: u64| bytes.div_ceil(BLOCK_BYTES) * BLOCK_BYTES;
         let channels = self.channels.len() as u64;
         let pixels = u64::from(self.tile[0]) * u64::from(self.tile[1]);
         let blocks = self.grid().tile_blocks().map(u64::from);
-        let files = [pixels * channels * 4, pixels * 12, blocks[0] * blocks[1] * channels * 4, 4, channels * 16 + 64];
+        let journal = super::journal::MAX_BYTES_PER_CHANNEL * channels + super::journal::MAX_BYTES;
+        let files = [pixels * channels * 4, pixels * 12, blocks[0] * blocks[1] * channels * 4, 4, journal];
         // Each tile has a folder of `preview`, each row of tiles one of every array.
         let tile = files.into_iter().map(in_blocks).sum::<u64>() + BLOCK_BYTES;
-        let [columns, rows] = self.grid().tiles().map(u64::from);
+        let [_, rows] = self.grid().tiles().map(u64::from);
         // Names stand on a line each; centres, bounds and integrals are four doubles.
         let names: u64 = self.channels.names.iter().map(|name| name.len() as u64 + 16).sum();
         let coordinates = 32 * channels + 8 * (u64::from(self.size[0]) + u64::from(self.size[1]));
         let metadata = FIXED_BLOCKS * BLOCK_BYTES + in_blocks(names) + in_blocks(coordinates) + 4 * rows * BLOCK_BYTES;
-        tile.saturating_mul(columns * rows + 1).saturating_add(metadata)
+        tile.saturating_mul(tiles).saturating_add(metadata)
+    }
+
+    /// What of this cube's identity is not as in `wanted`, in words; `None` where both are one.
+    pub(super) fn difference(&self, wanted: &Header) -> Option<String> {
+        let size = |[width, height]: [u32; 2]| format!("{width} x {height}");
+        let there_and_wanted = |what: &str, there: String, wanted: String| {
+            Some(format!("{what}: {there} in the cube, {wanted} now"))
+        };
+        if self.size != wanted.size {
+            return there_and_wanted("size", size(self.size), size(wanted.size));
+        }
+        if self.origin != wanted.origin {
+            return there_and_wanted("film.crop", format!("from {:?}", self.origin), format!("from {:?}", wanted.origin));
+        }
+        if self.channels != wanted.channels {
+            let (there, wanted) = (&self.channels, &wanted.channels);
+            return match (0..there.len().min(wanted.len())).find(|&k| there.bounds[k] != wanted.bounds[k]) {
+                _ if there.len() != wanted.len() => {
+                    there_and_wanted("channels", there.len().to_string(), wanted.len().to_string())
+                }
+                Some(k) => {
+                    let bounds = |[from, to]: [f64; 2]| format!("{from} to {to} nm");
+                    there_and_wanted(&format!("channel {k}"), bounds(there.bounds[k]), bounds(wanted.bounds[k]))
+                }
+                None => Some("the names of the channels, or channels.false_colour".into()),
+            };
+        }
+        if self.tile != wanted.tile {
+            return there_and_wanted("tile", size(self.tile), size(wanted.tile));
+        }
+        if self.epoch != wanted.epoch {
+            return there_and_wanted("integrator.epoch", self.epoch.to_string(), wanted.epoch.to_string());
+        }
+        // Whoever goes on with a cube adopts the evaluator that it was begun with.
+        let decides = |key: &str| key != "evaluator" && key != "scene_digest";
+        let of = |attributes: &Map<String, Value>| {
+            Value::Object(attributes.iter().filter(|(key, _)| decides(key)).map(|(k, v)| (k.clone(), v.clone())).collect())
+        };
+        if let Some((key, there, wanted)) = first_difference("", &of(&self.attributes), &of(&wanted.attributes)) {
+            return there_and_wanted(&key, there, wanted);
+        }
+        // Last, since it differs whenever any of those does, and says the least.
+        (self.attributes.get("scene_digest") != wanted.attributes.get("scene_digest"))
+            .then(|| "the scene (its spectra, geometry, materials, lights or camera)".into())
     }
 
     /// Checks what a cube relies on, [`super::Cube::create`] included; the message says which value is wrong and what is allowed.
@@ -186,6 +235,18 @@ impl Header {
             }
         }
         Ok(header)
+    }
+}
+
+/// Dotted key and both values of the first difference between two JSON values.
+fn first_difference(key: &str, a: &Value, b: &Value) -> Option<(String, String, String)> {
+    match (a, b) {
+        (Value::Object(a), Value::Object(b)) => a.keys().chain(b.keys()).find_map(|name| {
+            let inner = if key.is_empty() { name.clone() } else { format!("{key}.{name}") };
+            first_difference(&inner, a.get(name).unwrap_or(&Value::Null), b.get(name).unwrap_or(&Value::Null))
+        }),
+        _ if a == b => None,
+        _ => Some((key.to_owned(), a.to_string(), b.to_string())),
     }
 }
 

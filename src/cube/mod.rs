@@ -2,25 +2,42 @@
 //! section 4).
 //!
 //! A tile of pixels with all its channels is one chunk, and one file. Units (tile, epoch) are merged into it one at a
-//! time: the new chunk is written aside and renamed over the old one, never changed in place. So are the parts of the
-//! derived arrays (`samples`, `preview`, `overview`) that belong to the tile, and the error sums under `.spectile/`.
+//! time: the new chunk is written aside, journalled, and renamed over the old one, never changed in place. So are the
+//! parts of the derived arrays (`samples`, `preview`, `overview`) that belong to the tile.
+//!
+//! A [`Cube`] reads; a [`Writer`] holds the locks of some tiles and changes them. What a writer merges is gathered in a
+//! batch and committed at most once a second. Whatever ends a writer, the next one's [`recover`] finds each tile as it
+//! was after one of its commits.
 //!
 //! Invariant: nothing outside this module maps memory.
 
-mod aside;
+mod checksums;
 mod compare;
+mod create;
+mod epochs;
 mod estimate;
+mod faults;
 mod grid;
+mod journal;
+mod lock;
 mod map;
 mod merge;
 mod metadata;
+mod recover;
 mod store;
+mod verify;
+mod writer;
 
 pub use compare::{ChannelMetrics, Comparison, compare};
+pub use create::{Existing, check_target};
+pub use epochs::{epoch_samples, epochs_in, samples_before, whole_epochs};
 pub use grid::{Grid, Rect};
 pub use map::Chunk;
+pub use merge::merge_means;
 pub use metadata::{FORMAT, Header};
 pub use store::{Cube, Progress};
+pub use verify::Verification;
+pub use writer::Writer;
 
 /// Side, in pixels, of the blocks whose means make up `overview`.
 pub const BLOCK: u32 = 8;

@@ -5,13 +5,12 @@ use std::sync::mpsc::Sender;
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
-use crate::cube::Cube;
+use crate::cube::{Writer, epoch_samples, merge_means, samples_before};
 use crate::gpu::adapter::Gpu;
 use crate::gpu::layout::Counters;
 use crate::gpu::self_test;
 use crate::render::prepare::Prepared;
 use crate::render::queue::{Group, Next, Queue};
-use crate::render::schedule::epoch_samples;
 use crate::render::worker::{Collected, Interrupt, Profile, UnitRect, Worker};
 use crate::{Error, Result};
 
@@ -20,7 +19,7 @@ pub struct Pool<'a> {
     pub prepared: &'a Arc<Prepared>,
     pub queue: &'a Queue,
     /// Set before the first unit may be taken.
-    pub cube: &'a OnceLock<Cube>,
+    pub cube: &'a OnceLock<Writer>,
     pub tile: [u32; 2],
     /// Samples of a full epoch.
     pub full_epoch: u32,
@@ -38,14 +37,25 @@ pub enum Report {
     Left { result: Result<Option<Profile>> },
 }
 
+/// A group that a device has taken.
+struct Taken {
+    group: Group,
+    /// Epochs that have come back.
+    collected: u32,
+    /// The means of each tile over these, where several epochs are merged at once.
+    means: Vec<Vec<f32>>,
+    counters: Counters,
+    bad: Option<[u32; 4]>,
+}
+
 /// A group of units in the cube.
 pub struct Merged {
     pub group: Group,
     /// Paths of the pixels in the image.
     pub paths: u64,
     pub counters: Counters,
-    /// Column, row and sample of a bad sample, where there was one.
-    pub bad: Option<[u32; 3]>,
+    /// Column, row, epoch and sample of a bad sample, where there was one.
+    pub bad: Option<[u32; 4]>,
     /// Seconds that merging took, and since when the device has been without work, in all.
     pub merge_s: f64,
     pub idle_s: f64,
@@ -63,8 +73,8 @@ impl Pool<'_> {
             self.pull(&mut worker, &mut taken, &report)?;
             Ok((self.profile && worker.gpu.timestamps).then_some(worker.profile))
         });
-        for group in taken.into_iter().rev() {
-            self.queue.give_back(group);
+        for taken in taken.into_iter().rev() {
+            self.queue.give_back(taken.group);
         }
         report(Report::Left { result });
     }
@@ -81,15 +91,18 @@ impl Pool<'_> {
     }
 
     /// Renders what the queue has, until it has nothing any more. `taken`: groups under way, the oldest first.
-    fn pull(&self, worker: &mut Worker, taken: &mut VecDeque<Group>, report: &impl Fn(Report)) -> Result<()> {
+    fn pull(&self, worker: &mut Worker, taken: &mut VecDeque<Taken>, report: &impl Fn(Report)) -> Result<()> {
         loop {
             let plan = worker.plan;
             match self.queue.next(|epoch| plan.units_at_once(epoch_samples(epoch, self.full_epoch))) {
                 Next::Units(group) => {
                     let units: Vec<UnitRect> = group.tiles.iter().map(|&tile| self.unit_rect(tile)).collect();
-                    let (epoch, samples) = (group.epoch, epoch_samples(group.epoch, self.full_epoch));
-                    taken.push_back(group);
-                    worker.submit(&units, epoch, samples, &mut |c| self.merge(&c, taken, report))?;
+                    let epochs = group.epoch..group.epoch + group.epochs;
+                    taken.push_back(Taken::new(group));
+                    for epoch in epochs {
+                        let samples = epoch_samples(epoch, self.full_epoch);
+                        worker.submit(&units, epoch, samples, &mut |c| self.merge(&c, taken, report))?;
+                    }
                 }
                 // What this device holds back may be what others, or it itself, wait for.
                 Next::Later if worker.is_idle() => self.queue.wait(),
@@ -99,19 +112,19 @@ impl Pool<'_> {
         }
     }
 
-    fn cube(&self) -> &Cube {
+    fn cube(&self) -> &Writer {
         self.cube.get().expect("the cube is there before the first unit")
     }
 
     /// A tile in the coordinates of the full film.
     fn unit_rect(&self, tile: u32) -> UnitRect {
-        let rect = self.cube().grid().rect(tile);
-        let [x, y] = self.cube().header().origin;
+        let cube = self.cube().cube();
+        let (rect, [x, y]) = (cube.grid().rect(tile), cube.header().origin);
         [x + rect.x0, y + rect.y0, x + rect.x1, y + rect.y1]
     }
 
-    /// Merges the oldest group under way into the cube.
-    fn merge(&self, collected: &Collected, taken: &mut VecDeque<Group>, report: &impl Fn(Report)) -> Result<()> {
+    /// Takes what came back of the oldest group under way; merges it into the cube when all has.
+    fn merge(&self, collected: &Collected, taken: &mut VecDeque<Taken>, report: &impl Fn(Report)) -> Result<()> {
         let counters = collected.counters;
         if counters.overflow > 0 {
             let [x0, y0, x1, y1] = collected.units[0];
@@ -122,28 +135,65 @@ impl Pool<'_> {
             )));
         }
         let began = Instant::now();
-        let Some(group) = taken.front() else {
+        let Some(oldest) = taken.front_mut() else {
             return Err(Error::Internal("a device returned units that it had not taken".into()));
         };
-        let (cube, samples) = (self.cube(), epoch_samples(group.epoch, self.full_epoch));
+        let epoch = oldest.group.epoch + oldest.collected;
+        oldest.note(counters, epoch, || self.bad_sample(collected));
+        oldest.collected += 1;
+        let (n_before, samples) = (samples_before(epoch, self.full_epoch), epoch_samples(epoch, self.full_epoch));
         let unit_len = collected.means.len() / collected.units.len();
-        let mut paths = 0;
-        for (&tile, mean) in group.tiles.iter().zip(collected.means.chunks(unit_len)) {
-            cube.merge_unit(tile, samples, mean)?;
-            paths += cube.grid().rect(tile).pixels() * u64::from(samples);
+        let units = collected.means.chunks(unit_len);
+        let last = oldest.collected == oldest.group.epochs;
+        if oldest.group.epochs > 1 {
+            // The same arithmetic as in the cube, but nothing is written before the last of these epochs.
+            if oldest.means.is_empty() {
+                oldest.means = units.map(<[f32]>::to_vec).collect();
+            } else {
+                oldest.means.iter_mut().zip(units).for_each(|(mean, unit)| merge_means(mean, n_before, unit, samples));
+            }
+            if !last {
+                return Ok(());
+            }
+            for (&tile, mean) in oldest.group.tiles.iter().zip(&oldest.means) {
+                self.cube().merge_unit(tile, 0, n_before + samples, mean)?;
+            }
+        } else {
+            for (&tile, unit) in oldest.group.tiles.iter().zip(units) {
+                self.cube().merge_unit(tile, n_before, samples, unit)?;
+            }
         }
-        let bad = (counters.bad_sample > 0).then(|| {
-            let [width, height] = self.tile;
-            let unit = collected.units[(counters.bad_slot / (width * height)) as usize];
-            let in_tile = counters.bad_slot % (width * height);
-            [unit[0] + in_tile % width, unit[1] + in_tile / width, counters.bad_sample - 1]
-        });
-        let group = taken.pop_front().expect("looked at above");
-        for &tile in &group.tiles {
-            self.queue.done(group.epoch, tile);
-        }
+        let Some(Taken { group, counters, bad, .. }) = taken.pop_front() else { return Ok(()) };
+        self.queue.done(&group);
+        let merged = u64::from(n_before + samples - samples_before(group.epoch, self.full_epoch));
+        let grid = self.cube().cube().grid();
+        let paths = group.tiles.iter().map(|&tile| grid.rect(tile).pixels() * merged).sum();
         let (merge_s, idle_s) = (began.elapsed().as_secs_f64(), collected.idle_s);
         report(Report::Merged(Merged { group, paths, counters, bad, merge_s, idle_s }));
         Ok(())
+    }
+
+    /// Column, row and sample of a bad sample.
+    fn bad_sample(&self, collected: &Collected) -> [u32; 3] {
+        let ([width, height], counters) = (self.tile, collected.counters);
+        let unit = collected.units[(counters.bad_slot / (width * height)) as usize];
+        let in_tile = counters.bad_slot % (width * height);
+        [unit[0] + in_tile % width, unit[1] + in_tile / width, counters.bad_sample - 1]
+    }
+}
+
+impl Taken {
+    fn new(group: Group) -> Taken {
+        Taken { group, collected: 0, means: Vec::new(), counters: Counters::default(), bad: None }
+    }
+
+    fn note(&mut self, counters: Counters, epoch: u32, bad_sample: impl FnOnce() -> [u32; 3]) {
+        self.counters.non_finite += counters.non_finite;
+        self.counters.negative += counters.negative;
+        self.counters.rays += counters.rays;
+        if counters.bad_sample > 0 && self.bad.is_none() {
+            let [x, y, sample] = bad_sample();
+            self.bad = Some([x, y, epoch, sample]);
+        }
     }
 }

@@ -1,14 +1,16 @@
 //! The render: epochs of the whole image, decided one after the other; devices that pull their units; what is known so far.
 
 use std::collections::VecDeque;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{self, Receiver};
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 use serde_json::json;
 
-use crate::cube::Cube;
+use crate::cube::{Existing, Header, Writer, check_target, epoch_samples, epochs_in, samples_before, whole_epochs};
 use crate::gpu::adapter::{Gpu, Selection};
 use crate::gpu::layout::Counters;
 use crate::render::plan;
@@ -23,6 +25,8 @@ use crate::{Error, Result, files, format};
 pub const DEFAULT_SAMPLES: u32 = 64;
 /// The preview file is rewritten at most this often.
 const PREVIEW_INTERVAL: Duration = Duration::from_secs(1);
+/// How soon a signal is noticed while no device has anything to report.
+const SIGNAL_INTERVAL: Duration = Duration::from_millis(200);
 
 /// When to stop; the first that is reached does, at the end of an epoch of the whole image.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -43,7 +47,10 @@ pub struct Preview {
 pub struct Job {
     pub scene: Scene,
     pub output: PathBuf,
-    pub overwrite: bool,
+    /// What may be there already.
+    pub existing: Existing,
+    /// The tiles to render, if not all.
+    pub tiles: Option<Range<u32>>,
     pub seed: u64,
     /// Side of the tiles, if asked for.
     pub tile: Option<u32>,
@@ -88,6 +95,8 @@ pub enum Event<'a> {
     Device(&'a str),
     Progress(&'a Status),
     Epoch(&'a Status),
+    /// Somebody has asked, and what is merged is on disk.
+    Asked(&'a Status),
     Warning(String),
 }
 
@@ -106,20 +115,6 @@ pub struct Summary {
     pub counters: Counters,
 }
 
-/// Samples of epoch `index` when a full one has `full`: 1, 1, 2, 4, … full/2, then `full` for ever.
-pub fn epoch_samples(index: u32, full: u32) -> u32 {
-    match index {
-        0 => 1,
-        i if i > full.ilog2() => full,
-        i => 1 << (i - 1),
-    }
-}
-
-/// Samples per pixel at the end of the first epoch that has `wanted`; `None` where u32 does not count that far.
-pub fn whole_epochs(wanted: u32, full: u32) -> Option<u32> {
-    if wanted < full { wanted.checked_next_power_of_two() } else { wanted.checked_next_multiple_of(full) }
-}
-
 impl StopRule {
     /// The samples per pixel at which a render with full epochs of `full` samples stops; `None`: only time does.
     pub fn samples_limit(&self, full: u32) -> Result<Option<u32>> {
@@ -134,14 +129,15 @@ impl StopRule {
     }
 }
 
-/// Renders `job` into a new cube. Errors leave the cube with every unit merged so far.
+/// Renders `job` into a cube, new or gone on with. Errors leave the cube with every unit merged so far.
 pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event) -> Result<()>) -> Result<Summary> {
     let started = Instant::now();
     plan::check(&job.scene)?;
     let samples_limit = job.stop.samples_limit(job.scene.integrator.epoch)?;
     let tile = plan::tile_size(&job.scene, job.tile);
     let header = plan::header(&job.scene, tile, job.seed);
-    Cube::check_target(&job.output, &header, job.overwrite)?;
+    let tiles = job.tiles(&header)?;
+    check_target(&job.output, &header, job.existing, &tiles)?;
     if let Some(preview) = &job.preview {
         files::check_target(&preview.file)?;
     }
@@ -161,7 +157,7 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
         observe(Event::Warning(what))?;
     }
 
-    let (queue, cube) = (Queue::new(header.grid().count()), OnceLock::new());
+    let (queue, cube) = (Queue::new(), OnceLock::new());
     let pool = Pool {
         prepared: &prepared,
         queue: &queue,
@@ -172,7 +168,7 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
         interrupt,
     };
     let names = gpus.iter().map(|gpu| gpu.name.clone()).collect();
-    let mut render = Render::new(job, names, header.grid().count(), samples_limit, started);
+    let mut render = Render::new(job, names, samples_limit, interrupt, started);
     let result = std::thread::scope(|threads| {
         let (sender, reports) = mpsc::channel();
         for (device, gpu) in gpus.into_iter().enumerate() {
@@ -183,20 +179,30 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
         let result = render.wait_for_devices(&reports, observe).and_then(|()| {
             check_interrupt(interrupt)?;
             // Only now is anything written: whatever can be refused has been.
-            let made = Cube::create(&job.output, header, job.overwrite)?;
-            render.epochs(cube.get_or_init(|| made), &queue, &reports, observe)
+            let mut warnings = Vec::new();
+            let opened = Writer::open(&job.output, &header, job.existing, tiles, &mut |what| warnings.push(what));
+            warnings.into_iter().try_for_each(|what| observe(Event::Warning(what)))?;
+            let opened = opened?;
+            let cube = cube.get_or_init(|| opened);
+            threads.spawn(|| cube.commit_regularly());
+            render.epochs(cube, &queue, &reports, observe)
         });
         // At the end nobody has a unit any more; after an error those under way are dropped.
         queue.close();
         reports.iter().for_each(|(_, report)| render.note_profile(report));
+        if let Some(cube) = cube.get() {
+            cube.close();
+        }
         result
     });
     // What ended the epochs is the error to report, whatever else fails for the same reason.
     let Some(cube) = cube.get() else { return Err(result.err().unwrap_or_else(no_cube)) };
+    let flushed = cube.flush();
     let preview = render.write_preview(cube);
     let facts = render.write_run_facts(cube);
     let warned = render.report_counters(observe);
     result?;
+    flushed?;
     facts?;
     warned?;
     Ok(Summary {
@@ -214,10 +220,40 @@ fn no_cube() -> Error {
     Error::Internal("the render ended without a cube".into())
 }
 
+impl Job {
+    /// The tiles to render, of the cube that `header` describes.
+    fn tiles(&self, header: &Header) -> Result<Range<u32>> {
+        header.validate().map_err(Error::Usage)?;
+        let count = header.grid().count();
+        match &self.tiles {
+            None => Ok(0..count),
+            Some(tiles) if tiles.start < tiles.end && tiles.end <= count => Ok(tiles.clone()),
+            Some(tiles) => Err(Error::Usage(format!(
+                "--tiles {}..{}: this picture has the tiles 0..{count}, and A must be less than B",
+                tiles.start, tiles.end
+            ))),
+        }
+    }
+
+    /// How many epochs of a new tile are rendered at once and merged once: all of the first full one where nobody could
+    /// look at the picture before, since it is too large or only a part of it is rendered here.
+    fn together(&self, header: &Header, samples_limit: Option<u32>) -> u32 {
+        let full = header.epoch;
+        let only_samples = self.stop.time.is_none() && samples_limit.is_some_and(|limit| limit >= full);
+        let larger_than_half = || files::memory_bytes().is_some_and(|memory| header.store_bytes() > memory / 2);
+        if only_samples && (self.tiles.is_some() || larger_than_half()) { epochs_in(full, full) } else { 1 }
+    }
+}
+
 struct Render<'a> {
     job: &'a Job,
+    interrupt: &'a Interrupt,
     /// Samples per pixel at which to stop, the end of an epoch.
     samples_limit: Option<u32>,
+    /// Samples per pixel that every tile had before.
+    samples_found: u32,
+    /// Paths to trace until the limit.
+    paths_needed: Option<f64>,
     started: Instant,
     setup_s: f64,
     merge_s: f64,
@@ -235,12 +271,21 @@ struct Render<'a> {
 }
 
 impl<'a> Render<'a> {
-    fn new(job: &'a Job, names: Vec<String>, tiles: u32, samples_limit: Option<u32>, started: Instant) -> Self {
+    fn new(
+        job: &'a Job,
+        names: Vec<String>,
+        samples_limit: Option<u32>,
+        interrupt: &'a Interrupt,
+        started: Instant,
+    ) -> Self {
         let devices: Vec<_> =
             names.into_iter().map(|name| DeviceStatus { name, units: 0, busy_s: 0.0, idle_s: 0.0 }).collect();
         Render {
             job,
+            interrupt,
             samples_limit,
+            samples_found: 0,
+            paths_needed: None,
             started,
             setup_s: 0.0,
             merge_s: 0.0,
@@ -250,7 +295,7 @@ impl<'a> Render<'a> {
             status: Status {
                 samples: 0,
                 samples_next: 0,
-                units: (0, tiles),
+                units: (0, 0),
                 paths: 0,
                 rays: 0,
                 elapsed: Duration::ZERO,
@@ -289,16 +334,62 @@ impl<'a> Render<'a> {
         Ok(())
     }
 
+    /// What the next device has to tell. Signals are noticed meanwhile.
+    fn next_report(
+        &self,
+        cube: &Writer,
+        reports: &Receiver<(usize, Report)>,
+        observe: &mut dyn FnMut(Event) -> Result<()>,
+    ) -> Result<(usize, Report)> {
+        loop {
+            if self.interrupt.report.swap(false, Ordering::SeqCst) {
+                cube.flush()?;
+                observe(Event::Asked(&self.status))?;
+            }
+            match reports.recv_timeout(SIGNAL_INTERVAL) {
+                Ok(report) => return Ok(report),
+                Err(RecvTimeoutError::Timeout) => check_interrupt(self.interrupt)?,
+                Err(RecvTimeoutError::Disconnected) => return Err(no_cube()),
+            }
+        }
+    }
+
+    /// Counts what the cube holds already, and fills the queue with what is missing. Returns the first epoch that is.
+    fn go_on(&mut self, cube: &Writer, queue: &Queue) -> u32 {
+        let (full, grid) = (cube.cube().header().epoch, cube.cube().grid());
+        let tiles = || cube.tiles().zip(cube.found().iter().copied());
+        let epochs = || tiles().map(|(tile, samples)| (tile, epochs_in(samples, full)));
+        queue.fill(epochs(), self.job.together(cube.cube().header(), self.samples_limit));
+
+        let first = epochs().map(|(_, epoch)| epoch).min().unwrap_or(0);
+        self.status.units.1 = cube.tiles().len() as u32;
+        self.samples_found = samples_before(first, full);
+        self.status.samples = self.samples_found;
+        self.paths_needed = self.samples_limit.map(|limit| {
+            tiles().map(|(tile, n)| grid.rect(tile).pixels() as f64 * f64::from(limit.saturating_sub(n))).sum()
+        });
+        for (_, epoch) in epochs() {
+            let ahead = (epoch - first) as usize;
+            if self.merged.len() < ahead {
+                self.merged.resize(ahead, 0);
+            }
+            self.merged.iter_mut().take(ahead).for_each(|count| *count += 1);
+        }
+        first
+    }
+
     /// One epoch after another until a stop rule is met.
     fn epochs(
         &mut self,
-        cube: &Cube,
+        cube: &Writer,
         queue: &Queue,
         reports: &Receiver<(usize, Report)>,
         observe: &mut dyn FnMut(Event) -> Result<()>,
     ) -> Result<()> {
         let full = self.job.scene.integrator.epoch;
-        for epoch in 0.. {
+        let first = self.go_on(cube, queue);
+        self.update_estimate(cube);
+        for epoch in first.. {
             let n = epoch_samples(epoch, full);
             if self.samples_limit.is_some_and(|limit| self.status.samples >= limit) || self.too_late(n) {
                 return Ok(());
@@ -310,15 +401,14 @@ impl<'a> Render<'a> {
                 })?;
             self.status.units.0 = self.merged.front().copied().unwrap_or(0);
             while self.status.units.0 < self.status.units.1 {
-                let (device, report) = reports.recv().map_err(|_| no_cube())?;
-                match report {
-                    Report::Merged(merged) => self.note_merged(cube, epoch, device, merged, observe)?,
-                    report => self.left(device, report, observe)?,
+                match self.next_report(cube, reports, observe)? {
+                    (device, Report::Merged(merged)) => self.note_merged(cube, epoch, device, merged, observe)?,
+                    (device, report) => self.left(device, report, observe)?,
                 }
             }
             self.merged.pop_front();
             self.status.samples += n;
-            self.update_estimate(cube)?;
+            self.update_estimate(cube);
             observe(Event::Epoch(&self.status))?;
         }
         unreachable!("epochs go on until a stop rule ends them")
@@ -328,8 +418,7 @@ impl<'a> Render<'a> {
     /// are: then no device waits for another at an epoch's end.
     fn decided(&self, epoch: u32) -> u32 {
         let (None, Some(limit)) = (self.job.stop.time, self.samples_limit) else { return epoch + 1 };
-        let full = self.job.scene.integrator.epoch;
-        if limit < full { limit.ilog2() + 1 } else { full.ilog2() + limit / full }
+        epochs_in(limit, self.job.scene.integrator.epoch)
     }
 
     fn rendering_s(&self) -> f64 {
@@ -339,10 +428,11 @@ impl<'a> Render<'a> {
     /// Whether an epoch of `n` samples would not fit into the time that is left.
     fn too_late(&self, n: u32) -> bool {
         let Some(limit) = self.job.stop.time else { return false };
-        if self.status.samples == 0 {
+        let rendered = self.status.samples - self.samples_found;
+        if rendered == 0 {
             return false;
         }
-        let predicted = self.rendering_s() / f64::from(self.status.samples) * f64::from(n);
+        let predicted = self.rendering_s() / f64::from(rendered) * f64::from(n);
         self.started.elapsed().as_secs_f64() + predicted > limit.as_secs_f64()
     }
 
@@ -363,30 +453,29 @@ impl<'a> Render<'a> {
     /// A group of units is in the cube.
     fn note_merged(
         &mut self,
-        cube: &Cube,
+        cube: &Writer,
         current: u32,
         device: usize,
         merged: Merged,
         observe: &mut dyn FnMut(Event) -> Result<()>,
     ) -> Result<()> {
-        let ahead = (merged.group.epoch - current) as usize;
-        if self.merged.len() <= ahead {
-            self.merged.resize(ahead + 1, 0);
+        let first = (merged.group.epoch - current) as usize;
+        let epochs = first..first + merged.group.epochs as usize;
+        if self.merged.len() < epochs.end {
+            self.merged.resize(epochs.end, 0);
         }
-        self.merged[ahead] += merged.group.tiles.len() as u32;
+        self.merged.range_mut(epochs).for_each(|count| *count += merged.group.tiles.len() as u32);
         self.status.units.0 = self.merged[0];
         self.counters.non_finite += merged.counters.non_finite;
         self.counters.negative += merged.counters.negative;
-        if let (Some([x, y, sample]), None) = (merged.bad, self.first_bad) {
-            self.first_bad = Some([x, y, merged.group.epoch, sample]);
-        }
+        self.first_bad = self.first_bad.or(merged.bad);
         self.merge_s += merged.merge_s;
         self.status.paths += merged.paths;
         self.status.rays += u64::from(merged.counters.rays);
         self.update_clock();
         let rendering_s = self.status.rendering_s;
         let of_device = &mut self.status.devices[device];
-        of_device.units += merged.group.tiles.len() as u64;
+        of_device.units += merged.group.tiles.len() as u64 * u64::from(merged.group.epochs);
         of_device.idle_s = merged.idle_s;
         of_device.busy_s = rendering_s - merged.idle_s;
         if self.last_preview.is_none_or(|last| last.elapsed() >= PREVIEW_INTERVAL) {
@@ -412,26 +501,21 @@ impl<'a> Render<'a> {
 
     /// Time until the last epoch ends, from the paths still to trace.
     fn remaining(&self) -> Option<Duration> {
-        let left = self.samples_limit.map(|limit| {
-            let pixels: f64 = self.job.scene.film.cube_size().iter().map(|&s| f64::from(s)).product();
-            self.rendering_s() * (pixels * f64::from(limit) / self.status.paths.max(1) as f64 - 1.0)
-        });
+        let left = self.paths_needed.map(|paths| self.rendering_s() * (paths / self.status.paths.max(1) as f64 - 1.0));
         let until = self.job.stop.time.map(|limit| limit.as_secs_f64() - self.status.elapsed.as_secs_f64());
         let seconds = [left, until].into_iter().flatten().reduce(f64::min)?;
         Duration::try_from_secs_f64(seconds.max(0.0)).ok()
     }
 
-    fn update_estimate(&mut self, cube: &Cube) -> Result<()> {
+    fn update_estimate(&mut self, cube: &Writer) {
         if self.status.samples >= 2 * self.job.scene.integrator.epoch {
-            let estimates = cube.error_estimate()?;
-            self.status.error_estimate = estimates.into_iter().filter(|e| !e.is_nan()).reduce(f64::max);
+            self.status.error_estimate = cube.error_estimate().into_iter().filter(|e| !e.is_nan()).reduce(f64::max);
         }
         self.update_clock();
-        Ok(())
     }
 
     /// Writes the preview, if one is wanted, and says at which exposure.
-    fn write_preview(&mut self, cube: &Cube) -> Result<Option<f64>> {
+    fn write_preview(&mut self, cube: &Writer) -> Result<Option<f64>> {
         let Some(preview) = &self.job.preview else { return Ok(None) };
         let picture = cube.preview()?;
         let exposure = preview.exposure.unwrap_or_else(|| picture.auto_exposure());
@@ -441,7 +525,7 @@ impl<'a> Render<'a> {
     }
 
     /// Facts about this process, which are not part of what the cube is.
-    fn write_run_facts(&self, cube: &Cube) -> Result<()> {
+    fn write_run_facts(&self, cube: &Writer) -> Result<()> {
         let devices =
             self.status.devices.iter().map(|d| json!({ "name": d.name, "units": d.units, "idle_seconds": d.idle_s }));
         let facts = json!({
@@ -456,7 +540,7 @@ impl<'a> Render<'a> {
             "negative_samples": self.counters.negative,
             "version": env!("CARGO_PKG_VERSION"),
         });
-        let folder = cube.path().join(".spectile");
+        let folder = cube.cube().path().join(".spectile");
         let file: &Path = &folder.join(format!("run-{}.json", files::random_suffix()));
         files::write_atomically(file, format!("{facts:#}\n").as_bytes())
     }
@@ -475,28 +559,10 @@ impl<'a> Render<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::{StopRule, epoch_samples, whole_epochs};
+    use super::StopRule;
 
     #[test]
-    fn epochs_double_up_to_a_full_one() {
-        let sizes = |full, n: u32| (0..n).map(|i| epoch_samples(i, full)).collect::<Vec<_>>();
-        assert_eq!(sizes(64, 9), [1, 1, 2, 4, 8, 16, 32, 64, 64]);
-        assert_eq!(sizes(1, 3), [1, 1, 1]);
-        assert_eq!(sizes(2, 4), [1, 1, 2, 2]);
-    }
-
-    #[test]
-    fn limits_are_ends_of_epochs() {
-        for full in [1, 2, 64, 1024] {
-            let mut end = 0;
-            for epoch in 0..20 {
-                let begin = end;
-                end += epoch_samples(epoch, full);
-                for wanted in begin + 1..=end {
-                    assert_eq!(whole_epochs(wanted, full), Some(end), "{wanted} in epochs of {full}");
-                }
-            }
-        }
+    fn limits_that_cannot_be_counted_are_refused() {
         let limit = |samples| StopRule { samples: Some(samples), time: None }.samples_limit(64);
         assert_eq!(limit(u32::MAX - 63).ok(), Some(Some(u32::MAX - 63)));
         assert!(limit(u32::MAX).unwrap_err().to_string().contains("4294967232"));

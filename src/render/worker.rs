@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
 use crate::gpu::adapter::Gpu;
@@ -26,12 +26,18 @@ const SLOTS: usize = 2;
 const WAVES_AHEAD: usize = 32;
 const WAVES_AHEAD_SOFTWARE: usize = 2;
 
-/// Set by a signal handler: the signal's number asks for an orderly end, 0 does not.
-pub type Interrupt = AtomicUsize;
+/// What signal handlers set.
+#[derive(Debug, Default)]
+pub struct Interrupt {
+    /// The number of the signal that asks for an orderly end, or 0.
+    pub end: Arc<AtomicUsize>,
+    /// Whether somebody asks how far the render is, with everything so far on disk.
+    pub report: Arc<AtomicBool>,
+}
 
 /// [`Error::Interrupted`] once a signal has asked for the end.
 pub fn check_interrupt(interrupt: &Interrupt) -> Result<()> {
-    match interrupt.load(Ordering::SeqCst) {
+    match interrupt.end.load(Ordering::SeqCst) {
         0 => Ok(()),
         signal => Err(Error::Interrupted { signal: signal as i32 }),
     }

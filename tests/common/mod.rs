@@ -2,10 +2,12 @@
 
 #![allow(dead_code, reason = "every test binary uses its own part")]
 
+use std::ops::Deref;
 use std::path::Path;
 
 use serde_json::{Map, json};
-use spectile::cube::{Cube, Header};
+use spectile::Result;
+use spectile::cube::{Cube, Existing, Header, Writer};
 use spectile::spectral::Channels;
 
 /// SplitMix64 (Steele, Lea and Flood 2014).
@@ -37,8 +39,32 @@ pub fn header(size: [u32; 2], tile: [u32; 2], channels: usize) -> Header {
     }
 }
 
-pub fn create(folder: &Path, name: &str, header: Header) -> Cube {
-    Cube::create(&folder.join(name), header, false).expect("a new cube")
+/// A cube that this test writes to, every unit committed at once.
+pub struct Written(Writer);
+
+impl Deref for Written {
+    type Target = Cube;
+
+    fn deref(&self) -> &Cube {
+        self.0.cube()
+    }
+}
+
+impl Written {
+    /// Writes to all tiles.
+    pub fn open(path: &Path, header: Header, existing: Existing) -> Result<Written> {
+        let tiles = header.validate().map_or(0..1, |()| 0..header.grid().count());
+        Writer::open(path, &header, existing, tiles, &mut |what| panic!("{what}")).map(Written)
+    }
+
+    pub fn merge_unit(&self, tile: u32, n_unit: u32, unit: &[f32]) -> Result<()> {
+        self.0.merge_unit(tile, self.samples(tile)?, n_unit, unit)?;
+        self.0.flush()
+    }
+}
+
+pub fn create(folder: &Path, name: &str, header: Header) -> Written {
+    Written::open(&folder.join(name), header, Existing::Refuse).expect("a new cube")
 }
 
 /// A unit with `value(x, y, k)` in the picture and garbage beyond its edge.
@@ -63,7 +89,7 @@ pub fn pattern(x: u32, y: u32, k: usize) -> f32 {
 }
 
 /// A cube whose tiles all hold [`pattern`] as their first sample.
-pub fn patterned(folder: &Path, name: &str, header: Header) -> Cube {
+pub fn patterned(folder: &Path, name: &str, header: Header) -> Written {
     let cube = create(folder, name, header);
     for tile in 0..cube.grid().count() {
         cube.merge_unit(tile, 1, &unit(&cube, tile, pattern)).expect("merged");

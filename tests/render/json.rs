@@ -154,6 +154,8 @@ fn progress_adds_up() {
         .expect("channels")
         .iter()
         .map(|c| c["error_estimate"].as_f64().expect("an estimate"));
-    assert_eq!(done["error_estimate"].as_f64(), largest.reduce(f64::max));
+    // The render adds and takes away as tiles come, `info` adds once.
+    let (largest, estimate) = (largest.reduce(f64::max), done["error_estimate"].as_f64());
+    assert!(estimate.zip(largest).is_some_and(|(a, b)| (a / b - 1.0).abs() < 1e-9), "{estimate:?} {largest:?}");
     assert_eq!((&done["remaining_s"], &done["samples_next"]), (&Value::from(0.0), &Value::from(192)));
 }

@@ -44,7 +44,7 @@ fn info_and_export_work_while_it_grows() {
     let _child = place.start("cube.zarr", &["--quiet", "--tile", "8"]);
     until_samples(&place, 1);
     let mut seen = Vec::new();
-    for i in 0..5 {
+    for i in 0..3 {
         let done = place.events(&["info", "cube.zarr"]).pop().expect("done");
         assert_eq!((&done["event"], done["tiles_started"].as_u64()), (&"done".into(), Some(9)));
         seen.push(done["samples"]["most"].as_u64().expect("samples"));
@@ -52,8 +52,10 @@ fn info_and_export_work_while_it_grows() {
         let name = format!("{i}.png");
         place.success(&["export", "cube.zarr", "-o", &name]);
         assert_eq!(png(&place.path().join(&name)).0, [24, 20]);
+        // It grows by commits, one a second.
+        until_samples(&place, seen[i] as u32 + 1);
     }
-    assert!(seen.is_sorted() && seen[0] < seen[4], "{seen:?}");
+    assert!(seen.is_sorted() && seen[0] < seen[2], "{seen:?}");
 }
 
 #[test]
@@ -142,7 +144,7 @@ mod signals {
             assert_eq!(exit, Some(code), "{stderr}");
             let last = stderr.lines().last().expect("a hint");
             assert!(last.starts_with("interrupted: cube.zarr keeps every unit merged so far, "), "{stderr}");
-            assert!(!stderr.contains("error") && !stderr.contains("panic"), "{stderr}");
+            assert!(!stderr.contains("error:") && !stderr.contains("panic"), "{stderr}");
 
             let cube = place.cube("cube.zarr");
             let [least, most] = cube.progress().expect("progress").samples;

@@ -1,0 +1,273 @@
+//! Making a cube, replacing one, and going on with one that is there.
+
+use std::fs;
+use std::io::ErrorKind;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use super::checksums;
+use super::lock::TileLock;
+use super::metadata::Header;
+use super::store::{Cube, PRIVATE, read_group};
+use super::writer::BATCH_BYTES;
+use crate::{Error, Result, files};
+
+/// Arrays that later versions add and this one must not mistake for somebody else's files.
+const OTHER_ARRAYS: [&str; 1] = ["standard_error"];
+
+/// What may be at the path of a cube that is going to be written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Existing {
+    /// Nothing.
+    Refuse,
+    /// A cube, which is replaced; or nothing.
+    Replace,
+    /// The same cube, which is gone on with; or nothing.
+    Join,
+    /// The same cube, which is gone on with.
+    Resume,
+}
+
+/// What [`open_or_create`] is going to do.
+enum Way {
+    Create(PathBuf),
+    Replace(PathBuf),
+    GoOn(Cube),
+}
+
+/// Whether [`super::Writer::open`] may work on `tiles` of a cube at `path`, as far as can be told without changing
+/// anything.
+pub fn check_target(path: &Path, header: &Header, existing: Existing, tiles: &Range<u32>) -> Result<()> {
+    match find_way(path, header, existing, tiles)? {
+        Way::Create(_) => Ok(()),
+        Way::Replace(target) => refuse_in_use(TileLock::held(&target.join(PRIVATE), ALL_TILES), &target),
+        Way::GoOn(cube) => refuse_in_use(TileLock::held(&cube.private(), tiles.clone()), cube.path()),
+    }
+}
+
+/// Those of any cube.
+const ALL_TILES: Range<u32> = 0..u32::MAX;
+
+fn refuse_in_use(held: Option<Range<u32>>, path: &Path) -> Result<()> {
+    held.map_or(Ok(()), |held| Err(super::lock::in_use(path, &held)))
+}
+
+/// The cube to write to, made or found. A new one is built under a temporary name beside it and renamed: whoever of
+/// several processes comes second finds the first one's.
+pub(super) fn open_or_create(path: &Path, header: &Header, existing: Existing, tiles: &Range<u32>) -> Result<Cube> {
+    let (target, old) = match find_way(path, header, existing, tiles)? {
+        Way::GoOn(cube) => return Ok(cube),
+        Way::Create(target) => (target, None),
+        Way::Replace(target) => {
+            let lock = TileLock::take(&target, &target.join(PRIVATE), ALL_TILES)?;
+            (target, Some(lock))
+        }
+    };
+    let mut building = Building(Some(files::sibling(&target, "creating")));
+    let temporary = building.0.as_deref().unwrap_or(&target);
+    write_empty(temporary, header).map_err(|error| match error {
+        // Nobody knows the temporary name: name the cube.
+        Error::Storage { what, .. } => Error::storage(&target, what),
+        error => error,
+    })?;
+    let failed = |error: std::io::Error| Error::storage(&target, format!("cannot be created: {error}"));
+    if old.is_some() {
+        let replaced = files::sibling(&target, "replaced");
+        fs::rename(&target, &replaced).map_err(failed)?;
+        if let Err(error) = fs::rename(temporary, &target) {
+            fs::rename(&replaced, &target).map_err(failed)?;
+            return Err(failed(error));
+        }
+        building.0 = None;
+        let removed = fs::remove_dir_all(&replaced);
+        removed.map_err(|error| Error::storage(&replaced, format!("cannot be removed: {error}")))?;
+    } else {
+        match fs::rename(temporary, &target) {
+            Ok(()) => building.0 = None,
+            Err(error) if matches!(error.kind(), ErrorKind::DirectoryNotEmpty | ErrorKind::AlreadyExists) => {
+                // Another process was quicker. Joining is what was asked for, or it is an error.
+                return match find_way(path, header, existing, tiles)? {
+                    Way::GoOn(cube) => Ok(cube),
+                    _ => Err(failed(error)),
+                };
+            }
+            Err(error) => return Err(failed(error)),
+        }
+    }
+    files::sync_folder(files::parent(&target)).map_err(failed)?;
+    Ok(Cube::new(&target, header.clone()))
+}
+
+/// What there is at `path`, and whether it is what may be there.
+fn find_way(path: &Path, header: &Header, existing: Existing, tiles: &Range<u32>) -> Result<Way> {
+    header.validate().map_err(|what| Error::Usage(format!("{}: {what}", path.display())))?;
+    let there = match fs::symlink_metadata(path) {
+        Ok(_) => true,
+        Err(error) if error.kind() == ErrorKind::NotFound => false,
+        Err(error) => return Err(Error::storage(path, error)),
+    };
+    let count = u64::from(tiles.end - tiles.start);
+    match existing {
+        Existing::Refuse if there => {
+            let what = "exists already; choose another name, --resume to go on with it, or --overwrite to replace a cube";
+            Err(Error::Usage(format!("{} {what}", path.display())))
+        }
+        Existing::Replace if there => {
+            // A link to a cube on another disk stays a link.
+            let target = fs::canonicalize(path).unwrap_or(path.to_owned());
+            check_removable(&target)?;
+            check_space(&target, header, count, folder_bytes(&target))?;
+            Ok(Way::Replace(target))
+        }
+        Existing::Join | Existing::Resume if there => {
+            let cube = open_same(path, header)?;
+            let begun = tiles.clone().filter(|&tile| cube.part_path(super::store::Part::Radiance, tile).exists()).count();
+            check_space(cube.path(), header, count - begun as u64, 0)?;
+            Ok(Way::GoOn(cube))
+        }
+        Existing::Resume => {
+            let what = "there is no such cube to go on with; leave --resume out to begin it";
+            Err(Error::Usage(format!("{}: {what}", path.display())))
+        }
+        Existing::Refuse | Existing::Replace | Existing::Join => {
+            let folder = files::parent(path);
+            if !folder.is_dir() {
+                let what = format!("cannot be created: there is no folder {}", folder.display());
+                return Err(Error::storage(path, what));
+            }
+            check_space(path, header, count, 0)?;
+            Ok(Way::Create(path.to_owned()))
+        }
+    }
+}
+
+/// The cube at `path`, if it is what rendering into `header` would have made; else the difference is named.
+fn open_same(path: &Path, header: &Header) -> Result<Cube> {
+    let cube = Cube::open(path)?;
+    let made_by = read_group(path)?["attributes"]["spectile_version"].as_str().unwrap_or("another version").to_owned();
+    let version = env!("CARGO_PKG_VERSION");
+    let difference = if made_by == version {
+        cube.header().difference(header)
+    } else {
+        Some(format!("version: it was begun by Spectile {made_by}, this is {version}"))
+    };
+    match difference {
+        None => Ok(cube),
+        Some(what) => Err(Error::Usage(format!(
+            "{}: cannot be gone on with, since something else would be rendered: {what}",
+            path.display()
+        ))),
+    }
+}
+
+/// The temporary folder of a cube that is being built, removed again unless it has taken its place.
+struct Building(Option<PathBuf>);
+
+impl Drop for Building {
+    fn drop(&mut self) {
+        if let Some(folder) = &self.0 {
+            // Creation has failed already; that error is the one to report.
+            let _ = fs::remove_dir_all(folder);
+        }
+    }
+}
+
+/// Writes metadata, coordinates and empty folders of a cube into a new folder, durably.
+fn write_empty(folder: &Path, header: &Header) -> Result<()> {
+    let mut checksums = checksums::List::default();
+    let mut write = |name: &str, bytes: &[u8]| -> Result<()> {
+        let path = folder.join(name);
+        files::make_folder_durably(files::parent(&path))
+            .and_then(|()| files::write_durably(&path, bytes))
+            .map_err(|error| Error::storage(&path, format!("{name} cannot be written: {error}")))?;
+        checksums.add(name, bytes);
+        Ok(())
+    };
+    let (group, arrays) = header.metadata()?;
+    for (name, array) in arrays {
+        write(&format!("{name}/zarr.json"), pretty(&array).as_bytes())?;
+    }
+    let channels = &header.channels;
+    let each = |value: &dyn Fn(usize) -> f64| doubles((0..channels.len()).map(value));
+    write("wavelength/c/0", &each(&|k| channels.centre(k)))?;
+    write("wavelength_bounds/c/0/0", &doubles(channels.bounds.iter().flatten().copied()))?;
+    write("response_integral/c/0", &each(&|k| channels.width(k)))?;
+    for (axis, name) in ["x", "y"].into_iter().enumerate() {
+        let centres = (0..header.size[axis]).map(|i| f64::from(header.origin[axis]) + f64::from(i) + 0.5);
+        write(&format!("{name}/c/0"), &doubles(centres))?;
+    }
+    for private in ["aside", "journal"] {
+        let path = folder.join(PRIVATE).join(private);
+        let made = files::make_folder_durably(&path);
+        made.map_err(|error| Error::storage(&path, format!("cannot be created: {error}")))?;
+    }
+    write("zarr.json", pretty(&group).as_bytes())?;
+    let list = folder.join(checksums::FILE);
+    files::write_durably(&list, checksums.to_string().as_bytes())
+        .map_err(|error| Error::storage(&list, format!("cannot be written: {error}")))
+}
+
+fn pretty(value: &Value) -> String {
+    format!("{value:#}\n")
+}
+
+fn doubles(values: impl Iterator<Item = f64>) -> Vec<u8> {
+    values.flat_map(f64::to_le_bytes).collect()
+}
+
+
+/// Whether `path` is a Spectile cube and nothing else, so that replacing it loses nobody's other files.
+fn check_removable(path: &Path) -> Result<()> {
+    let refuse = |what: String| {
+        Error::Usage(format!("{}: --overwrite replaces nothing but Spectile cubes: {what}", path.display()))
+    };
+    if !path.exists() {
+        return Err(refuse("this is a link to nothing".into()));
+    }
+    let group = read_group(path).map_err(|error| match error {
+        Error::Storage { what, .. } => refuse(format!("this {what}")),
+        error => error,
+    })?;
+    let arrays = group["consolidated_metadata"]["metadata"].as_object();
+    let known = |name: &str| {
+        [PRIVATE, "zarr.json"].contains(&name)
+            || OTHER_ARRAYS.contains(&name)
+            || arrays.is_some_and(|arrays| arrays.contains_key(name))
+    };
+    for entry in fs::read_dir(path).map_err(|error| Error::storage(path, error))? {
+        let name = entry.map_err(|error| Error::storage(path, error))?.file_name();
+        if !name.to_str().is_some_and(known) {
+            return Err(refuse(format!("this one also holds `{}`, which is no part of it", name.display())));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses what would not fit: a cube with `tiles` more tiles than there are, `freed` bytes of the one it replaces
+/// counted in, and a batch of files aside beside those that they replace.
+fn check_space(path: &Path, header: &Header, tiles: u64, freed: u64) -> Result<()> {
+    let needed = header.bytes_with_tiles(tiles).saturating_add(header.store_bytes().min(2 * BATCH_BYTES));
+    match files::free_bytes(files::parent(path)) {
+        Some(free) if free.saturating_add(freed) < needed => Err(Error::Usage(format!(
+            "{}: the cube needs {}, and {} are free there; use fewer channels or pixels, or another disk",
+            path.display(),
+            files::format_bytes(needed),
+            files::format_bytes(free.saturating_add(freed))
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// Bytes of all files under a folder; what cannot be read counts nothing.
+fn folder_bytes(folder: &Path) -> u64 {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    entries
+        .map(|entry| match entry.file_type() {
+            Ok(kind) if kind.is_dir() => folder_bytes(&entry.path()),
+            Ok(_) => entry.metadata().map_or(0, |metadata| metadata.len()),
+            Err(_) => 0,
+        })
+        .sum()
+}

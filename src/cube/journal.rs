@@ -1,0 +1,286 @@
+//! The journal of a tile: what its files must be, one fixed-size record for every commit (DESIGN section 4).
+//!
+//! A record, little-endian: magic, tile, K, samples per pixel, index of the last epoch merged, suffix of the files aside,
+//! five 128-bit checksums (one per [`Part`], one spare), per channel Σ M2 and Σ mean² for the error estimate, and the
+//! checksum of all that. Checksums are XXH3 (Y. Collet, xxHash), which finds damage and is no protection against intent.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, ErrorKind, Read, Seek, SeekFrom, Write};
+use std::path::PathBuf;
+
+use xxhash_rust::xxh3::xxh3_128;
+
+use super::faults::step;
+use super::store::{Cube, Part};
+use crate::{Error, Result, files};
+
+const MAGIC: [u8; 8] = *b"SPTJRNL1";
+/// Checksums in a record: of the four parts, and room for one more.
+const CHECKSUMS: usize = 5;
+const HEAD_BYTES: usize = 32 + 16 * CHECKSUMS;
+/// A journal that is this long is written anew with its last record only, so that it stays small beside its tile.
+const MAX_RECORDS: u64 = 16;
+/// The most that a journal takes.
+pub(super) const MAX_BYTES_PER_CHANNEL: u64 = MAX_RECORDS * 16;
+pub(super) const MAX_BYTES: u64 = MAX_RECORDS * (HEAD_BYTES as u64 + 16);
+
+/// What a commit says about a tile.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Record {
+    pub tile: u32,
+    /// Samples per pixel merged.
+    pub samples: u32,
+    /// Index of the last epoch merged.
+    pub epoch: u32,
+    /// The name that the files had aside; no two commits have the same.
+    pub suffix: u64,
+    /// Of the tile's files, in the order of [`Part::ALL`].
+    pub checksums: [u128; Part::ALL.len()],
+    /// Per channel: Σ over pixels of Welford's M2 = Σ (epoch mean - mean)² over the epochs so far.
+    pub spread: Vec<f64>,
+    /// Per channel: Σ over pixels of mean².
+    pub square: Vec<f64>,
+}
+
+impl Record {
+    /// Bytes of a record of K channels.
+    pub fn bytes(channels: usize) -> usize {
+        HEAD_BYTES + 16 * channels + 16
+    }
+
+    fn encode(&self) -> Vec<u8> {
+        let mut bytes = MAGIC.to_vec();
+        for word in [self.tile, self.square.len() as u32, self.samples, self.epoch] {
+            bytes.extend(word.to_le_bytes());
+        }
+        bytes.extend(self.suffix.to_le_bytes());
+        self.checksums.iter().for_each(|sum| bytes.extend(sum.to_le_bytes()));
+        bytes.resize(HEAD_BYTES, 0);
+        bytes.extend(self.spread.iter().chain(&self.square).flat_map(|v| v.to_le_bytes()));
+        let checksum = xxh3_128(&bytes);
+        bytes.extend(checksum.to_le_bytes());
+        bytes
+    }
+
+    /// `None` where the bytes are no record of this tile and so many channels, or damaged.
+    fn decode(bytes: &[u8], tile: u32, channels: usize) -> Option<Record> {
+        let (content, checksum) = bytes.split_last_chunk::<16>()?;
+        let (head, sums) = content.split_at_checked(HEAD_BYTES)?;
+        let word = |at: usize| u32::from_le_bytes(head[at..at + 4].try_into().expect("four bytes"));
+        let valid = head[..8] == MAGIC
+            && word(8) == tile
+            && word(12) as usize == channels
+            && sums.len() == 16 * channels
+            && xxh3_128(content).to_le_bytes() == *checksum;
+        if !valid {
+            return None;
+        }
+        let sum_at = |i: usize| u128::from_le_bytes(head[32 + 16 * i..][..16].try_into().expect("sixteen bytes"));
+        let mut spread: Vec<f64> = sums.as_chunks().0.iter().map(|b| f64::from_le_bytes(*b)).collect();
+        let square = spread.split_off(channels);
+        Some(Record {
+            tile,
+            samples: word(16),
+            epoch: word(20),
+            suffix: u64::from_le_bytes(head[24..32].try_into().expect("eight bytes")),
+            checksums: std::array::from_fn(sum_at),
+            spread,
+            square,
+        })
+    }
+}
+
+/// The journal of one tile.
+pub(super) struct Journal {
+    path: PathBuf,
+    tile: u32,
+    channels: usize,
+}
+
+impl Journal {
+    pub fn of(cube: &Cube, tile: u32) -> Journal {
+        let path = cube.journal_folder().join(tile.to_string());
+        Journal { path, tile, channels: cube.channels().len() }
+    }
+
+    fn failed(&self, error: io::Error) -> Error {
+        Error::storage(&self.path, error)
+    }
+
+    fn decode(&self, bytes: &[u8]) -> Option<Record> {
+        Record::decode(bytes, self.tile, self.channels)
+    }
+
+    /// Every whole slot of the file, `None` where it is damaged, and whether the file ends with a whole valid record.
+    pub fn records(&self) -> Result<(Vec<Option<Record>>, bool)> {
+        let bytes = match fs::read(&self.path) {
+            Ok(bytes) => bytes,
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok((Vec::new(), true)),
+            Err(error) => return Err(self.failed(error)),
+        };
+        let slots = bytes.chunks_exact(Record::bytes(self.channels));
+        let whole = slots.remainder().is_empty();
+        let records: Vec<_> = slots.map(|slot| self.decode(slot)).collect();
+        let sound = whole && records.last().is_none_or(Option::is_some);
+        Ok((records, sound))
+    }
+
+    /// The last valid record: the one with the most samples, since samples never decrease.
+    pub fn last(&self) -> Result<Option<Record>> {
+        let size = Record::bytes(self.channels) as u64;
+        let mut file = match File::open(&self.path) {
+            Ok(file) => file,
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+            Err(error) => return Err(self.failed(error)),
+        };
+        // Usually the last slot is it; a writer that is at work, or was killed, may have left a part of another.
+        let mut read = || -> io::Result<Option<Record>> {
+            let slots = file.metadata()?.len() / size;
+            let mut bytes = vec![0; size as usize];
+            for slot in (0..slots).rev() {
+                file.seek(SeekFrom::Start(slot * size))?;
+                file.read_exact(&mut bytes)?;
+                if let Some(record) = self.decode(&bytes) {
+                    return Ok(Some(record));
+                }
+            }
+            Ok(None)
+        };
+        read().map_err(|error| self.failed(error))
+    }
+
+    /// Appends a record after the one with the suffix `previous`, durably. Refuses where that is not the last one: then
+    /// somebody else writes this tile.
+    pub fn append(&self, record: &Record, previous: Option<u64>) -> Result<()> {
+        self.expect_tail(previous)?;
+        let size = Record::bytes(self.channels) as u64;
+        let existed = self.path.exists();
+        let length = if existed { fs::metadata(&self.path).map_err(|e| self.failed(e))?.len() } else { 0 };
+        if length >= MAX_RECORDS * size {
+            let last = self.last()?.map(|last| last.encode()).unwrap_or_default();
+            return self.replace(&[last, record.encode()].concat());
+        }
+        let write = || -> io::Result<()> {
+            let mut file = OpenOptions::new().create(true).truncate(false).write(true).open(&self.path)?;
+            step("journal opened")?;
+            // A part of a record that a full disk left behind is written over.
+            file.seek(SeekFrom::Start(length / size * size))?;
+            let bytes = record.encode();
+            let (first, second) = bytes.split_at(bytes.len() / 2);
+            let written = file.write_all(first).and_then(|()| step("journal half appended"));
+            let written = written.and_then(|()| file.write_all(second)).and_then(|()| step("journal appended"));
+            if let Err(error) = written.and_then(|()| file.sync_all()) {
+                // What cannot be cut now is cut when the tile is resumed.
+                let _ = file.set_len(length);
+                return Err(error);
+            }
+            step("journal synced")?;
+            if existed { Ok(()) } else { files::sync_folder(files::parent(&self.path)) }
+        };
+        write().map_err(|error| self.failed(error))
+    }
+
+    /// Refuses where the last valid record is not the one with this suffix.
+    pub fn expect_tail(&self, suffix: Option<u64>) -> Result<()> {
+        if self.last()?.map(|record| record.suffix) == suffix {
+            return Ok(());
+        }
+        let what = format!("tile {} was changed by another process; this one has lost its lock on it and stops", self.tile);
+        Err(Error::storage(&self.path, what))
+    }
+
+    /// Makes `record` the only one, or the journal empty.
+    pub fn reset(&self, record: Option<&Record>) -> Result<()> {
+        self.replace(&record.map(Record::encode).unwrap_or_default())
+    }
+
+    /// Cuts what follows the last valid record.
+    pub fn cut(&self, records: &[Option<Record>]) -> Result<()> {
+        let kept = records.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
+        let cut = || -> io::Result<()> {
+            let file = OpenOptions::new().write(true).open(&self.path)?;
+            file.set_len((kept * Record::bytes(self.channels)) as u64)?;
+            step("journal cut")?;
+            file.sync_all()
+        };
+        cut().map_err(|error| self.failed(error))
+    }
+
+    fn replace(&self, bytes: &[u8]) -> Result<()> {
+        let aside = files::sibling(&self.path, "part");
+        let replace = || -> io::Result<()> {
+            let mut file = File::create_new(&aside)?;
+            file.write_all(bytes)?;
+            step("journal written anew")?;
+            file.sync_all()?;
+            step("new journal synced")?;
+            fs::rename(&aside, &self.path)?;
+            step("new journal renamed")?;
+            files::sync_folder(files::parent(&self.path))
+        };
+        replace().map_err(|error| {
+            // The journal is what it was; a leftover that cannot be removed is removed when the tile is resumed.
+            let _ = fs::remove_file(&aside);
+            self.failed(error)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record(samples: u32) -> Record {
+        Record {
+            tile: 7,
+            samples,
+            epoch: 8,
+            suffix: u64::from(samples) << 32 | 5,
+            checksums: [1, 2 << 100, 3, u128::MAX],
+            spread: vec![0.5, -0.0, 1e300],
+            square: vec![9.0, 5.0, 0.0],
+        }
+    }
+
+    #[test]
+    fn bytes_round_trip_and_damage_is_seen() {
+        let bytes = record(192).encode();
+        assert_eq!(bytes.len(), Record::bytes(3));
+        assert_eq!(Record::decode(&bytes, 7, 3), Some(record(192)));
+        assert_eq!(Record::decode(&bytes, 7, 2), None);
+        assert_eq!(Record::decode(&bytes, 6, 3), None);
+        for i in 0..bytes.len() {
+            let mut damaged = bytes.clone();
+            damaged[i] ^= 4;
+            assert_eq!(Record::decode(&damaged, 7, 3), None, "byte {i}");
+            assert_eq!(Record::decode(&bytes[..i], 7, 3), None, "cut at {i}");
+        }
+    }
+
+    #[test]
+    fn journals_grow_stay_small_and_know_their_tail() {
+        let folder = tempfile::tempdir().expect("folder");
+        let journal = Journal { path: folder.path().join("7"), tile: 7, channels: 3 };
+        assert_eq!(journal.last().expect("read"), None);
+        let mut previous = None;
+        for samples in 1..100 {
+            let record = record(samples);
+            let error = journal.append(&record, Some(99)).expect_err("the tail is another");
+            assert!(error.to_string().contains("tile 7 was changed by another process"), "{error}");
+            journal.append(&record, previous).expect("appended");
+            assert_eq!(journal.last().expect("read").as_ref(), Some(&record));
+            let length = fs::metadata(&journal.path).expect("there").len();
+            assert!(length <= MAX_RECORDS * Record::bytes(3) as u64, "{length}");
+            previous = Some(record.suffix);
+        }
+        // A torn record is not seen, cut, and written over.
+        let sound = fs::read(&journal.path).expect("read");
+        fs::write(&journal.path, [&sound[..], &record(100).encode()[..50]].concat()).expect("written");
+        assert_eq!(journal.last().expect("read"), Some(record(99)));
+        let (records, sound_tail) = journal.records().expect("read");
+        assert!(!sound_tail);
+        journal.cut(&records).expect("cut");
+        assert_eq!(fs::read(&journal.path).expect("read"), sound);
+        assert_eq!(fs::read_dir(folder.path()).expect("list").count(), 1);
+    }
+}

@@ -1,0 +1,454 @@
+//! A process's hold on tiles of a cube: units are merged aside, and committed in batches (DESIGN section 4).
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::{self, File};
+use std::io::Write;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use super::checksums::{self, Summing};
+use super::create::{Existing, open_or_create};
+use super::epochs::epochs_in;
+use super::estimate::Totals;
+use super::faults::step;
+use super::journal::{Journal, Record};
+use super::lock::TileLock;
+use super::map::Chunk;
+use super::merge::{Fold, check_portion};
+use super::metadata::Header;
+use super::recover;
+use super::store::{Cube, Part};
+use crate::spectral::colour::Picture;
+use crate::{Error, Result, files};
+
+/// At most one batch is committed in this time, but for the last.
+const COMMIT_EVERY: Duration = Duration::from_secs(1);
+/// A batch that is so large, in bytes of radiance or in tiles, takes no more: whoever merges waits until it is committed.
+pub(super) const BATCH_BYTES: u64 = 1 << 30;
+const BATCH_TILES: usize = 4096;
+
+/// The right to change some tiles of a cube, shared by the threads that do. Reading goes through [`Writer::cube`].
+///
+/// What is merged is on disk for good, and seen by readers, once it is committed: once a second by
+/// [`Writer::commit_regularly`], which a thread of its own should run, or at once by [`Writer::flush`].
+pub struct Writer {
+    cube: Cube,
+    tiles: Range<u32>,
+    /// Samples per pixel that each of `tiles` had when this writer came.
+    found: Vec<u32>,
+    state: Mutex<State>,
+    changed: Condvar,
+    /// Held during a commit.
+    committing: Mutex<()>,
+    /// Held, by tile number modulo their count, while a tile is merged: a merge reads what it replaces.
+    merging: [Mutex<()>; 32],
+    _lock: TileLock,
+}
+
+struct State {
+    /// Tiles merged since the last commit, and those of the commit under way.
+    open: BTreeMap<u32, Arc<Pending>>,
+    committing: BTreeMap<u32, Arc<Pending>>,
+    last_commit: Option<Instant>,
+    totals: Totals,
+    /// A commit has failed; nothing more is merged.
+    failed: Option<(PathBuf, String)>,
+    closed: bool,
+}
+
+/// A tile merged and not committed yet: its files lie aside.
+struct Pending {
+    record: Record,
+    /// Suffix of the record before it in the journal.
+    previous: Option<u64>,
+    chunk: Chunk,
+}
+
+impl Writer {
+    /// Makes a cube or goes on with one, as `existing` says, to write to `tiles` of it. Those are locked until this is
+    /// dropped, and what a killed process left of them is put in order; what that loses, if anything, `warn` is told.
+    pub fn open(
+        path: &Path,
+        header: &Header,
+        existing: Existing,
+        tiles: Range<u32>,
+        warn: &mut dyn FnMut(String),
+    ) -> Result<Writer> {
+        let cube = open_or_create(path, header, existing, &tiles)?;
+        let lock = TileLock::take(cube.path(), &cube.private(), tiles.clone())?;
+        let mut totals = Totals::new(cube.channels().len(), cube.header().epoch);
+        let mut found = Vec::with_capacity(tiles.len());
+        for record in recover::recover(&cube, tiles.clone(), warn)? {
+            let record = record?;
+            found.push(record.as_ref().map_or(0, |record| record.samples));
+            if let Some(record) = record {
+                totals.replace(None, &record);
+            }
+        }
+        let state = State {
+            open: BTreeMap::new(),
+            committing: BTreeMap::new(),
+            last_commit: None,
+            totals,
+            failed: None,
+            closed: false,
+        };
+        Ok(Writer {
+            cube,
+            tiles,
+            found,
+            state: Mutex::new(state),
+            changed: Condvar::new(),
+            committing: Mutex::new(()),
+            merging: Default::default(),
+            _lock: lock,
+        })
+    }
+
+    pub fn cube(&self) -> &Cube {
+        &self.cube
+    }
+
+    /// The tiles that this writer may change.
+    pub fn tiles(&self) -> Range<u32> {
+        self.tiles.clone()
+    }
+
+    /// Samples per pixel that each of [`Writer::tiles`] had when this writer came.
+    pub fn found(&self) -> &[u32] {
+        &self.found
+    }
+
+    /// The error estimate of every channel over the tiles of this writer, units not committed yet included; see
+    /// [`Cube::error_estimate`].
+    pub fn error_estimate(&self) -> Vec<f64> {
+        self.state().totals.error_estimate()
+    }
+
+    /// The preview with every unit merged so far.
+    pub fn preview(&self) -> Result<Picture> {
+        let state = self.state();
+        let pending = state.committing.iter().chain(&state.open);
+        let suffixes: BTreeMap<u32, u64> = pending.map(|(&tile, pending)| (tile, pending.record.suffix)).collect();
+        drop(state);
+        self.cube.preview_of(|tile| {
+            let aside = suffixes.get(&tile).map(|&suffix| self.cube.aside_path(Part::Preview, tile, suffix));
+            // By now it may have taken its place, or a newer one is about to.
+            let opened = aside.and_then(|aside| File::open(aside).ok());
+            opened.map_or_else(|| File::open(self.cube.part_path(Part::Preview, tile)), Ok)
+        })
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        // Every change of the state is one assignment or insertion, so a thread that died has left it whole.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Merges the mean of `n_unit` samples per pixel into a tile that has `n_before`, with all that is derived from it.
+    ///
+    /// `unit` is [tile_h][tile_w][K], the full tile size; what lies beyond the edge of the picture is not looked at and
+    /// stored as NaN. The first unit of a tile is stored bit for bit; later ones as
+    /// m + (unit - m) · n_unit / (n_before + n_unit) in f64, rounded to f32, so that a constant stays exact. The first
+    /// `epoch` samples may come in any portions that add up to it, then every unit is one whole epoch.
+    ///
+    /// Waits while the open batch is full. On an error the tile is what it was.
+    pub fn merge_unit(&self, tile: u32, n_before: u32, n_unit: u32, unit: &[f32]) -> Result<()> {
+        let (cube, grid) = (&self.cube, self.cube.grid());
+        let expected = grid.tile_pixels() * cube.channels().len();
+        if !self.tiles.contains(&tile) || unit.len() != expected {
+            let what = format!("tile {tile} with {} values where {:?} have {expected}", unit.len(), self.tiles);
+            return Err(Error::Internal(what));
+        }
+        let _held =
+            self.merging[tile as usize % self.merging.len()].lock().unwrap_or_else(PoisonError::into_inner);
+        let base = self.base(tile)?;
+        let n_found = base.as_ref().map_or(0, Base::samples);
+        if n_found != n_before {
+            let what = format!(
+                "tile {tile} has {n_found} samples per pixel where {n_before} were expected: another process works on it"
+            );
+            return Err(Error::storage(cube.path(), what));
+        }
+        let samples = check_portion(n_before, n_unit, cube.header().epoch)?;
+        let aside = Aside::new(cube, tile);
+        let record = aside.write(base.as_ref(), samples, n_unit, unit)?;
+        let chunk = Chunk::open(&aside.path(Part::Radiance), grid.rect(tile), grid.tile, cube.channels().len())?;
+        let chunk = chunk.ok_or_else(|| Error::storage(&aside.path(Part::Radiance), "has vanished"))?;
+        self.insert(aside, base, record, chunk);
+        Ok(())
+    }
+
+    /// What a unit of the tile is merged into, once the open batch has room.
+    fn base(&self, tile: u32) -> Result<Option<Base>> {
+        let full = |state: &mut State| {
+            let bytes = state.open.len() as u64 * self.cube.header().chunk_bytes();
+            let room = bytes < BATCH_BYTES && state.open.len() < BATCH_TILES;
+            !(room || state.open.contains_key(&tile) || state.failed.is_some() || state.closed)
+        };
+        let state = self.changed.wait_while(self.state(), full).unwrap_or_else(PoisonError::into_inner);
+        if let Some((path, what)) = &state.failed {
+            return Err(Error::storage(path, what));
+        }
+        if let Some(pending) = state.open.get(&tile).or_else(|| state.committing.get(&tile)) {
+            return Ok(Some(Base::Pending(Arc::clone(pending))));
+        }
+        drop(state);
+        let Some(record) = Journal::of(&self.cube, tile).last()? else { return Ok(None) };
+        let path = self.cube.part_path(Part::Radiance, tile);
+        let damaged = |what: &str| Error::storage(&path, format!("{what}; --resume puts it in order"));
+        let chunk = self.cube.chunk(tile)?.ok_or_else(|| damaged("is missing, although the journal has it"))?;
+        if checksums::of(chunk.bytes()) != record.checksums[Part::Radiance as usize] {
+            return Err(damaged("is damaged: it is not what the journal says"));
+        }
+        Ok(Some(Base::Committed { record, chunk }))
+    }
+
+    fn insert(&self, aside: Aside, base: Option<Base>, record: Record, chunk: Chunk) {
+        let tile = record.tile;
+        let mut state = self.state();
+        let replaced = state.open.remove(&tile);
+        // Whether the base was, or is being, committed decides what stands in the journal before this record.
+        let previous = match (&base, &replaced) {
+            (None, _) => None,
+            (Some(Base::Pending(_)), Some(replaced)) => replaced.previous,
+            (Some(base), _) => Some(base.record().suffix),
+        };
+        state.totals.replace(base.as_ref().map(Base::record), &record);
+        state.open.insert(tile, Arc::new(Pending { record, previous, chunk }));
+        drop(state);
+        aside.keep();
+        if let Some(replaced) = replaced {
+            remove_aside(&self.cube, tile, replaced.record.suffix);
+        }
+        self.changed.notify_all();
+    }
+
+    /// Commits once a second until [`Writer::close`]; what a thread of its own should run. After an error merging
+    /// returns it too.
+    pub fn commit_regularly(&self) -> Result<()> {
+        loop {
+            let mut state = self.state();
+            loop {
+                if state.closed {
+                    return Ok(());
+                }
+                let since = state.last_commit.map_or(COMMIT_EVERY, |last| last.elapsed());
+                if !state.open.is_empty() && since >= COMMIT_EVERY {
+                    break;
+                }
+                let patience = if state.open.is_empty() { COMMIT_EVERY } else { COMMIT_EVERY - since };
+                state = self.changed.wait_timeout(state, patience).unwrap_or_else(PoisonError::into_inner).0;
+            }
+            drop(state);
+            self.flush()?;
+        }
+    }
+
+    /// Ends [`Writer::commit_regularly`], without a last commit.
+    pub fn close(&self) {
+        self.state().closed = true;
+        self.changed.notify_all();
+    }
+
+    /// Commits everything merged so far.
+    pub fn flush(&self) -> Result<()> {
+        let _committing = self.committing.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut state = self.state();
+        if let Some((path, what)) = &state.failed {
+            return Err(Error::storage(path, what));
+        }
+        let batch = std::mem::take(&mut state.open);
+        state.committing = batch.clone();
+        drop(state);
+        let result = if batch.is_empty() { Ok(()) } else { self.commit(&batch) };
+        let mut state = self.state();
+        state.committing.clear();
+        state.last_commit = Some(Instant::now());
+        if let Err(Error::Storage { path, what }) = &result {
+            state.failed = Some((path.clone(), what.clone()));
+        }
+        drop(state);
+        self.changed.notify_all();
+        result
+    }
+
+    /// The protocol of DESIGN section 4. The files lie aside already.
+    fn commit(&self, batch: &BTreeMap<u32, Arc<Pending>>) -> Result<()> {
+        let mut journalled = BTreeSet::new();
+        let result = self.journal(batch, &mut journalled);
+        if result.is_err() {
+            // What no journal speaks of is nothing but wasted space, which may be what is missing.
+            for (&tile, pending) in batch.iter().filter(|(tile, _)| !journalled.contains(*tile)) {
+                remove_aside(&self.cube, tile, pending.record.suffix);
+            }
+        }
+        let mut folders = BTreeSet::new();
+        for (&tile, pending) in batch.iter().filter(|(tile, _)| journalled.contains(*tile)) {
+            Journal::of(&self.cube, tile).expect_tail(Some(pending.record.suffix))?;
+            take_places(&self.cube, tile, pending.record.suffix, &mut folders)?;
+        }
+        sync_folders(&folders)?;
+        result
+    }
+
+    /// Makes the files aside of a batch durable, and then the records that speak of them.
+    fn journal(&self, batch: &BTreeMap<u32, Arc<Pending>>, journalled: &mut BTreeSet<u32>) -> Result<()> {
+        for (&tile, pending) in batch {
+            for part in Part::ALL {
+                let path = self.cube.aside_path(part, tile, pending.record.suffix);
+                let synced = File::open(&path).and_then(|file| file.sync_all()).and_then(|()| step("file aside synced"));
+                synced.map_err(|error| Error::storage(&path, format!("cannot be written: {error}")))?;
+            }
+        }
+        let folder = self.cube.aside_folder();
+        let synced = files::sync_folder(&folder).and_then(|()| step("folder aside synced"));
+        synced.map_err(|error| Error::storage(&folder, error))?;
+        for (&tile, pending) in batch {
+            Journal::of(&self.cube, tile).append(&pending.record, pending.previous)?;
+            journalled.insert(tile);
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Writer {
+    fn drop(&mut self) {
+        // Left only by a render that ended with an error.
+        let left = std::mem::take(&mut self.state().open);
+        left.iter().for_each(|(&tile, pending)| remove_aside(&self.cube, tile, pending.record.suffix));
+    }
+}
+
+/// What a unit is merged into.
+enum Base {
+    Committed { record: Record, chunk: Chunk },
+    Pending(Arc<Pending>),
+}
+
+impl Base {
+    fn record(&self) -> &Record {
+        match self {
+            Base::Committed { record, .. } => record,
+            Base::Pending(pending) => &pending.record,
+        }
+    }
+
+    fn chunk(&self) -> &Chunk {
+        match self {
+            Base::Committed { chunk, .. } => chunk,
+            Base::Pending(pending) => &pending.chunk,
+        }
+    }
+
+    fn samples(&self) -> u32 {
+        self.record().samples
+    }
+}
+
+/// New files of a tile, under one suffix; removed again unless kept.
+struct Aside<'a> {
+    cube: &'a Cube,
+    tile: u32,
+    suffix: u64,
+    kept: bool,
+}
+
+impl<'a> Aside<'a> {
+    fn new(cube: &'a Cube, tile: u32) -> Self {
+        Aside { cube, tile, suffix: files::random_number(), kept: false }
+    }
+
+    fn path(&self, part: Part) -> PathBuf {
+        self.cube.aside_path(part, self.tile, self.suffix)
+    }
+
+    fn keep(mut self) {
+        self.kept = true;
+    }
+
+    /// Writes the tile's new files and says what they are.
+    fn write(&self, base: Option<&Base>, samples: u32, n_unit: u32, unit: &[f32]) -> Result<Record> {
+        let (cube, tile) = (self.cube, self.tile);
+        let mut fold = Fold::new(cube.grid(), cube.grid().rect(tile), cube.channels().len(), cube.projection());
+        let weight = f64::from(n_unit) / f64::from(samples);
+        let radiance = self.file(Part::Radiance, |file| fold.run(base.map(Base::chunk), unit, weight, file))?;
+        if let Some(k) = fold.square.iter().position(|v| !v.is_finite()) {
+            let what = format!("a unit of tile {tile} holds a value in channel {k} that is not finite");
+            return Err(Error::Internal(what));
+        }
+        let (spread, square) = fold.sums(base.map(Base::record), cube.header().epoch);
+        let samples_sum = self.file(Part::Samples, |file| file.write_all(&samples.to_le_bytes()))?;
+        let preview = self.file(Part::Preview, |file| file.write_all(bytemuck::cast_slice(&fold.preview)))?;
+        let overview = self.file(Part::Overview, |file| file.write_all(bytemuck::cast_slice(&fold.overview)))?;
+        Ok(Record {
+            tile,
+            samples,
+            epoch: epochs_in(samples, cube.header().epoch).saturating_sub(1),
+            suffix: self.suffix,
+            checksums: [radiance, samples_sum, preview, overview],
+            spread,
+            square,
+        })
+    }
+
+    fn file(&self, part: Part, write: impl FnOnce(&mut Summing<File>) -> std::io::Result<()>) -> Result<u128> {
+        let path = self.path(part);
+        let write = || {
+            let mut file = Summing::new(File::create_new(&path)?);
+            step("file aside made")?;
+            write(&mut file)?;
+            step("file aside written")?;
+            Ok(file.checksum())
+        };
+        write().map_err(|error: std::io::Error| {
+            Error::storage(&self.cube.part_path(part, self.tile), format!("cannot be written: {error}"))
+        })
+    }
+}
+
+impl Drop for Aside<'_> {
+    fn drop(&mut self) {
+        if !self.kept {
+            remove_aside(self.cube, self.tile, self.suffix);
+        }
+    }
+}
+
+fn remove_aside(cube: &Cube, tile: u32, suffix: u64) {
+    for part in Part::ALL {
+        // Nobody reads such a file; one that cannot be removed now is removed when the tile is resumed.
+        let _ = fs::remove_file(cube.aside_path(part, tile, suffix));
+    }
+}
+
+/// Renames the files aside of a tile to their places, and adds the folders that must be synced then.
+pub(super) fn take_places(cube: &Cube, tile: u32, suffix: u64, folders: &mut BTreeSet<PathBuf>) -> Result<()> {
+    for part in Part::ALL {
+        let (aside, target) = (cube.aside_path(part, tile, suffix), cube.part_path(part, tile));
+        take_place(&aside, &target, folders)?;
+    }
+    Ok(())
+}
+
+/// Renames one file to its place.
+pub(super) fn take_place(aside: &Path, target: &Path, folders: &mut BTreeSet<PathBuf>) -> Result<()> {
+    let folder = files::parent(target);
+    // The first unit of a tile, or of a row of tiles, makes the folder.
+    let renamed = files::make_folder_durably(folder)
+        .and_then(|()| step("folder made"))
+        .and_then(|()| fs::rename(aside, target))
+        .and_then(|()| step("file in place"));
+    renamed.map_err(|error| Error::storage(target, format!("cannot be replaced: {error}")))?;
+    folders.insert(folder.to_owned());
+    Ok(())
+}
+
+pub(super) fn sync_folders(folders: &BTreeSet<PathBuf>) -> Result<()> {
+    for folder in folders {
+        let synced = files::sync_folder(folder).and_then(|()| step("folder synced"));
+        synced.map_err(|error| Error::storage(folder, error))?;
+    }
+    Ok(())
+}
