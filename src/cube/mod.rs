@@ -23,6 +23,8 @@ mod lock;
 mod map;
 mod merge;
 mod metadata;
+#[cfg(all(test, unix))]
+mod protocol_tests;
 mod recover;
 mod store;
 mod verify;

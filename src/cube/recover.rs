@@ -65,6 +65,7 @@ fn recover_tile(cube: &Cube, tile: u32, warn: &mut dyn FnMut(String)) -> Result<
     if !sound {
         journal.cut(&records)?;
     }
+    let damaged = records.iter().rev().skip_while(|record| record.is_none()).any(Option::is_none);
     let valid: Vec<Record> = records.into_iter().flatten().collect();
     for (i, record) in valid.iter().enumerate().rev() {
         if !put_in_place(cube, record)? {
@@ -78,6 +79,8 @@ fn recover_tile(cube: &Cube, tile: u32, warn: &mut dyn FnMut(String)) -> Result<
                 newest.samples,
                 record.samples
             ));
+        }
+        if damaged || i + 1 < valid.len() {
             journal.reset(Some(record))?;
         }
         return Ok(Some(record.clone()));

@@ -276,25 +276,27 @@ impl Writer {
 
     /// The protocol of DESIGN section 4. The files lie aside already.
     fn commit(&self, batch: &BTreeMap<u32, Arc<Pending>>) -> Result<()> {
-        let mut journalled = BTreeSet::new();
-        let result = self.journal(batch, &mut journalled);
-        if result.is_err() {
-            // What no journal speaks of is nothing but wasted space, which may be what is missing.
-            for (&tile, pending) in batch.iter().filter(|(tile, _)| !journalled.contains(*tile)) {
-                remove_aside(&self.cube, tile, pending.record.suffix);
+        if let Err(error) = self.journal(batch) {
+            // What no journal speaks of is nothing but wasted space, which may be what is missing. The rest is in order
+            // again when the tiles are resumed.
+            for (&tile, pending) in batch {
+                let last = Journal::of(&self.cube, tile).last();
+                if last.is_ok_and(|last| last.is_none_or(|last| last.suffix != pending.record.suffix)) {
+                    remove_aside(&self.cube, tile, pending.record.suffix);
+                }
             }
+            return Err(error);
         }
         let mut folders = BTreeSet::new();
-        for (&tile, pending) in batch.iter().filter(|(tile, _)| journalled.contains(*tile)) {
+        for (&tile, pending) in batch {
             Journal::of(&self.cube, tile).expect_tail(Some(pending.record.suffix))?;
             take_places(&self.cube, tile, pending.record.suffix, &mut folders)?;
         }
-        sync_folders(&folders)?;
-        result
+        sync_folders(&folders)
     }
 
     /// Makes the files aside of a batch durable, and then the records that speak of them.
-    fn journal(&self, batch: &BTreeMap<u32, Arc<Pending>>, journalled: &mut BTreeSet<u32>) -> Result<()> {
+    fn journal(&self, batch: &BTreeMap<u32, Arc<Pending>>) -> Result<()> {
         for (&tile, pending) in batch {
             for part in Part::ALL {
                 let path = self.cube.aside_path(part, tile, pending.record.suffix);
@@ -307,7 +309,6 @@ impl Writer {
         synced.map_err(|error| Error::storage(&folder, error))?;
         for (&tile, pending) in batch {
             Journal::of(&self.cube, tile).append(&pending.record, pending.previous)?;
-            journalled.insert(tile);
         }
         Ok(())
     }
