@@ -1,29 +1,38 @@
 //! `spectile info`: what a cube is and how far it got.
 
 use std::fmt::Write;
+use std::ops::Range;
 use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
 use super::Output;
-use crate::Result;
-use crate::cube::{Cube, Progress};
+use crate::cube::{Cube, Progress, Verification};
 use crate::spectral::Channels;
 use crate::spectral::colour::ProjectionKind;
+use crate::{Error, Result};
 
 /// Say what a cube is, how far it got and how large its error is
 ///
 /// Works on finished cubes and on those being rendered. The error estimate of a channel is the standard error of its
 /// pixels, root mean square over the picture, relative to their root mean square radiance. It comes from the spread of
 /// the epochs (64 samples each), so it needs two of them and is rough below eight.
+///
+/// With --verify every file is read and compared with its checksum; the exit code is 1 if one is damaged. Rendering the same
+/// scene into the cube with --resume puts it in order.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = "\
 Examples:
   spectile info cube.zarr
+  spectile info cube.zarr --verify
   spectile info cube.zarr --json        all channels, with bounds and error estimates; null where unknown")]
 pub struct Args {
     /// The cube, a folder
     pub cube: PathBuf,
+
+    /// Compare every file with its checksum
+    #[arg(long)]
+    pub verify: bool,
 
     /// One JSON object on stdout, instead of text
     #[arg(long)]
@@ -35,68 +44,128 @@ const ROUGH_BELOW: u32 = 8;
 
 pub fn run(args: &Args, output: &Output) -> Result<()> {
     let cube = Cube::open(&args.cube)?;
-    let progress = cube.progress()?;
-    let estimate = cube.error_estimate()?;
-    output.event("done", facts(&cube, progress, &estimate))?;
-    output.text(&describe(&cube, progress, &estimate))
+    let found = Found {
+        progress: cube.progress()?,
+        estimate: cube.error_estimate()?,
+        in_use: cube.in_use(),
+        verified: if args.verify { Some(cube.verify()?) } else { None },
+        cube,
+    };
+    output.event("done", found.facts())?;
+    output.text(&found.describe())?;
+    let damage = found.verified.as_ref().map_or(0, |verified| verified.damage.len());
+    if damage == 0 {
+        return Ok(());
+    }
+    let files = if damage == 1 { "file is" } else { "files are" };
+    Err(Error::Check(format!(
+        "{}: {damage} {files} damaged; rendering the same scene into it with --resume puts the tiles in order",
+        args.cube.display()
+    )))
+}
+
+/// All that is told of a cube.
+struct Found {
+    cube: Cube,
+    progress: Progress,
+    estimate: Vec<f64>,
+    /// Tiles that a process works on.
+    in_use: Option<Range<u32>>,
+    verified: Option<Verification>,
+}
+
+/// Ranges of tiles as people write them, the first few.
+fn list(tiles: &[Range<u32>]) -> String {
+    const SHOWN: usize = 8;
+    let mut each: Vec<String> = tiles.iter().take(SHOWN).map(|t| format!("{}..{}", t.start, t.end)).collect();
+    if tiles.len() > SHOWN {
+        each.push(format!("and {} more ranges (--json lists all)", tiles.len() - SHOWN));
+    }
+    each.join(", ")
+}
+
+fn pairs(tiles: &[Range<u32>]) -> Vec<[u32; 2]> {
+    tiles.iter().map(|tiles| [tiles.start, tiles.end]).collect()
 }
 
 /// Whole epochs that every tile begun has.
-fn epochs(cube: &Cube, progress: Progress) -> u32 {
+fn epochs(cube: &Cube, progress: &Progress) -> u32 {
     progress.samples[0] / cube.header().epoch
 }
 
-fn facts(cube: &Cube, progress: Progress, estimate: &[f64]) -> Value {
-    let (header, channels) = (cube.header(), cube.channels());
-    let each = (0..channels.len()).map(|k| {
+impl Found {
+    fn facts(&self) -> Value {
+        let Found { cube, progress, estimate, .. } = self;
+        let (header, channels) = (cube.header(), cube.channels());
+        let each = (0..channels.len()).map(|k| {
+            json!({
+                "name": channels.names[k],
+                "wavelength_nm": channels.centre(k),
+                "bounds_nm": channels.bounds[k],
+                "error_estimate": estimate[k],
+            })
+        });
         json!({
-            "name": channels.names[k],
-            "wavelength_nm": channels.centre(k),
-            "bounds_nm": channels.bounds[k],
-            "error_estimate": estimate[k],
+            "cube": cube.path(),
+            "size": header.size,
+            "origin": header.origin,
+            "tile": header.tile,
+            "tiles": progress.tiles,
+            "tiles_started": progress.tiles_started,
+            "tiles_missing": pairs(&progress.missing),
+            "tiles_behind": pairs(&progress.behind),
+            "tiles_in_use": self.in_use.as_ref().map(|tiles| [tiles.start, tiles.end]),
+            "verified_files": self.verified.as_ref().map(|verified| verified.files),
+            "damage": self.verified.as_ref().map(|verified| &verified.damage),
+            "samples": { "least": progress.samples[0], "most": progress.samples[1] },
+            "epoch": header.epoch,
+            "epochs": epochs(cube, progress),
+            "error_estimate_is_rough": epochs(cube, progress) < ROUGH_BELOW,
+            "store_bytes": header.store_bytes(),
+            "preview": shows(cube),
+            "attributes": header.attributes,
+            "channels": each.collect::<Vec<_>>(),
         })
-    });
-    json!({
-        "cube": cube.path(),
-        "size": header.size,
-        "origin": header.origin,
-        "tile": header.tile,
-        "tiles": progress.tiles,
-        "tiles_started": progress.tiles_started,
-        "samples": { "least": progress.samples[0], "most": progress.samples[1] },
-        "epoch": header.epoch,
-        "epochs": epochs(cube, progress),
-        "error_estimate_is_rough": epochs(cube, progress) < ROUGH_BELOW,
-        "store_bytes": header.store_bytes(),
-        "preview": shows(cube),
-        "attributes": header.attributes,
-        "channels": each.collect::<Vec<_>>(),
-    })
-}
+    }
 
-fn describe(cube: &Cube, progress: Progress, estimate: &[f64]) -> String {
-    let header = cube.header();
-    let ([width, height], [tile_width, tile_height]) = (header.size, header.tile);
-    let mut text = String::new();
-    let mut row = |name: &str, value: String| {
-        // Writing to a string cannot fail.
-        let _ = writeln!(text, "{name:<16} {value}");
-    };
-    row("cube", cube.path().display().to_string());
-    row("size", format!("{width} x {height} pixels x {} channels", cube.channels().len()));
-    if header.origin != [0, 0] {
-        row("crop", format!("from column {}, row {} of the film", header.origin[0], header.origin[1]));
+    fn describe(&self) -> String {
+        let Found { cube, progress, estimate, .. } = self;
+        let header = cube.header();
+        let ([width, height], [tile_width, tile_height]) = (header.size, header.tile);
+        let mut text = String::new();
+        let mut row = |name: &str, value: String| {
+            // Writing to a string cannot fail.
+            let _ = writeln!(text, "{name:<16} {value}");
+        };
+        row("cube", cube.path().display().to_string());
+        row("size", format!("{width} x {height} pixels x {} channels", cube.channels().len()));
+        if header.origin != [0, 0] {
+            row("crop", format!("from column {}, row {} of the film", header.origin[0], header.origin[1]));
+        }
+        row("wavelengths", describe_channels(cube.channels()));
+        row("tiles", format!("{} of {tile_width} x {tile_height} pixels", progress.tiles));
+        row("samples", describe_samples(progress));
+        if !progress.missing.is_empty() && progress.tiles_started > 0 {
+            row("missing tiles", list(&progress.missing));
+        }
+        if !progress.behind.is_empty() {
+            row("tiles behind", list(&progress.behind));
+        }
+        if let Some(tiles) = &self.in_use {
+            row("in use", format!("a process works on the tiles {}..{}", tiles.start, tiles.end));
+        }
+        row("error estimate", describe_estimate(cube, progress, estimate));
+        row("preview", shows(cube));
+        row("on disk", format!("{} when all tiles are begun", crate::files::format_bytes(header.store_bytes())));
+        for (name, value) in &header.attributes {
+            row(name, value.as_str().map_or_else(|| value.to_string(), str::to_owned));
+        }
+        if let Some(verified) = &self.verified {
+            row("verified", format!("{} files, {} damaged", verified.files, verified.damage.len()));
+            verified.damage.iter().for_each(|what| row("damage", what.clone()));
+        }
+        text
     }
-    row("wavelengths", describe_channels(cube.channels()));
-    row("tiles", format!("{} of {tile_width} x {tile_height} pixels", progress.tiles));
-    row("samples", describe_samples(progress));
-    row("error estimate", describe_estimate(cube, progress, estimate));
-    row("preview", shows(cube));
-    row("on disk", format!("{} when all tiles are begun", crate::files::format_bytes(header.store_bytes())));
-    for (name, value) in &header.attributes {
-        row(name, value.as_str().map_or_else(|| value.to_string(), str::to_owned));
-    }
-    text
 }
 
 fn describe_channels(channels: &Channels) -> String {
@@ -108,7 +177,7 @@ fn describe_channels(channels: &Channels) -> String {
     format!("{from} to {to} nm, channels {width} nm wide")
 }
 
-fn describe_samples(progress: Progress) -> String {
+fn describe_samples(progress: &Progress) -> String {
     let [least, most] = progress.samples;
     let per_pixel = if least == most { format!("{most} per pixel") } else { format!("{least} to {most} per pixel") };
     match progress.tiles - progress.tiles_started {
@@ -118,7 +187,7 @@ fn describe_samples(progress: Progress) -> String {
     }
 }
 
-fn describe_estimate(cube: &Cube, progress: Progress, estimate: &[f64]) -> String {
+fn describe_estimate(cube: &Cube, progress: &Progress, estimate: &[f64]) -> String {
     let epochs = epochs(cube, progress);
     if epochs < 2 {
         return format!("unknown before 2 epochs ({} samples per pixel)", 2 * cube.header().epoch);

@@ -9,10 +9,10 @@ use serde_json::{Value, json};
 use super::Output;
 use super::output::say;
 use super::render::Args;
-use crate::cube::{Cube, Progress};
+use crate::cube::{Cube, Progress, reduction};
 use crate::files::format_bytes;
 use crate::render::plan;
-use crate::render::schedule::{Event, Job, Status, Summary};
+use crate::render::schedule::{Event, Job, PREVIEW_PIXELS, Status, Summary};
 use crate::{Error, Result};
 
 /// Epochs below which an error estimate is only rough (DESIGN section 8).
@@ -83,6 +83,12 @@ impl<'a> Reporter<'a> {
             && asked != limit
         {
             self.line(&format!("--spp {asked} is rounded up to {limit} samples/pixel, the end of an epoch"));
+        }
+        let factor = reduction([width, height], PREVIEW_PIXELS);
+        if job.preview.is_some() && factor > 1 {
+            self.line(&format!(
+                "the preview is reduced: {factor} x {factor} pixels are one (`spectile export` writes them all)"
+            ));
         }
         self.emit(
             "start",
@@ -200,7 +206,7 @@ impl<'a> Reporter<'a> {
             return Ok("interrupted before anything was rendered".into());
         }
         let output = job.output.display();
-        let Progress { tiles, tiles_started, samples: [least, most] } = Cube::open(&job.output)?.progress()?;
+        let Progress { tiles, tiles_started, samples: [least, most], .. } = Cube::open(&job.output)?.progress()?;
         let samples = if least == most { most.to_string() } else { format!("{least} to {most}") };
         Ok(format!(
             "interrupted: {output} keeps every unit merged so far, {samples} samples/pixel in {tiles_started} of {tiles} tiles \

@@ -7,7 +7,6 @@ use std::path::Path;
 
 use xxhash_rust::xxh3::{Xxh3, xxh3_128};
 
-
 /// The list of the files that are written when a cube is made and never again: `checksum  path`, a line each.
 pub(super) const FILE: &str = ".spectile/checksums";
 

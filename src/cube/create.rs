@@ -111,7 +111,8 @@ fn find_way(path: &Path, header: &Header, existing: Existing, tiles: &Range<u32>
     let count = u64::from(tiles.end - tiles.start);
     match existing {
         Existing::Refuse if there => {
-            let what = "exists already; choose another name, --resume to go on with it, or --overwrite to replace a cube";
+            let what =
+                "exists already; choose another name, --resume to go on with it, or --overwrite to replace a cube";
             Err(Error::Usage(format!("{} {what}", path.display())))
         }
         Existing::Replace if there => {
@@ -123,7 +124,8 @@ fn find_way(path: &Path, header: &Header, existing: Existing, tiles: &Range<u32>
         }
         Existing::Join | Existing::Resume if there => {
             let cube = open_same(path, header)?;
-            let begun = tiles.clone().filter(|&tile| cube.part_path(super::store::Part::Radiance, tile).exists()).count();
+            let begun =
+                tiles.clone().filter(|&tile| cube.part_path(super::store::Part::Radiance, tile).exists()).count();
             check_space(cube.path(), header, count - begun as u64, 0)?;
             Ok(Way::GoOn(cube))
         }
@@ -216,7 +218,6 @@ fn pretty(value: &Value) -> String {
 fn doubles(values: impl Iterator<Item = f64>) -> Vec<u8> {
     values.flat_map(f64::to_le_bytes).collect()
 }
-
 
 /// Whether `path` is a Spectile cube and nothing else, so that replacing it loses nobody's other files.
 fn check_removable(path: &Path) -> Result<()> {

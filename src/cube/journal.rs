@@ -185,7 +185,8 @@ impl Journal {
         if self.last()?.map(|record| record.suffix) == suffix {
             return Ok(());
         }
-        let what = format!("tile {} was changed by another process; this one has lost its lock on it and stops", self.tile);
+        let what =
+            format!("tile {} was changed by another process; this one has lost its lock on it and stops", self.tile);
         Err(Error::storage(&self.path, what))
     }
 

@@ -67,10 +67,10 @@ mod unix {
     use nix::libc::{self, flock};
 
     // Locks of an open file where there are such, so that two in one process keep apart as well.
-    #[cfg(target_os = "linux")]
-    use nix::fcntl::FcntlArg::{F_OFD_GETLK as GET, F_OFD_SETLK as SET};
     #[cfg(not(target_os = "linux"))]
     use nix::fcntl::FcntlArg::{F_GETLK as GET, F_SETLK as SET};
+    #[cfg(target_os = "linux")]
+    use nix::fcntl::FcntlArg::{F_OFD_GETLK as GET, F_OFD_SETLK as SET};
 
     fn range(tiles: &Range<u32>) -> flock {
         flock {

@@ -71,14 +71,17 @@ impl Header {
     /// What of this cube's identity is not as in `wanted`, in words; `None` where both are one.
     pub(super) fn difference(&self, wanted: &Header) -> Option<String> {
         let size = |[width, height]: [u32; 2]| format!("{width} x {height}");
-        let there_and_wanted = |what: &str, there: String, wanted: String| {
-            Some(format!("{what}: {there} in the cube, {wanted} now"))
-        };
+        let there_and_wanted =
+            |what: &str, there: String, wanted: String| Some(format!("{what}: {there} in the cube, {wanted} now"));
         if self.size != wanted.size {
             return there_and_wanted("size", size(self.size), size(wanted.size));
         }
         if self.origin != wanted.origin {
-            return there_and_wanted("film.crop", format!("from {:?}", self.origin), format!("from {:?}", wanted.origin));
+            return there_and_wanted(
+                "film.crop",
+                format!("from {:?}", self.origin),
+                format!("from {:?}", wanted.origin),
+            );
         }
         if self.channels != wanted.channels {
             let (there, wanted) = (&self.channels, &wanted.channels);
@@ -102,7 +105,9 @@ impl Header {
         // Whoever goes on with a cube adopts the evaluator that it was begun with.
         let decides = |key: &str| key != "evaluator" && key != "scene_digest";
         let of = |attributes: &Map<String, Value>| {
-            Value::Object(attributes.iter().filter(|(key, _)| decides(key)).map(|(k, v)| (k.clone(), v.clone())).collect())
+            Value::Object(
+                attributes.iter().filter(|(key, _)| decides(key)).map(|(k, v)| (k.clone(), v.clone())).collect(),
+            )
         };
         if let Some((key, there, wanted)) = first_difference("", &of(&self.attributes), &of(&wanted.attributes)) {
             return there_and_wanted(&key, there, wanted);

@@ -23,6 +23,7 @@ mod lock;
 mod map;
 mod merge;
 mod metadata;
+mod preview;
 #[cfg(all(test, unix))]
 mod protocol_tests;
 mod recover;
@@ -37,6 +38,7 @@ pub use grid::{Grid, Rect};
 pub use map::Chunk;
 pub use merge::merge_means;
 pub use metadata::{FORMAT, Header};
+pub use preview::reduction;
 pub use store::{Cube, Progress};
 pub use verify::Verification;
 pub use writer::Writer;

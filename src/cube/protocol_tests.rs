@@ -181,9 +181,15 @@ fn a_writer_may_die_between_any_two_steps() {
     let bench = Bench::new();
     let steps = bench.steps(AFTER);
     let all: std::collections::BTreeSet<&str> = steps.iter().map(String::as_str).collect();
-    for step in ["file aside written", "folder aside synced", "journal half appended", "journal synced", "file in place",
-        "new journal renamed", "folder synced"]
-    {
+    for step in [
+        "file aside written",
+        "folder aside synced",
+        "journal half appended",
+        "journal synced",
+        "file in place",
+        "new journal renamed",
+        "folder synced",
+    ] {
         assert!(all.contains(step), "{step} is among the steps: {all:?}");
     }
     for (n, name) in steps.iter().enumerate() {
@@ -258,7 +264,8 @@ fn power_may_be_cut_between_any_two_steps() {
         } else if last("journal opened") > last("journal synced") {
             let journals = (0..TILES).map(|tile| cube.journal_folder().join(tile.to_string()));
             let newest = journals.max_by_key(|j| fs::metadata(j).and_then(|m| m.modified()).ok()).expect("a journal");
-            let (before, now) = (bench.base().join(".spectile/journal").join(newest.file_name().expect("a name")), &newest);
+            let (before, now) =
+                (bench.base().join(".spectile/journal").join(newest.file_name().expect("a name")), &newest);
             let before = fs::metadata(before).expect("there").len();
             let length = fs::metadata(now).expect("there").len();
             truncate(now, before + chance(length.saturating_sub(before) + 1));
@@ -348,7 +355,8 @@ fn damaged_files_are_found_and_made_anew() {
 fn who_has_lost_its_lock_stops() {
     let bench = Bench::new();
     let path = bench.cube();
-    let open = || Writer::open(&path, &header(), Existing::Join, 0..TILES, &mut |what| panic!("{what}")).expect("a cube");
+    let open =
+        || Writer::open(&path, &header(), Existing::Join, 0..TILES, &mut |what| panic!("{what}")).expect("a cube");
     let first = open();
     // A lock file that was removed locks nobody out any more.
     fs::remove_file(path.join(".spectile/lock")).expect("removed");

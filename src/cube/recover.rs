@@ -176,9 +176,7 @@ fn rebuild(cube: &Cube, record: &Record, parts: &[Part], folders: &mut BTreeSet<
             file.sync_all()
         };
         let target = cube.part_path(part, tile);
-        write().map_err(|error: std::io::Error| {
-            Error::storage(&target, format!("cannot be made anew: {error}"))
-        })?;
+        write().map_err(|error: std::io::Error| Error::storage(&target, format!("cannot be made anew: {error}")))?;
         take_place(&aside, &target, folders)?;
     }
     Ok(())

@@ -14,7 +14,7 @@ use super::lock::TileLock;
 use super::map::Chunk;
 use super::metadata::{FORMAT, Header};
 use crate::spectral::Channels;
-use crate::spectral::colour::{Picture, Projection};
+use crate::spectral::colour::Projection;
 use crate::{Error, Result};
 
 /// Folder of everything that is not plain Zarr.
@@ -51,13 +51,17 @@ pub struct Cube {
 }
 
 /// How far a cube has got.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Progress {
     pub tiles: u32,
     /// Tiles with at least one sample.
     pub tiles_started: u32,
     /// The least and the most samples per pixel of the tiles with any.
     pub samples: [u32; 2],
+    /// Tiles without any.
+    pub missing: Vec<Range<u32>>,
+    /// Tiles with some, but fewer than the most.
+    pub behind: Vec<Range<u32>>,
 }
 
 impl Cube {
@@ -113,23 +117,23 @@ impl Cube {
     /// How far the whole cube has got.
     pub fn progress(&self) -> Result<Progress> {
         let tiles = self.grid().count();
-        let mut progress = Progress { tiles, tiles_started: 0, samples: [u32::MAX, 0] };
-        for tile in 0..tiles {
-            let samples = self.samples(tile)?;
-            if samples > 0 {
-                progress.tiles_started += 1;
-                progress.samples = [progress.samples[0].min(samples), progress.samples[1].max(samples)];
-            }
-        }
-        if progress.tiles_started == 0 {
-            progress.samples = [0, 0];
-        }
-        Ok(progress)
+        let samples = (0..tiles).map(|tile| self.samples(tile)).collect::<Result<Vec<u32>>>()?;
+        let most = samples.iter().copied().max().unwrap_or(0);
+        let least = samples.iter().copied().filter(|&n| n > 0).min().unwrap_or(0);
+        let missing = ranges(&samples, |n| n == 0);
+        let tiles_started = tiles - missing.iter().map(|range| range.end - range.start).sum::<u32>();
+        let behind = ranges(&samples, |n| n > 0 && n < most);
+        Ok(Progress { tiles, tiles_started, samples: [least, most], missing, behind })
     }
 
     /// The radiance of a tile, mapped into memory; `None` before its first unit.
     pub fn chunk(&self, tile: u32) -> Result<Option<Chunk>> {
-        Chunk::open(&self.part_path(Part::Radiance, tile), self.grid().rect(tile), self.header.tile, self.channels().len())
+        Chunk::open(
+            &self.part_path(Part::Radiance, tile),
+            self.grid().rect(tile),
+            self.header.tile,
+            self.channels().len(),
+        )
     }
 
     /// The K channels of the pixel in column `x` and row `y` from the top left, in one contiguous read; `None` before
@@ -155,36 +159,6 @@ impl Cube {
             .and_then(|_| file.read_exact(bytemuck::cast_slice_mut(&mut spectrum)))
             .map_err(|error| Error::storage(&path, format!("is damaged: {error}")))?;
         Ok(Some(spectrum))
-    }
-
-    /// The preview of the whole picture, NaN where nothing is rendered yet.
-    pub fn preview(&self) -> Result<Picture> {
-        self.preview_of(|tile| File::open(self.part_path(Part::Preview, tile)))
-    }
-
-    /// The preview from files that `open` finds, none where a tile has no samples yet.
-    pub(super) fn preview_of(&self, open: impl Fn(u32) -> std::io::Result<File>) -> Result<Picture> {
-        let grid = self.grid();
-        let [width, height] = grid.size.map(|side| side as usize);
-        let mut rgb = vec![f32::NAN; width * height * 3];
-        let mut tile_rgb = vec![0.0f32; grid.tile_pixels() * 3];
-        for tile in 0..grid.count() {
-            let failed = |what: &dyn std::fmt::Display| Error::storage(&self.part_path(Part::Preview, tile), what);
-            match open(tile) {
-                Ok(mut file) => file
-                    .read_exact(bytemuck::cast_slice_mut(&mut tile_rgb))
-                    .map_err(|error| failed(&format!("is damaged: {error}")))?,
-                Err(error) if error.kind() == ErrorKind::NotFound => continue,
-                Err(error) => return Err(failed(&error)),
-            }
-            let rect = grid.rect(tile);
-            let row_length = rect.width() as usize * 3;
-            for (y, row) in (rect.y0..rect.y1).zip(tile_rgb.chunks_exact(grid.tile[0] as usize * 3)) {
-                let start = (y as usize * width + rect.x0 as usize) * 3;
-                rgb[start..start + row_length].copy_from_slice(&row[..row_length]);
-            }
-        }
-        Ok(Picture { size: grid.size, rgb })
     }
 
     /// The error estimate of every channel (DESIGN section 8), from the spread of the epochs: sqrt(Σ variance of the
@@ -232,6 +206,18 @@ impl Cube {
     pub(super) fn aside_path(&self, part: Part, tile: u32, suffix: u64) -> PathBuf {
         self.aside_folder().join(format!("{tile}.{suffix:016x}.{}", part.name()))
     }
+}
+
+/// The tiles whose samples are `such`, those that follow each other together.
+fn ranges(samples: &[u32], such: impl Fn(u32) -> bool) -> Vec<Range<u32>> {
+    let mut found: Vec<Range<u32>> = Vec::new();
+    for (tile, _) in (0..).zip(samples).filter(|(_, n)| such(**n)) {
+        match found.last_mut() {
+            Some(last) if last.end == tile => last.end += 1,
+            _ => found.push(tile..tile + 1),
+        }
+    }
+    found
 }
 
 fn read_doubles(path: &Path, count: usize) -> Result<Vec<f64>> {

@@ -127,13 +127,13 @@ impl Writer {
         self.state().totals.error_estimate()
     }
 
-    /// The preview with every unit merged so far.
-    pub fn preview(&self) -> Result<Picture> {
+    /// The preview with every unit merged so far; means of `factor` x `factor` pixels.
+    pub fn preview(&self, factor: u32) -> Result<Picture> {
         let state = self.state();
         let pending = state.committing.iter().chain(&state.open);
         let suffixes: BTreeMap<u32, u64> = pending.map(|(&tile, pending)| (tile, pending.record.suffix)).collect();
         drop(state);
-        self.cube.preview_of(|tile| {
+        self.cube.preview_of(factor, |tile| {
             let aside = suffixes.get(&tile).map(|&suffix| self.cube.aside_path(Part::Preview, tile, suffix));
             // By now it may have taken its place, or a newer one is about to.
             let opened = aside.and_then(|aside| File::open(aside).ok());
@@ -161,8 +161,7 @@ impl Writer {
             let what = format!("tile {tile} with {} values where {:?} have {expected}", unit.len(), self.tiles);
             return Err(Error::Internal(what));
         }
-        let _held =
-            self.merging[tile as usize % self.merging.len()].lock().unwrap_or_else(PoisonError::into_inner);
+        let _held = self.merging[tile as usize % self.merging.len()].lock().unwrap_or_else(PoisonError::into_inner);
         let base = self.base(tile)?;
         let n_found = base.as_ref().map_or(0, Base::samples);
         if n_found != n_before {
@@ -300,7 +299,8 @@ impl Writer {
         for (&tile, pending) in batch {
             for part in Part::ALL {
                 let path = self.cube.aside_path(part, tile, pending.record.suffix);
-                let synced = File::open(&path).and_then(|file| file.sync_all()).and_then(|()| step("file aside synced"));
+                let synced =
+                    File::open(&path).and_then(|file| file.sync_all()).and_then(|()| step("file aside synced"));
                 synced.map_err(|error| Error::storage(&path, format!("cannot be written: {error}")))?;
             }
         }

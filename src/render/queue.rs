@@ -44,8 +44,7 @@ struct State {
 impl Queue {
     /// A queue without units.
     pub fn new() -> Queue {
-        let state =
-            State { ready: VecDeque::new(), undecided: Vec::new(), allowed: 0, together: 1, closed: false };
+        let state = State { ready: VecDeque::new(), undecided: Vec::new(), allowed: 0, together: 1, closed: false };
         Queue { state: Mutex::new(state), changed: Condvar::new() }
     }
 

@@ -10,7 +10,9 @@ use std::time::{Duration, Instant};
 
 use serde_json::json;
 
-use crate::cube::{Existing, Header, Writer, check_target, epoch_samples, epochs_in, samples_before, whole_epochs};
+use crate::cube::{
+    Existing, Header, Writer, check_target, epoch_samples, epochs_in, reduction, samples_before, whole_epochs,
+};
 use crate::gpu::adapter::{Gpu, Selection};
 use crate::gpu::layout::Counters;
 use crate::render::plan;
@@ -23,8 +25,11 @@ use crate::{Error, Result, files, format};
 
 /// Samples per pixel where no stop rule says otherwise.
 pub const DEFAULT_SAMPLES: u32 = 64;
-/// The preview file is rewritten at most this often.
+/// The preview file is rewritten at most this often, and takes at most this share of the time.
 const PREVIEW_INTERVAL: Duration = Duration::from_secs(1);
+const PREVIEW_SHARE: u32 = 20;
+/// Most pixels of the preview file: 4K. Larger pictures are reduced, so that memory does not grow with the cube.
+pub const PREVIEW_PIXELS: u64 = 3840 * 2160;
 /// How soon a signal is noticed while no device has anything to report.
 const SIGNAL_INTERVAL: Duration = Duration::from_millis(200);
 
@@ -267,7 +272,8 @@ struct Render<'a> {
     counters: Counters,
     /// Column, row, epoch and sample of the first bad sample, for the report.
     first_bad: Option<[u32; 4]>,
-    last_preview: Option<Instant>,
+    /// When the preview file may be rewritten.
+    next_preview: Option<Instant>,
 }
 
 impl<'a> Render<'a> {
@@ -307,7 +313,7 @@ impl<'a> Render<'a> {
             merged: VecDeque::new(),
             counters: Counters::default(),
             first_bad: None,
-            last_preview: None,
+            next_preview: None,
         }
     }
 
@@ -478,7 +484,7 @@ impl<'a> Render<'a> {
         of_device.units += merged.group.tiles.len() as u64 * u64::from(merged.group.epochs);
         of_device.idle_s = merged.idle_s;
         of_device.busy_s = rendering_s - merged.idle_s;
-        if self.last_preview.is_none_or(|last| last.elapsed() >= PREVIEW_INTERVAL) {
+        if self.next_preview.is_none_or(|next| next <= Instant::now()) {
             self.write_preview(cube)?;
         }
         observe(Event::Progress(&self.status))
@@ -517,10 +523,11 @@ impl<'a> Render<'a> {
     /// Writes the preview, if one is wanted, and says at which exposure.
     fn write_preview(&mut self, cube: &Writer) -> Result<Option<f64>> {
         let Some(preview) = &self.job.preview else { return Ok(None) };
-        let picture = cube.preview()?;
+        let began = Instant::now();
+        let picture = cube.preview(reduction(cube.cube().header().size, PREVIEW_PIXELS))?;
         let exposure = preview.exposure.unwrap_or_else(|| picture.auto_exposure());
         format::png::write(&preview.file, &picture, exposure)?;
-        self.last_preview = Some(Instant::now());
+        self.next_preview = Some(Instant::now() + PREVIEW_INTERVAL.max(began.elapsed() * PREVIEW_SHARE));
         Ok(Some(exposure))
     }
 

@@ -3,6 +3,7 @@
 
 mod json;
 mod outcome;
+mod resume;
 mod running;
 mod several;
 mod sizes;
