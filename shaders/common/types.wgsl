@@ -29,9 +29,9 @@ struct Frame {
     environment_pick: f32,
     environment_spectrum: u32,
     max_records: u32,
-    channels: u32,
     // Wavelength strata per channel in the spectral tables: 2^stratum_bits.
     stratum_bits: u32,
+    unused: u32,
 }
 
 // What stays the same during a wave: one range of samples of the pixels of one or several units of one epoch.

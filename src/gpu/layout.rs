@@ -23,8 +23,8 @@ pub struct Frame {
     pub environment_pick: f32,
     pub environment_spectrum: u32,
     pub max_records: u32,
-    pub channels: u32,
     pub stratum_bits: u32,
+    pub unused: u32,
 }
 
 /// `Wave` in WGSL: one range of samples of the pixels of one or several units of one epoch.
@@ -151,8 +151,8 @@ mod tests {
             environment_pick,
             environment_spectrum,
             max_records,
-            channels,
-            stratum_bits
+            stratum_bits,
+            unused
         });
         same_layout!(Wave {
             path_count,

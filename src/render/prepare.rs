@@ -306,8 +306,8 @@ fn frame(
         environment_spectrum,
         // Next-event estimation at every scattering event, and emission where a surface or the sky emits.
         max_records: bounces + if features.emitters { bounces + 1 } else { 1 },
-        channels: scene.channels.len() as u32,
         stratum_bits,
+        unused: 0,
     }
 }
 
