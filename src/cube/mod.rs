@@ -19,6 +19,7 @@ mod store;
 pub use compare::{ChannelMetrics, Comparison, compare};
 pub use grid::{Grid, Rect};
 pub use map::Chunk;
+pub use merge::merge_bytes;
 pub use metadata::{FORMAT, Header};
 pub use store::{Cube, Progress};
 

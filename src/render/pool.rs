@@ -12,6 +12,7 @@ use crate::gpu::self_test;
 use crate::render::prepare::Prepared;
 use crate::render::queue::{Group, Next, Queue};
 use crate::render::schedule::epoch_samples;
+use crate::render::wave::Budget;
 use crate::render::worker::{Collected, Interrupt, Profile, UnitRect, Worker};
 use crate::{Error, Result};
 
@@ -24,6 +25,8 @@ pub struct Pool<'a> {
     pub tile: [u32; 2],
     /// Samples of a full epoch.
     pub full_epoch: u32,
+    /// Bytes of each device that may be used.
+    pub memory: Option<u64>,
     pub profile: bool,
     pub interrupt: &'a Arc<Interrupt>,
 }
@@ -71,12 +74,13 @@ impl Pool<'_> {
 
     fn start(&self, gpu: Gpu, report: &impl Fn(Report)) -> Result<Worker> {
         self_test::run(&gpu)?;
-        let mut worker = Worker::new(gpu, Arc::clone(self.prepared), self.tile, None)?;
+        let budget = Budget { memory: self.memory, paths: None };
+        let mut worker = Worker::new(gpu, Arc::clone(self.prepared), self.tile, budget)?;
         worker.watch(self.interrupt);
         if self.profile {
             worker.enable_profile();
         }
-        report(Report::Ready { bytes: worker.device_bytes() });
+        report(Report::Ready { bytes: worker.plan.device_bytes() });
         Ok(worker)
     }
 

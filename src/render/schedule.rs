@@ -1,6 +1,6 @@
 //! The render: epochs of the whole image, decided one after the other; devices that pull their units; what is known so far.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver};
 use std::sync::{Arc, OnceLock};
@@ -51,6 +51,8 @@ pub struct Job {
     pub preview: Option<Preview>,
     pub profile: bool,
     pub devices: Selection,
+    /// Bytes of each device that may be used.
+    pub memory: Option<u64>,
 }
 
 /// How far a render is.
@@ -168,6 +170,7 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
         cube: &cube,
         tile,
         full_epoch: job.scene.integrator.epoch,
+        memory: job.memory,
         profile: job.profile,
         interrupt,
     };
@@ -266,13 +269,13 @@ impl<'a> Render<'a> {
         }
     }
 
-    /// Waits until every device holds the scene, or has left.
+    /// Waits until every device holds the scene, or has left: one that cannot is left out, unless none can.
     fn wait_for_devices(
         &mut self,
         reports: &Receiver<(usize, Report)>,
         observe: &mut dyn FnMut(Event) -> Result<()>,
     ) -> Result<()> {
-        let mut ready = 0;
+        let (mut ready, mut refused) = (0, BTreeMap::new());
         while ready < self.active {
             let (device, report) = reports.recv().map_err(|_| no_cube())?;
             match report {
@@ -283,8 +286,22 @@ impl<'a> Render<'a> {
                     ready += 1;
                     self.device_bytes += bytes;
                 }
+                Report::Left {
+                    result: Err(error @ (Error::Usage(_) | Error::NoDevice(_) | Error::DevicesLost(_))),
+                } => {
+                    self.active -= 1;
+                    refused.insert(device, error);
+                }
                 report => self.left(device, report, observe)?,
             }
+        }
+        if ready == 0
+            && let Some((_, error)) = refused.pop_first()
+        {
+            return Err(error);
+        }
+        for (device, error) in refused {
+            observe(Event::Warning(format!("device {} is left out: {error}", device + 1)))?;
         }
         Ok(())
     }

@@ -12,7 +12,7 @@ use crate::gpu::pass::Pass;
 use crate::gpu::shader;
 use crate::gpu::upload::{self, SceneBuffers};
 use crate::render::prepare::{EvaluateShape, Prepared};
-use crate::render::wave::{self, DeviceLimits, WavePlan};
+use crate::render::wave::{self, Budget, DeviceLimits, WavePlan};
 use crate::{Error, Result};
 
 /// A rectangle x0, y0, x1, y1 of the full film: one tile in one epoch.
@@ -46,7 +46,7 @@ pub struct Profile {
 
 /// A device with everything a scene needs on it.
 pub struct Worker {
-    pub gpu: Gpu,
+    pub gpu: Arc<Gpu>,
     pub plan: WavePlan,
     pub profile: Profile,
     prepared: Arc<Prepared>,
@@ -55,7 +55,6 @@ pub struct Worker {
     evaluate: Stage,
     shape: EvaluateShape,
     path_buffers: PathBuffers,
-    scene_bytes: u64,
     timestamps: Option<Timestamps>,
     slots: Vec<Slot>,
     next_slot: usize,
@@ -111,13 +110,18 @@ pub struct Collected<'a> {
 }
 
 impl Worker {
-    /// Uploads the scene and compiles its passes. `max_paths` bounds the waves (tests, small memories).
-    pub fn new(gpu: Gpu, prepared: Arc<Prepared>, tile: [u32; 2], max_paths: Option<u32>) -> Result<Worker> {
-        let limits = DeviceLimits { binding: binding_limit(&gpu), software: gpu.is_software, max_paths };
-        let plan = WavePlan::new(&prepared, tile, limits)?;
-        let windows = upload::windows(&prepared, limits.binding)?;
+    /// Uploads the scene and compiles its passes, with waves as large as `budget` lets them be.
+    pub fn new(gpu: impl Into<Arc<Gpu>>, prepared: Arc<Prepared>, tile: [u32; 2], budget: Budget) -> Result<Worker> {
+        let gpu = gpu.into();
+        let plan = WavePlan::new(&prepared, tile, device_limits(&gpu), budget)?;
+        Worker::with_waves(gpu, prepared, plan)
+    }
+
+    /// As [`Worker::new`], with waves as planned.
+    pub fn with_waves(gpu: Arc<Gpu>, prepared: Arc<Prepared>, plan: WavePlan) -> Result<Worker> {
+        let windows = upload::windows(&prepared, plan.limits.binding)?;
         let scene = SceneBuffers::new(&gpu, &prepared, &windows)?;
-        let path_buffers = PathBuffers::new(&gpu, &prepared, &plan);
+        let path_buffers = PathBuffers::new(&gpu, &plan);
 
         let shape = EvaluateShape::new(prepared.tables.channels_padded as u32 / 4, gpu.is_software);
         let defines = prepared.defines(&windows);
@@ -136,7 +140,7 @@ impl Worker {
                 staging: buffer::empty(
                     &gpu,
                     "staging",
-                    plan.mean_bytes() + size_of::<Counters>() as u64,
+                    plan.staging_bytes(),
                     wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
                 ),
                 pending: None,
@@ -155,7 +159,6 @@ impl Worker {
             evaluate,
             shape,
             path_buffers,
-            scene_bytes: scene.bytes,
             timestamps,
             slots,
             next_slot: 0,
@@ -256,11 +259,6 @@ impl Worker {
         self.slots.iter().all(|slot| slot.pending.is_none())
     }
 
-    /// Scene and buffers on the device, bytes.
-    pub fn device_bytes(&self) -> u64 {
-        self.scene_bytes + self.plan.device_bytes()
-    }
-
     fn unit_bytes(&self) -> u64 {
         u64::from(self.plan.tile_pixels()) * u64::from(self.plan.channels) * 4
     }
@@ -320,9 +318,15 @@ impl Worker {
     }
 }
 
-/// What one binding may show: the device's limit, but no more than 1 GiB, so that offsets stay within 32 bits of words.
-pub fn binding_limit(gpu: &Gpu) -> u64 {
-    gpu.limits.max_storage_buffer_binding_size.min(gpu.limits.max_buffer_size).min(1 << 30)
+/// What `gpu` allows. A binding shows no more than 1 GiB, so that offsets stay within 32 bits of words, and leaves room
+/// for the counters that follow the means in a staging buffer.
+pub fn device_limits(gpu: &Gpu) -> DeviceLimits {
+    let buffer = gpu.limits.max_buffer_size - buffer::allocated(size_of::<Counters>() as u64);
+    DeviceLimits {
+        binding: gpu.limits.max_storage_buffer_binding_size.min(buffer).min(1 << 30),
+        uniform_alignment: gpu.limits.min_uniform_buffer_offset_alignment,
+        software: gpu.is_software,
+    }
 }
 
 /// Workgroup counts in x and y for at least `groups` groups: a dimension takes at most 65,535.
@@ -341,20 +345,19 @@ impl Stage {
 }
 
 impl PathBuffers {
-    fn new(gpu: &Gpu, prepared: &Prepared, plan: &WavePlan) -> PathBuffers {
+    fn new(gpu: &Gpu, plan: &WavePlan) -> PathBuffers {
         use wgpu::BufferUsages as U;
         let storage = U::STORAGE | U::COPY_SRC | U::COPY_DST;
-        let step_stride = gpu.limits.min_uniform_buffer_offset_alignment.max(16);
-        let steps = wave::steps(prepared.frame.max_bounces);
-        let mut step_bytes = vec![0u8; steps.len() * step_stride as usize];
-        for (step, bytes) in steps.iter().zip(step_bytes.chunks_mut(step_stride as usize)) {
+        let step_stride = plan.step_stride();
+        let mut step_bytes = vec![0u8; plan.step_bytes() as usize];
+        for (step, bytes) in wave::steps(plan.max_bounces).iter().zip(step_bytes.chunks_mut(step_stride as usize)) {
             bytes[..size_of_val(step)].copy_from_slice(bytemuck::bytes_of(step));
         }
-        let steps = buffer::empty(gpu, "steps", step_bytes.len() as u64, U::UNIFORM | U::COPY_DST);
+        let steps = buffer::empty(gpu, "steps", plan.step_bytes(), U::UNIFORM | U::COPY_DST);
         gpu.queue.write_buffer(&steps, 0, &step_bytes);
         PathBuffers {
             wave: buffer::empty(gpu, "wave", size_of::<Wave>() as u64, U::UNIFORM | U::COPY_DST),
-            units: buffer::empty(gpu, "units", u64::from(plan.units) * size_of::<UnitRect>() as u64, storage),
+            units: buffer::empty(gpu, "units", plan.unit_list_bytes(), storage),
             steps,
             step_stride,
             states: buffer::empty(gpu, "states", plan.state_bytes(), storage),
@@ -362,12 +365,7 @@ impl PathBuffers {
             records: buffer::empty(gpu, "records", plan.record_bytes(), storage),
             throughputs: plan.roulette.then(|| buffer::empty(gpu, "throughputs", plan.throughput_bytes(), storage)),
             queue: buffer::empty(gpu, "queue", plan.queue_bytes(), storage),
-            queue_lengths: buffer::empty(
-                gpu,
-                "queue_lengths",
-                4 * wave::steps(prepared.frame.max_bounces).len() as u64,
-                storage,
-            ),
+            queue_lengths: buffer::empty(gpu, "queue_lengths", plan.queue_length_bytes(), storage),
             counters: buffer::empty(gpu, "counters", size_of::<Counters>() as u64, storage),
             means: buffer::empty(gpu, "means", plan.mean_bytes(), storage),
         }
