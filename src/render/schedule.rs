@@ -399,7 +399,7 @@ impl<'a> Render<'a> {
         }
         self.merge_s += merged.merge_s;
         self.status.paths += merged.paths;
-        self.status.rays += u64::from(merged.counters.rays);
+        self.status.rays += merged.counters.rays();
         self.update_clock();
         let rendering_s = self.status.rendering_s;
         let of_device = &mut self.status.devices[device];

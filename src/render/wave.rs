@@ -242,7 +242,7 @@ impl WavePlan {
         }
     }
 
-    /// The waves of `units` units of one epoch, in the order in which they must run.
+    /// The waves of `units` units of one epoch, in the order in which they must run; whoever runs them numbers them.
     pub fn waves(&self, units: u32, epoch: u32, epoch_samples: u32) -> Vec<Wave> {
         let pixels = units * self.tile_pixels();
         let samples = epoch_samples.min(self.samples);
@@ -261,6 +261,7 @@ impl WavePlan {
                     tile_pixels: self.tile_pixels(),
                     epoch,
                     epoch_mask: epoch_samples - 1,
+                    sequence: 0,
                 });
             }
         }

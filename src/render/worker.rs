@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use crate::gpu::adapter::Gpu;
 use crate::gpu::buffer;
-use crate::gpu::layout::{Counters, Wave};
+use crate::gpu::layout::{Counters, Proof, Wave};
 use crate::gpu::pass::Pass;
 use crate::gpu::shader;
 use crate::gpu::upload::{self, SceneBuffers};
@@ -59,6 +59,8 @@ pub struct Worker {
     slots: Vec<Slot>,
     next_slot: usize,
     waves: VecDeque<wgpu::SubmissionIndex>,
+    /// Waves submitted so far.
+    sequence: u64,
     interrupt: Arc<Interrupt>,
     /// Since when nothing is under way; `None` before the first unit.
     idle_since: Option<Instant>,
@@ -97,6 +99,7 @@ struct Slot {
 struct Pending {
     units: Vec<UnitRect>,
     submission: wgpu::SubmissionIndex,
+    proof: Proof,
 }
 
 /// What a group of units brought back.
@@ -163,6 +166,7 @@ impl Worker {
             slots,
             next_slot: 0,
             waves: VecDeque::new(),
+            sequence: 0,
             interrupt: Arc::default(),
             idle_since: None,
             idle_s: 0.0,
@@ -198,7 +202,9 @@ impl Worker {
         let buffers = &self.path_buffers;
         self.gpu.queue.write_buffer(&buffers.units, 0, bytemuck::cast_slice(units));
         let ahead = if self.gpu.is_software { WAVES_AHEAD_SOFTWARE } else { WAVES_AHEAD };
-        for wave in self.plan.waves(units.len() as u32, epoch, epoch_samples) {
+        for mut wave in self.plan.waves(units.len() as u32, epoch, epoch_samples) {
+            self.sequence += 1;
+            wave.sequence = self.sequence as u32;
             check_interrupt(&self.interrupt)?;
             while self.waves.len() >= ahead
                 && let Some(oldest) = self.waves.pop_front()
@@ -218,7 +224,8 @@ impl Worker {
         encoder.clear_buffer(&buffers.counters, 0, None);
         let submission = self.gpu.queue.submit([encoder.finish()]);
         buffer::map(staging);
-        self.slots[slot].pending = Some(Pending { units: units.to_vec(), submission });
+        let proof = self.proof(units, epoch_samples);
+        self.slots[slot].pending = Some(Pending { units: units.to_vec(), submission, proof });
         Ok(())
     }
 
@@ -243,6 +250,10 @@ impl Worker {
             let end = size + size_of::<Counters>() as u64;
             let view = staging.slice(..end).get_mapped_range().map_err(lost)?;
             let counters: Counters = bytemuck::pod_read_unaligned(&view[size as usize..]);
+            if let Some(what) = counters.missing(&pending.proof) {
+                let what = format!("{}: a unit came back incomplete: {what}", self.gpu.name);
+                return Err(Error::DevicesLost(what));
+            }
             collected(Collected {
                 units: &pending.units,
                 means: bytemuck::cast_slice(&view[..size as usize]),
@@ -257,6 +268,18 @@ impl Worker {
     /// Whether nothing is under way.
     pub fn is_idle(&self) -> bool {
         self.slots.iter().all(|slot| slot.pending.is_none())
+    }
+
+    /// What the counters must show after the last wave of `units`.
+    fn proof(&self, units: &[UnitRect], epoch_samples: u32) -> Proof {
+        let samples = u64::from(epoch_samples);
+        let pixels = |[x0, y0, x1, y1]: &UnitRect| u64::from(x1 - x0) * u64::from(y1 - y0);
+        let slots = units.len() as u64 * u64::from(self.plan.tile_pixels());
+        Proof {
+            paths: units.iter().map(pixels).sum::<u64>() * samples,
+            folded: slots * samples * u64::from(self.shape.blocks),
+            sequence: self.sequence,
+        }
     }
 
     fn unit_bytes(&self) -> u64 {
@@ -419,5 +442,53 @@ impl Timestamps {
         let ticks: Vec<u64> = buffer::read(gpu, &self.resolved, 32)?;
         let period = f64::from(gpu.queue.get_timestamp_period()) * 1e-9;
         Ok([0, 2].map(|i| ticks[i + 1].saturating_sub(ticks[i]) as f64 * period))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::mem::offset_of;
+
+    use glam::DVec3;
+
+    use super::*;
+    use crate::scene::Sides;
+    use crate::scene_builder::{Builder, room, sphere};
+
+    /// A lamp in a closed room, so that every path goes all the way.
+    fn worker() -> Worker {
+        let scene = Builder::new()
+            .bounces(3)
+            .diffuse(room(DVec3::splat(-2.0), DVec3::splat(2.0)), 0.5)
+            .lamp(sphere(DVec3::new(0.0, 1.0, 0.0), 0.1), 1.0, Sides::Front)
+            .build();
+        let prepared = Arc::new(Prepared::new(&scene, 0).expect("a scene"));
+        Worker::new(Gpu::open().expect("a device"), prepared, [4, 4], Budget::default()).expect("a worker")
+    }
+
+    /// The counters of 64 samples of 3 x 2 pixels.
+    fn counters(worker: &mut Worker) -> Result<Counters> {
+        let mut found = None;
+        let mut note = |collected: Collected| {
+            found = Some(collected.counters);
+            Ok(())
+        };
+        worker.submit(&[[0, 0, 3, 2]], 0, 64, &mut note)?;
+        worker.collect(&mut note)?;
+        Ok(found.expect("collected"))
+    }
+
+    /// The count of rays goes on beyond 32 bits, from wherever it crosses them.
+    #[test]
+    fn rays_do_not_wrap() {
+        let mut worker = worker();
+        let rays = counters(&mut worker).expect("counters").rays();
+        // 384 paths of up to 4 vertices, each with its shadow ray but the last.
+        assert!((384 * 2..=384 * 7).contains(&rays), "{rays}");
+        for before in [u32::MAX, u32::MAX - 100, u32::MAX - rays as u32, u32::MAX - rays as u32 + 1] {
+            let at = offset_of!(Counters, rays_low) as u64;
+            worker.gpu.queue.write_buffer(&worker.path_buffers.counters, at, &before.to_le_bytes());
+            assert_eq!(counters(&mut worker).expect("counters").rays(), u64::from(before) + rays);
+        }
     }
 }

@@ -49,6 +49,7 @@ pub struct Epochs {
     /// `means[epoch][(y * width + x) * channels + k]`.
     pub means: Vec<Vec<f32>>,
     pub counters: Counters,
+    pub rays: u64,
 }
 
 /// One device at a time: two cores gain nothing from more.
@@ -76,7 +77,7 @@ pub fn render(scene: &Scene, epochs: u32, samples: u32, settings: Settings) -> E
         .flat_map(|y| (x0..x1).step_by(tw as usize).map(move |x| [x, y, (x + tw).min(x1), (y + th).min(y1)]))
         .collect();
     let (width, height, channels) = ((x1 - x0) as usize, (y1 - y0) as usize, scene.channels.len());
-    let mut counters = Counters::default();
+    let (mut counters, mut rays) = (Counters::default(), 0);
     let means = (0..epochs)
         .map(|epoch| {
             let mut image = vec![f32::NAN; width * height * channels];
@@ -84,7 +85,7 @@ pub fn render(scene: &Scene, epochs: u32, samples: u32, settings: Settings) -> E
                 counters.overflow += collected.counters.overflow;
                 counters.non_finite += collected.counters.non_finite;
                 counters.negative += collected.counters.negative;
-                counters.rays += collected.counters.rays;
+                rays += collected.counters.rays();
                 let unit_size = (tw * th) as usize * channels;
                 for (unit, means) in collected.units.iter().zip(collected.means.chunks(unit_size)) {
                     for y in unit[1]..unit[3] {
@@ -105,7 +106,7 @@ pub fn render(scene: &Scene, epochs: u32, samples: u32, settings: Settings) -> E
             image
         })
         .collect();
-    Epochs { width, height, channels, means, counters }
+    Epochs { width, height, channels, means, counters, rays }
 }
 
 impl Epochs {
