@@ -14,6 +14,7 @@ use spectile::cube::{Cube, Existing};
 use spectile::gpu::adapter::{Gpu, Selection};
 use spectile::render::prepare::Prepared;
 use spectile::render::schedule::{self, Event, Job, StopRule};
+use spectile::render::wave::Budget;
 use spectile::render::worker::Worker;
 use spectile::scene::{self, Scene};
 
@@ -62,7 +63,7 @@ fn median(values: &mut [f64]) -> f64 {
 /// Paths per CPU second, and microseconds of a path in generate and evaluate.
 fn speed(scene: &Scene, rounds: usize, samples: u32) -> Result<()> {
     let prepared = Arc::new(Prepared::new(scene, 0)?);
-    let mut worker = Worker::new(Gpu::open()?, prepared, [64, 64], None)?;
+    let mut worker = Worker::new(Gpu::open()?, prepared, [64, 64], Budget::default())?;
     let epoch = |worker: &mut Worker, index: u32| -> Result<()> {
         worker.submit(&[[0, 0, 64, 64]], index, samples, &mut |_| Ok(()))?;
         worker.collect(&mut |_| Ok(()))
@@ -118,6 +119,7 @@ fn render(scene: &Scene, samples: u32, seed: u64, output: &Path) -> Result<(Cube
         preview: None,
         profile: false,
         devices: Selection::Count(1),
+        memory: None,
     };
     let (mut began, mut peak) = (None, 0);
     let summary = schedule::run(&job, &Arc::default(), &mut |event| {

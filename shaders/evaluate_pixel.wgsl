@@ -234,6 +234,13 @@ fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
 #repeat VECTORS v
     store_mean(out_$v, channels_$v, mean_$v);
 #end
+    // A kernel that a driver drops without a word is noticed by this.
+    if (thread == 0u) {
+        atomicAdd(&counters[COUNTER_FOLDED], wave.samples * min(PIXELS_PER_GROUP, wave.pixel_count - local_slot));
+        if (local_slot == 0u && group.z == 0u) {
+            atomicStore(&counters[COUNTER_SEQUENCE], wave.sequence);
+        }
+    }
     if (bad.non_finite + bad.negative > 0u) {
         atomicAdd(&counters[COUNTER_NON_FINITE], bad.non_finite);
         atomicAdd(&counters[COUNTER_NEGATIVE], bad.negative);

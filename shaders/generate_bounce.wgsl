@@ -38,7 +38,9 @@ fn append(list: ptr<function, RecordList>, factor: u32, source: u32, weight: f32
 }
 
 fn end_path(list: RecordList, rays: u32) {
-    atomicAdd(&counters[COUNTER_RAYS], rays);
+    if (atomicAdd(&counters[COUNTER_RAYS], rays) > 0xffffffffu - rays) {
+        atomicAdd(&counters[COUNTER_RAYS_HIGH], 1u);
+    }
     heads[list.path].y = list.used;
 }
 

@@ -128,6 +128,29 @@ pub fn format_bytes(bytes: u64) -> String {
     if unit == "bytes" { format!("{bytes} bytes") } else { format!("{value:.1} {unit}") }
 }
 
+/// A size as people write it: bytes, or a number with kB, MB, GB, TB (powers of 1000) or KiB, MiB, GiB, TiB (of 1024).
+pub fn parse_bytes(text: &str) -> std::result::Result<u64, String> {
+    let explain =
+        || "a size is a positive number of bytes, or one with a unit, such as 512MiB, 2GiB or 1.5GB".to_owned();
+    let text = text.trim();
+    let (number, unit) = text.split_at(text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len()));
+    let unit = match unit.to_ascii_lowercase().as_str() {
+        "" | "b" => 1.0,
+        "kb" => 1e3,
+        "mb" => 1e6,
+        "gb" => 1e9,
+        "tb" => 1e12,
+        "kib" => f64::from(1 << 10),
+        "mib" => f64::from(1 << 20),
+        "gib" => f64::from(1 << 30),
+        "tib" => 1024.0 * f64::from(1 << 30),
+        _ => return Err(explain()),
+    };
+    let bytes = number.trim_end().parse::<f64>().map_err(|_| explain())? * unit;
+    // Whole bytes up to 2^53 are exact in f64; nothing that Spectile runs on has more.
+    if (1.0..=f64::from(1 << 23) * f64::from(1 << 30)).contains(&bytes) { Ok(bytes as u64) } else { Err(explain()) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -150,6 +173,28 @@ mod tests {
     fn sizes_for_people() {
         let shown = [0, 1023, 1024, 1536, 5 << 30, u64::MAX].map(format_bytes);
         assert_eq!(shown, ["0 bytes", "1023 bytes", "1.0 KiB", "1.5 KiB", "5.0 GiB", "16.0 EiB"]);
+    }
+
+    #[test]
+    fn sizes_from_people() {
+        let cases = [
+            ("1", 1),
+            ("123456789", 123_456_789),
+            ("512MiB", 512 << 20),
+            ("2GiB", 2 << 30),
+            ("2 gib", 2 << 30),
+            ("1.5GB", 1_500_000_000),
+            ("0.5KiB", 512),
+            ("64kB", 64_000),
+            ("3TiB", 3 << 40),
+            ("7B", 7),
+        ];
+        for (text, bytes) in cases {
+            assert_eq!(parse_bytes(text), Ok(bytes), "{text}");
+        }
+        for bad in ["", "0", "-1MiB", "2G", "GiB", "1e", "nan", "inf", "1MiBs", "0.1", "9e18", "1 2MiB"] {
+            assert!(parse_bytes(bad).unwrap_err().contains("512MiB"), "{bad}");
+        }
     }
 
     #[test]

@@ -15,4 +15,11 @@ pub mod render;
 pub mod scene;
 pub mod spectral;
 
+// The unit tests that need a scene build it as the integration tests do.
+#[cfg(test)]
+extern crate self as spectile;
+#[cfg(test)]
+#[path = "../tests/scene_builder/mod.rs"]
+mod scene_builder;
+
 pub use error::{Error, Result};

@@ -5,12 +5,17 @@ mod device;
 mod scene_builder;
 mod statistics;
 
+use std::sync::Arc;
+
 use device::{Settings, render};
 use glam::{DVec2, DVec3};
 use scene_builder::*;
-use spectile::gpu::upload;
+use spectile::gpu::adapter::Gpu;
+use spectile::gpu::{buffer, upload};
 use spectile::render::prepare::Prepared;
 use spectile::render::rng::hash;
+use spectile::render::wave::Budget;
+use spectile::render::worker::Worker;
 use spectile::scene::{Filter, Mesh, Projection, Sampler, Scene, Shape, Sides};
 use spectile::spectral::{Channels, Curve, Outside};
 
@@ -47,6 +52,10 @@ fn everything(sampler: Sampler) -> Scene {
     scene
 }
 
+fn budget(paths: u32) -> Budget {
+    Budget { paths: Some(paths), memory: None }
+}
+
 fn bits(scene: &Scene, epochs: u32, samples: u32, settings: Settings) -> Vec<u32> {
     let rendered = render(scene, epochs, samples, settings);
     rendered.assert_clean();
@@ -64,14 +73,14 @@ fn machinery_changes_no_bit() {
             |what: &str, settings: Settings| assert!(bits(&scene, 2, 64, settings) == expected, "{sampler:?}: {what}");
         same("again", base);
         // Waves of a few samples of a few pixels, and of all pixels at once.
-        for max_paths in [300, 1000, 60_000] {
-            same("wave size", Settings { max_paths: Some(max_paths), ..base });
+        for paths in [300, 1000, 60_000] {
+            same("wave size", Settings { budget: budget(paths), ..base });
         }
         same("units one by one", Settings { units: 1, ..base });
         for tile in [[5, 3], [8, 2], [32, 32]] {
             same("tile", Settings { tile, ..base });
         }
-        same("tile, wave and units", Settings { tile: [4, 4], max_paths: Some(3000), units: 3, ..base });
+        same("tile, wave and units", Settings { tile: [4, 4], budget: budget(3000), units: 3, ..base });
         same("bounds checks", Settings { checked: true, ..base });
         assert!(bits(&scene, 2, 64, Settings { seed: 6, ..base }) != expected, "another seed");
         assert!(bits(&scene, 2, 64, Settings { seed: 5 + (1 << 32), ..base }) != expected, "the seed's high half");
@@ -87,7 +96,7 @@ fn machinery_changes_no_bit_in_short_and_long_epochs() {
         let expected = bits(&scene, 2, samples, Settings { units: 1, ..base });
         for settings in [
             base,
-            Settings { max_paths: Some(500), ..base },
+            Settings { budget: budget(500), ..base },
             Settings { tile: [4, 8], ..base },
             Settings { tile: [7, 1], units: 5, ..base },
         ] {
@@ -222,4 +231,42 @@ fn a_channel_is_the_same_among_any_number() {
         let (first, last) = with(bounds);
         assert!(first == expected && last == expected, "K = {count}");
     }
+}
+
+/// A budget decides how large waves are, and no bit; and the device's own allocator says that it is kept.
+#[test]
+fn memory_changes_no_bit_and_is_kept() {
+    let scene = everything(Sampler::Sobol);
+    let prepared = Arc::new(Prepared::new(&scene, 5).expect("a scene"));
+    let tile = Settings::default().tile;
+    let worker = |memory| {
+        let budget = Budget { memory, paths: None };
+        Worker::new(Gpu::open().expect("a device"), Arc::clone(&prepared), tile, budget)
+    };
+    let unbounded = worker(None).expect("no budget").plan;
+    let refusal = worker(Some(1)).err().expect("a byte is not enough").to_string();
+    let least: u64 = refusal.split(' ').filter_map(|word| word.parse().ok()).nth(1).expect("the least");
+    let all = unbounded.device_bytes();
+    assert!(least < all / 3, "{least} of {all}: budgets in between say nothing");
+    let mut sizes = Vec::new();
+    for memory in [least, least + (all - least) / 50, all / 2, 2 * all] {
+        let mut worker = worker(Some(memory)).expect("enough");
+        worker.submit(&[[0, 0, 16, 13]], 3, 64, &mut |_| Ok(())).expect("submitted");
+        worker.collect(&mut |_| Ok(())).expect("rendered");
+        let allocated = worker.gpu.device.generate_allocator_report().expect("a report").total_allocated_bytes;
+        // wgpu's own: a buffer of zeros (512 KiB) and small change.
+        assert!(allocated <= memory, "{allocated} bytes allocated of {memory}");
+        // Beside what uploading took, which is free again, and what alignment did not.
+        let said = worker.plan.device_bytes() - worker.plan.scene_bytes.min(buffer::PIECE_BYTES) - (64 << 10);
+        assert!(allocated >= said, "{allocated} bytes allocated, {said} said");
+        sizes.push(worker.plan.paths);
+        drop(worker);
+        let settings =
+            Settings { seed: 5, budget: Budget { memory: Some(memory), paths: None }, ..Settings::default() };
+        for samples in [1, 64] {
+            let expected = bits(&scene, 2, samples, Settings { seed: 5, ..Settings::default() });
+            assert!(bits(&scene, 2, samples, settings) == expected, "{memory} bytes, {samples} samples");
+        }
+    }
+    assert!(sizes.is_sorted() && 3 * sizes[0] < sizes[3] && sizes[3] == unbounded.paths, "{sizes:?}");
 }

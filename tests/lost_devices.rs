@@ -51,6 +51,7 @@ fn render(doom: Option<Duration>) -> (Vec<Vec<f32>>, bool) {
         cube: &cube,
         tile: TILE,
         full_epoch: 64,
+        memory: None,
         profile: false,
         interrupt: &interrupt,
     };

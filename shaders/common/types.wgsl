@@ -29,9 +29,9 @@ struct Frame {
     environment_pick: f32,
     environment_spectrum: u32,
     max_records: u32,
-    channels: u32,
     // Wavelength strata per channel in the spectral tables: 2^stratum_bits.
     stratum_bits: u32,
+    unused: u32,
 }
 
 // What stays the same during a wave: one range of samples of the pixels of one or several units of one epoch.
@@ -48,6 +48,8 @@ struct Wave {
     epoch: u32,
     // Samples of the epoch - 1, a power of two - 1.
     epoch_mask: u32,
+    // Counts the waves of a device.
+    sequence: u32,
 }
 
 // One dispatch of a wave.
@@ -115,5 +117,10 @@ const COUNTER_NEGATIVE: u32 = 2u;
 // Where: the pixel slot that reported first, and the largest sample index + 1 reported.
 const COUNTER_BAD_SLOT: u32 = 3u;
 const COUNTER_BAD_SAMPLE: u32 = 4u;
-// Rays traced by the paths that ended.
+// Rays traced by the paths that ended: low and high word.
 const COUNTER_RAYS: u32 = 5u;
+const COUNTER_RAYS_HIGH: u32 = 6u;
+// Proof that evaluation took place: samples folded (of all pixel slots, by each workgroup of a pixel, modulo 2^32), and
+// the sequence number of the last wave.
+const COUNTER_FOLDED: u32 = 7u;
+const COUNTER_SEQUENCE: u32 = 8u;

@@ -11,11 +11,11 @@ use super::progress::short;
 use super::scene::SceneArgs;
 use crate::cube::Header;
 use crate::files::format_bytes;
-use crate::gpu::adapter::Gpu;
+use crate::gpu::adapter::{Gpu, Selection};
 use crate::render::plan;
 use crate::render::prepare::Prepared;
 use crate::render::schedule::StopRule;
-use crate::render::wave::WavePlan;
+use crate::render::wave::{Budget, WavePlan};
 use crate::render::worker::Worker;
 use crate::scene::Scene;
 use crate::{Error, Result};
@@ -28,10 +28,21 @@ use crate::{Error, Result};
 #[command(after_long_help = "\
 Examples:
   spectile plan scene.toml
-  spectile plan scene.toml --size 4096x4096 --set channels.equal.count=2000 --spp 256")]
+  spectile plan scene.toml --size 4096x4096 --set channels.equal.count=2000 --spp 256
+  spectile plan scene.toml --devices 2 --memory 512MiB")]
 pub struct Args {
     #[command(flatten)]
     pub scene: SceneArgs,
+
+    /// Devices to plan for: all, a number, or positions as `spectile devices` lists them
+    ///
+    /// As for `render`. All of them are tried at the same time.
+    #[arg(long, value_name = "all|N|LIST", default_value = "all")]
+    pub devices: Selection,
+
+    /// Memory to use on each device, as for `render`
+    #[arg(long, value_name = "SIZE", value_parser = crate::files::parse_bytes)]
+    pub memory: Option<u64>,
 
     /// Samples per pixel to predict the time for, rounded up as by `render`
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
@@ -54,25 +65,26 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     let samples = stop.samples_limit(scene.integrator.epoch)?.unwrap_or(args.spp);
     let tile = plan::tile_size(&scene, args.scene.tile);
     let header = plan::header(&scene, tile, 0);
+    let budget = Budget { memory: args.memory, paths: None };
     // Without a device there is no prediction, but still a plan.
-    let measured = match Gpu::open() {
-        Ok(gpu) => Some(measure(gpu, &prepared, &scene, tile)?),
+    let measured = match Gpu::open_all(&args.devices) {
+        Ok(gpus) => measure_all(gpus, &prepared, &scene, tile, budget, output)?,
         Err(error @ Error::NoDevice(_)) => {
             say(&format!("warning: {error}"));
-            None
+            Vec::new()
         }
         Err(error) => return Err(error),
     };
-    let waves = match &measured {
+    let waves = match measured.first() {
         Some(m) => m.waves,
-        None => plan::waves_without_device(&prepared, tile)?,
+        None => plan::waves_without_device(&prepared, tile, budget)?,
     };
     let plan = Plan { args, samples, prepared: &prepared, header, waves, measured };
     output.event("done", plan.facts())?;
     output.text(&plan.describe())
 }
 
-/// What a short trial on the device told.
+/// What a short trial on a device told.
 struct Measured {
     device: String,
     waves: WavePlan,
@@ -81,13 +93,46 @@ struct Measured {
     paths_per_s: f64,
 }
 
+/// Tries all devices at the same time, as they will work. Those that cannot hold the scene are left out with a warning,
+/// unless none can.
+fn measure_all(
+    gpus: Vec<Gpu>,
+    prepared: &Arc<Prepared>,
+    scene: &Scene,
+    tile: [u32; 2],
+    budget: Budget,
+    output: &Output,
+) -> Result<Vec<Measured>> {
+    let tried: Vec<_> = std::thread::scope(|threads| {
+        let trial = |gpu| threads.spawn(move || measure(gpu, prepared, scene, tile, budget));
+        let trials: Vec<_> = gpus.into_iter().map(trial).collect();
+        trials.into_iter().map(|t| t.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
+    });
+    let (mut measured, mut refused) = (Vec::new(), Vec::new());
+    for (device, result) in tried.into_iter().enumerate() {
+        match result {
+            Ok(m) => measured.push(m),
+            Err(error) => refused.push((device + 1, error)),
+        }
+    }
+    if measured.is_empty() && !refused.is_empty() {
+        return Err(refused.swap_remove(0).1);
+    }
+    for (device, error) in refused {
+        let what = format!("device {device} is left out: {error}");
+        say(&format!("warning: {what}"));
+        output.event("warning", json!({ "message": what }))?;
+    }
+    Ok(measured)
+}
+
 /// Renders a few samples of a tile in the middle of the picture, after one that compiles everything.
-fn measure(gpu: Gpu, prepared: &Arc<Prepared>, scene: &Scene, tile: [u32; 2]) -> Result<Measured> {
+fn measure(gpu: Gpu, prepared: &Arc<Prepared>, scene: &Scene, tile: [u32; 2], budget: Budget) -> Result<Measured> {
     const SAMPLES: u32 = 16;
     const TRIAL: Duration = Duration::from_millis(500);
     let started = Instant::now();
     let device = gpu.name.clone();
-    let mut worker = Worker::new(gpu, Arc::clone(prepared), tile, None)?;
+    let mut worker = Worker::new(gpu, Arc::clone(prepared), tile, budget)?;
     let [width, height] = scene.film.cube_size();
     let [x, y] = [(width - tile[0]) / 2 + scene.film.crop[0], (height - tile[1]) / 2 + scene.film.crop[1]];
     let unit = [x, y, x + tile[0], y + tile[1]];
@@ -112,8 +157,9 @@ struct Plan<'a> {
     samples: u32,
     prepared: &'a Prepared,
     header: Header,
+    /// Of the first device, or of one that is not there.
     waves: WavePlan,
-    measured: Option<Measured>,
+    measured: Vec<Measured>,
 }
 
 impl Plan<'_> {
@@ -121,12 +167,29 @@ impl Plan<'_> {
         self.header.size.iter().map(|&s| f64::from(s)).product::<f64>() * f64::from(self.samples)
     }
 
+    /// Of all devices together.
+    fn paths_per_s(&self) -> Option<f64> {
+        self.measured.iter().map(|m| m.paths_per_s).reduce(|a, b| a + b)
+    }
+
     fn predicted_s(&self) -> Option<f64> {
-        self.measured.as_ref().map(|m| m.setup_s + self.paths() / m.paths_per_s)
+        let setup_s = self.measured.iter().map(|m| m.setup_s).reduce(f64::max)?;
+        Some(setup_s + self.paths() / self.paths_per_s()?)
     }
 
     fn facts(&self) -> Value {
-        let memory = plan::memory(self.prepared, &self.waves, &self.header);
+        let host = plan::host_memory(self.prepared, &self.header);
+        let devices = self.measured.iter().map(|m| {
+            json!({
+                "name": m.device,
+                "wave_paths": m.waves.paths,
+                "wave_units": m.waves.units,
+                "scene_bytes": m.waves.scene_bytes,
+                "wave_bytes": m.waves.wave_bytes(),
+                "transfer_bytes": 2 * m.waves.staging_bytes(),
+                "paths_per_s": m.paths_per_s,
+            })
+        });
         let features = plan::feature_lines(self.prepared, &self.waves);
         let features = features.iter().map(|f| json!({ "name": f.name, "used": f.used, "effect": f.effect }));
         json!({
@@ -142,12 +205,15 @@ impl Plan<'_> {
             "emitters": self.prepared.emitters.len(),
             "wave_paths": self.waves.paths,
             "path_bytes": self.waves.path_bytes(),
-            "device_scene_bytes": memory.scene,
-            "device_wave_bytes": memory.waves,
-            "host_scene_bytes": memory.scene,
-            "disk_bytes": memory.disk,
-            "device": self.measured.as_ref().map(|m| m.device.clone()),
-            "paths_per_s": self.measured.as_ref().map(|m| m.paths_per_s),
+            "device_scene_bytes": self.waves.scene_bytes,
+            "device_wave_bytes": self.waves.wave_bytes(),
+            "device_budget_bytes": self.args.memory,
+            "devices": devices.collect::<Vec<_>>(),
+            "host_scene_bytes": host.scene,
+            "host_merge_bytes": host.merge,
+            "disk_bytes": self.header.store_bytes(),
+            "device": self.measured.first().map(|m| m.device.clone()),
+            "paths_per_s": self.paths_per_s(),
             "samples": self.samples,
             "predicted_s": self.predicted_s(),
         })
@@ -155,7 +221,6 @@ impl Plan<'_> {
 
     fn describe(&self) -> String {
         let (p, header) = (self.prepared, &self.header);
-        let memory = plan::memory(p, &self.waves, header);
         let [width, height] = header.size;
         let mut text = format!(
             "picture   {width} x {height} pixels x {} channels, {} tiles of {} x {}\n",
@@ -184,23 +249,44 @@ impl Plan<'_> {
                 b.pointwise, b.mean
             );
         }
+        let budget =
+            self.args.memory.map_or_else(|| "without a budget".to_owned(), |b| format!("of {}", format_bytes(b)));
+        let device = |name: &str, w: &WavePlan| {
+            format!(
+                "device    {name}: {} {budget}: {} for the scene, {} for waves of {} paths ({} bytes a path) in {} tiles at \
+                 most, two transfers of {} included\n",
+                format_bytes(w.device_bytes()),
+                format_bytes(w.scene_bytes),
+                format_bytes(w.wave_bytes()),
+                w.paths,
+                w.path_bytes(),
+                w.units,
+                format_bytes(w.staging_bytes())
+            )
+        };
+        for m in &self.measured {
+            text += &device(&m.device, &m.waves);
+        }
+        if self.measured.is_empty() {
+            text += &device("a common GPU", &self.waves);
+        }
+        let host = plan::host_memory(p, header);
         text += &format!(
-            "device    {} for the scene, {} for waves of {} paths ({} bytes a path)\n",
-            format_bytes(memory.scene),
-            format_bytes(memory.waves),
-            self.waves.paths,
-            self.waves.path_bytes()
+            "host      {} for the scene, {} a device to merge; units are merged from the devices' transfers\n",
+            format_bytes(host.scene),
+            format_bytes(host.merge)
         );
-        text += &format!("host      {} for the scene, 1 MiB to merge\n", format_bytes(memory.scene));
-        text += &format!("disk      {}\n", format_bytes(memory.disk));
-        match (&self.measured, self.predicted_s()) {
-            (Some(m), Some(seconds)) => {
+        text += &format!("disk      {}\n", format_bytes(header.store_bytes()));
+        match (self.paths_per_s(), self.predicted_s()) {
+            (Some(paths_per_s), Some(seconds)) => {
                 text += &format!(
-                    "time      {} for {} samples per pixel on {} ({:.0} paths/s)\n",
+                    "time      {} for {} samples per pixel on {} ({paths_per_s:.0} paths/s)\n",
                     short(Duration::from_secs_f64(seconds)),
                     self.samples,
-                    m.device,
-                    m.paths_per_s
+                    match self.measured.as_slice() {
+                        [only] => only.device.clone(),
+                        several => format!("{} devices", several.len()),
+                    },
                 );
             }
             _ => text += "time      unknown without a device\n",

@@ -91,6 +91,14 @@ pub struct Args {
     #[arg(long, value_name = "all|N|LIST", default_value = "all")]
     pub devices: Selection,
 
+    /// Memory to use on each device, such as 512MiB, 2GiB, 1.5GB or a number of bytes; else what is worth using
+    ///
+    /// It covers all that Spectile holds there: the scene, the paths under way, a tile or several with all channels, and
+    /// two transfers. A small budget makes small steps and changes no bit of the cube; what does not fit at all is refused,
+    /// and says what the least is. `spectile plan` says what would be used.
+    #[arg(long, value_name = "SIZE", value_parser = crate::files::parse_bytes)]
+    pub memory: Option<u64>,
+
     /// Keep a picture of the cube as it grows (PNG, 8-bit sRGB)
     #[arg(long, value_name = "FILE.png")]
     pub preview: Option<PathBuf>,
@@ -138,6 +146,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         preview: args.preview.clone().map(|file| Preview { file, exposure: args.exposure }),
         profile: args.profile,
         devices: args.devices.clone(),
+        memory: args.memory,
         scene,
     };
     reporter.start(&job)?;

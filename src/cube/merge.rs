@@ -37,6 +37,18 @@ fn merged(old: f64, new: f64, weight: f64) -> f32 {
     (old + (new - old) * weight) as f32
 }
 
+/// What merging a unit into a cube of `header` holds in memory at most, bytes: the unit and the old chunk apart, which are
+/// where the device and the file have them.
+pub fn merge_bytes(header: &super::Header) -> u64 {
+    let grid = header.grid();
+    let channels = header.channels.len() as u64;
+    let [blocks_x, blocks_y] = grid.tile_blocks().map(u64::from);
+    let buffer = (BUFFER_BYTES as u64).max(4 * channels);
+    // Error sums and a spectrum of squares: two f64 a channel as they were, and two as they become.
+    let sums = 4 * 8 * channels;
+    buffer + sums + 12 * grid.tile_pixels() as u64 + (8 * blocks_x + 4 * blocks_x * blocks_y) * channels
+}
+
 /// One pass over the pixels of a unit: the new chunk streams out, and all that is derived from it is gathered.
 pub(super) struct Fold<'a> {
     grid: Grid,

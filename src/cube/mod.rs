@@ -36,7 +36,7 @@ pub use create::{Existing, check_target};
 pub use epochs::{epoch_samples, epochs_in, samples_before, whole_epochs};
 pub use grid::{Grid, Rect};
 pub use map::Chunk;
-pub use merge::merge_means;
+pub use merge::{merge_bytes, merge_means};
 pub use metadata::{FORMAT, Header};
 pub use preview::reduction;
 pub use store::{Cube, Progress};

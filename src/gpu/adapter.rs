@@ -105,7 +105,7 @@ pub fn list() -> Vec<AdapterFacts> {
     sorted_adapters(&instance()).iter().map(facts).collect()
 }
 
-/// GPUs first, each through as many backends as list it; the order is the same in every Instance.
+/// GPUs first, each through as many backends as list it.
 fn sorted_adapters(instance: &wgpu::Instance) -> Vec<wgpu::Adapter> {
     let mut adapters = adapters(instance);
     adapters.sort_by_key(|a| rank(&a.get_info()));
@@ -191,6 +191,15 @@ fn usable_once(listed: &[AdapterFacts]) -> Vec<usize> {
     if gpus.is_empty() { of(true) } else { gpus }
 }
 
+/// Where `now`, what another Instance lists, has the adapter `listed[index]`: by name, backend, and position among
+/// those alike, since an adapter may come or go between two Instances.
+fn same_adapter(listed: &[AdapterFacts], index: usize, now: &[AdapterFacts]) -> Option<usize> {
+    let wanted = &listed[index];
+    let alike = |facts: &AdapterFacts| facts.name == wanted.name && facts.backend == wanted.backend;
+    let position = listed[..index].iter().filter(|facts| alike(facts)).count();
+    (0..now.len()).filter(|&i| alike(&now[i])).nth(position)
+}
+
 impl Gpu {
     /// Opens the best usable adapter: a GPU where there is one, else the software driver.
     pub fn open() -> Result<Gpu> {
@@ -201,14 +210,19 @@ impl Gpu {
     pub fn open_all(selection: &Selection) -> Result<Vec<Gpu>> {
         let listed = list();
         let chosen = selection.choose(&listed)?;
-        chosen.into_iter().map(|index| Self::open_index(index, &listed[index].name)).collect()
+        chosen.into_iter().map(|index| Self::open_like(&listed, index)).collect()
     }
 
-    /// Opens adapter `index` of [`list`], which must still be called `name`.
-    fn open_index(index: usize, name: &str) -> Result<Gpu> {
+    /// Opens the adapter that `listed[index]` describes, in an Instance of its own.
+    fn open_like(listed: &[AdapterFacts], index: usize) -> Result<Gpu> {
         let instance = instance();
-        let adapter = sorted_adapters(&instance).into_iter().nth(index).filter(|a| a.get_info().name == name);
-        let adapter = adapter.ok_or_else(|| Error::NoDevice(format!("{name}: is not there any more")))?;
+        let mut adapters = sorted_adapters(&instance);
+        let now: Vec<AdapterFacts> = adapters.iter().map(facts).collect();
+        let wanted = &listed[index];
+        let found = same_adapter(listed, index, &now).ok_or_else(|| {
+            Error::NoDevice(format!("{} through {} is not there any more: try again", wanted.name, wanted.backend))
+        })?;
+        let adapter = adapters.swap_remove(found);
         let info = adapter.get_info();
         let wanted = wgpu::Features::TIMESTAMP_QUERY;
         let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
@@ -314,5 +328,17 @@ mod tests {
         assert_eq!(Selection::List(vec![7]).choose(&listed).unwrap_err().exit_code(), 3);
         assert_eq!(Selection::All.choose(&listed[6..]).unwrap(), [0]);
         assert_eq!(Selection::All.choose(&[]).unwrap_err().exit_code(), 3);
+    }
+
+    /// Adapters that come or go between two Instances do not make a device another one.
+    #[test]
+    fn an_adapter_is_found_again_in_another_instance() {
+        let [a, b, a_dx] = [("A", "vulkan"), ("B", "vulkan"), ("A", "dx12")].map(|(n, w)| adapter(n, w, false, None));
+        let listed = [a.clone(), b.clone(), a.clone(), a_dx.clone()];
+        let now = [b.clone(), a_dx.clone(), a.clone(), a.clone()];
+        assert_eq!([0, 1, 2, 3].map(|i| same_adapter(&listed, i, &now)), [Some(2), Some(0), Some(3), Some(1)]);
+        // One of two equals is gone: the first is still there, the second is not.
+        let fewer = [b, a];
+        assert_eq!([0, 2].map(|i| same_adapter(&listed, i, &fewer)), [Some(1), None]);
     }
 }

@@ -8,29 +8,36 @@ use crate::{Error, Result};
 /// How long one submission may take before the device counts as hung.
 const TIMEOUT: Duration = Duration::from_secs(600);
 
-/// A storage buffer holding `data`; empty data gives the smallest buffer that can be bound.
-pub fn storage<T: bytemuck::NoUninit>(gpu: &Gpu, label: &str, data: &[T]) -> wgpu::Buffer {
+/// The most that is under way to the device at a time: wgpu keeps a copy of what is written until it has arrived.
+pub const PIECE_BYTES: u64 = 4 << 20;
+
+/// What wgpu and drivers take on every device beside the buffers asked for: a buffer of zeros (512 KiB), and alignment.
+pub const WGPU_BYTES: u64 = 576 << 10;
+
+/// A storage buffer holding `data`, which has arrived; empty data gives the smallest buffer that can be bound.
+pub fn storage<T: bytemuck::NoUninit>(gpu: &Gpu, label: &str, data: &[T]) -> Result<wgpu::Buffer> {
     let bytes: &[u8] = bytemuck::cast_slice(data);
     let buffer = empty(gpu, label, bytes.len() as u64, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST);
-    // In pieces: each `write_buffer` keeps a host copy until the device has taken it.
-    for (i, piece) in bytes.chunks(16 << 20).enumerate() {
-        gpu.queue.write_buffer(&buffer, (i as u64) * (16 << 20), piece);
-        if bytes.len() > 16 << 20 {
-            gpu.queue.submit([]);
-            let _ = gpu.device.poll(wgpu::PollType::wait_indefinitely());
-        }
+    for (i, piece) in bytes.chunks(PIECE_BYTES as usize).enumerate() {
+        gpu.queue.write_buffer(&buffer, i as u64 * PIECE_BYTES, piece);
+        wait(gpu, gpu.queue.submit([]))?;
     }
-    buffer
+    Ok(buffer)
 }
 
-/// A buffer of `size` bytes, at least 16 and a multiple of 16, with undefined (by wgpu: zero) content.
+/// A buffer of `size` bytes, [`allocated`], with undefined (by wgpu: zero) content.
 pub fn empty(gpu: &Gpu, label: &str, size: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
     gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some(label),
-        size: size.max(16).next_multiple_of(16),
+        size: allocated(size),
         usage,
         mapped_at_creation: false,
     })
+}
+
+/// Bytes that a buffer for `size` bytes takes: at least 16 and a multiple of 16.
+pub fn allocated(size: u64) -> u64 {
+    size.max(16).next_multiple_of(16)
 }
 
 /// Waits until a submission is done.

@@ -23,8 +23,8 @@ pub struct Frame {
     pub environment_pick: f32,
     pub environment_spectrum: u32,
     pub max_records: u32,
-    pub channels: u32,
     pub stratum_bits: u32,
+    pub unused: u32,
 }
 
 /// `Wave` in WGSL: one range of samples of the pixels of one or several units of one epoch.
@@ -40,6 +40,7 @@ pub struct Wave {
     pub tile_pixels: u32,
     pub epoch: u32,
     pub epoch_mask: u32,
+    pub sequence: u32,
 }
 
 /// `Step` in WGSL: one dispatch of a wave.
@@ -101,8 +102,40 @@ pub struct Counters {
     pub negative: u32,
     pub bad_slot: u32,
     pub bad_sample: u32,
-    pub rays: u32,
-    pub unused: [u32; 2],
+    pub rays_low: u32,
+    pub rays_high: u32,
+    pub folded: u32,
+    pub sequence: u32,
+}
+
+/// What the counters of a submission must show if every kernel ran.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Proof {
+    /// Camera paths of the pixels in the image: each traces at least one ray.
+    pub paths: u64,
+    /// Samples of all pixel slots, times the workgroups that share a pixel.
+    pub folded: u64,
+    /// Of the last wave.
+    pub sequence: u64,
+}
+
+impl Counters {
+    pub fn rays(&self) -> u64 {
+        u64::from(self.rays_high) << 32 | u64::from(self.rays_low)
+    }
+
+    /// What a kernel left out, if one did: drivers have dropped work without a word.
+    pub fn missing(&self, proof: &Proof) -> Option<String> {
+        if self.sequence != proof.sequence as u32 {
+            Some(format!("its last wave is number {}, not {}", self.sequence, proof.sequence as u32))
+        } else if self.folded != proof.folded as u32 {
+            Some(format!("{} samples are folded, not {} (modulo 2^32)", self.folded, proof.folded as u32))
+        } else if self.rays() < proof.paths {
+            Some(format!("{} rays were traced for {} camera paths", self.rays(), proof.paths))
+        } else {
+            None
+        }
+    }
 }
 
 #[cfg(test)]
@@ -151,8 +184,8 @@ mod tests {
             environment_pick,
             environment_spectrum,
             max_records,
-            channels,
-            stratum_bits
+            stratum_bits,
+            unused
         });
         same_layout!(Wave {
             path_count,
@@ -163,12 +196,40 @@ mod tests {
             tile_width,
             tile_pixels,
             epoch,
-            epoch_mask
+            epoch_mask,
+            sequence
         });
         same_layout!(Step { bounce });
         same_layout!(Emitter { primitive, spectrum, pick, area });
         same_layout!(Material { factor, two_sided, albedo, unused });
         assert_eq!(size_of::<Primitive>(), 48);
-        assert_eq!(offset_of!(Counters, rays) / 4, 5);
+        let constants = [
+            ("COUNTER_OVERFLOW", offset_of!(Counters, overflow)),
+            ("COUNTER_NON_FINITE", offset_of!(Counters, non_finite)),
+            ("COUNTER_NEGATIVE", offset_of!(Counters, negative)),
+            ("COUNTER_BAD_SLOT", offset_of!(Counters, bad_slot)),
+            ("COUNTER_BAD_SAMPLE", offset_of!(Counters, bad_sample)),
+            ("COUNTER_RAYS", offset_of!(Counters, rays_low)),
+            ("COUNTER_RAYS_HIGH", offset_of!(Counters, rays_high)),
+            ("COUNTER_FOLDED", offset_of!(Counters, folded)),
+            ("COUNTER_SEQUENCE", offset_of!(Counters, sequence)),
+        ];
+        for (name, offset) in constants {
+            let declared = format!("const {name}: u32 = {}u;", offset / 4);
+            assert!(include_str!("../../shaders/common/types.wgsl").contains(&declared), "{declared}");
+        }
+    }
+
+    #[test]
+    fn what_a_kernel_left_out_is_noticed() {
+        let proof = Proof { paths: 100, folded: (1 << 32) + 128, sequence: (1 << 32) + 7 };
+        let done = Counters { rays_low: 100, folded: 128, sequence: 7, ..Counters::default() };
+        assert_eq!(done.missing(&proof), None);
+        assert_eq!(Counters { rays_low: 0, rays_high: 1, ..done }.missing(&proof), None);
+        let missing = |counters: Counters| counters.missing(&proof).expect("something is missing");
+        assert!(missing(Counters::default()).contains("last wave is number 0, not 7"));
+        assert!(missing(Counters { sequence: 6, ..done }).contains("number 6"));
+        assert!(missing(Counters { folded: 64, ..done }).contains("64 samples are folded, not 128"));
+        assert!(missing(Counters { rays_low: 99, ..done }).contains("99 rays"));
     }
 }

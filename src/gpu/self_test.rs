@@ -18,7 +18,7 @@ const SEED: u64 = 0x0123_4567_89ab_cdef;
 pub fn run(gpu: &Gpu) -> Result<()> {
     let source = shader::compose(&[shader::RNG, shader::SELF_TEST], &Defines::default());
     let pass = Pass::new(gpu, &source)?;
-    let input = buffer::storage(gpu, "self-test input", &[LOOP_LIMIT, SEED as u32, (SEED >> 32) as u32, NAN_BITS]);
+    let input = buffer::storage(gpu, "self-test input", &[LOOP_LIMIT, SEED as u32, (SEED >> 32) as u32, NAN_BITS])?;
     let size = u64::from(LANES) * WORDS as u64 * 4;
     let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
     let results = buffer::empty(gpu, "self-test results", size, usage);

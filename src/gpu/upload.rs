@@ -14,8 +14,6 @@ const MAX_WINDOWS: u64 = 4;
 /// Buffers of group 0 and the spectral tables, found by their WGSL names.
 pub struct SceneBuffers {
     named: Vec<(String, wgpu::Buffer)>,
-    /// Sum of all sizes, bytes.
-    pub bytes: u64,
 }
 
 /// How many windows of how many elements, with bindings of at most `binding` bytes.
@@ -55,41 +53,52 @@ fn check_size(name: &str, bytes: u64, limits: &wgpu::Limits) -> Result<()> {
     )))
 }
 
+/// The scene's storage buffers: their names in WGSL and their content.
+fn parts<'a>(prepared: &'a Prepared, windows: &Windows) -> Vec<(String, &'a [u8])> {
+    let tables = &prepared.tables;
+    let mut parts: Vec<(String, &[u8])> = vec![
+        ("materials".into(), bytemuck::cast_slice(&prepared.materials)),
+        ("emitters".into(), bytemuck::cast_slice(&prepared.emitters)),
+        ("emitter_cdf".into(), bytemuck::cast_slice(&prepared.picks.cdf)),
+        ("spectra".into(), bytemuck::cast_slice(&tables.strata)),
+    ];
+    let mut add_windows = |name: &str, list: WindowList, bytes: &'a [u8], element: u64| {
+        for i in 0..u64::from(list.count) {
+            let size = u64::from(list.size) * element;
+            let end = ((i + 1) * size).min(bytes.len() as u64);
+            parts.push((format!("{name}_{i}"), &bytes[(i * size) as usize..end as usize]));
+        }
+    };
+    add_windows("nodes", windows.nodes, bytemuck::cast_slice(&prepared.accel.nodes), NODE_BYTES);
+    add_windows("primitives", windows.primitives, bytemuck::cast_slice(&prepared.accel.primitives), PRIMITIVE_BYTES);
+    if prepared.features.knots {
+        parts.push(("knot_starts".into(), bytemuck::cast_slice(&tables.knot_starts)));
+        parts.push(("knots".into(), bytemuck::cast_slice(&tables.knots)));
+    }
+    parts
+}
+
+/// What the scene takes on a device, bytes.
+pub fn scene_bytes(prepared: &Prepared, windows: &Windows) -> u64 {
+    let frame = buffer::allocated(size_of_val(&prepared.frame) as u64);
+    frame + parts(prepared, windows).iter().map(|(_, bytes)| buffer::allocated(bytes.len() as u64)).sum::<u64>()
+}
+
 impl SceneBuffers {
-    /// Uploads the scene. Errors: spectra, materials or emitters that exceed one binding.
+    /// Uploads the scene. Errors: spectra, materials or emitters that exceed one binding; a device that is lost, or whose
+    /// memory does not hold the scene.
     pub fn new(gpu: &Gpu, prepared: &Prepared, windows: &Windows) -> Result<SceneBuffers> {
-        let mut named = Vec::new();
         let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
         let frame = buffer::empty(gpu, "frame", size_of_val(&prepared.frame) as u64, usage);
         gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&prepared.frame));
-        named.push(("frame".into(), frame));
+        let mut named = vec![("frame".to_owned(), frame)];
         let limits = gpu.device.limits();
-        let mut add = |name: &str, bytes: &[u8]| {
-            check_size(name, bytes.len() as u64, &limits)?;
-            named.push((name.to_owned(), buffer::storage(gpu, name, bytes)));
-            Ok::<_, Error>(())
-        };
-        add("materials", bytemuck::cast_slice(&prepared.materials))?;
-        add("emitters", bytemuck::cast_slice(&prepared.emitters))?;
-        add("emitter_cdf", bytemuck::cast_slice(&prepared.picks.cdf))?;
-        let mut add_windows = |name: &str, list: WindowList, bytes: &[u8], element: u64| {
-            for i in 0..u64::from(list.count) {
-                let size = u64::from(list.size) * element;
-                let end = ((i + 1) * size).min(bytes.len() as u64);
-                add(&format!("{name}_{i}"), &bytes[(i * size) as usize..end as usize])?;
-            }
-            Ok::<_, Error>(())
-        };
-        add_windows("nodes", windows.nodes, bytemuck::cast_slice(&prepared.accel.nodes), NODE_BYTES)?;
-        let primitives = bytemuck::cast_slice(&prepared.accel.primitives);
-        add_windows("primitives", windows.primitives, primitives, PRIMITIVE_BYTES)?;
-        add("spectra", bytemuck::cast_slice(&prepared.tables.strata))?;
-        if prepared.features.knots {
-            add("knot_starts", bytemuck::cast_slice(&prepared.tables.knot_starts))?;
-            add("knots", bytemuck::cast_slice(&prepared.tables.knots))?;
+        for (name, bytes) in parts(prepared, windows) {
+            check_size(&name, bytes.len() as u64, &limits)?;
+            let buffer = buffer::storage(gpu, &name, bytes)?;
+            named.push((name, buffer));
         }
-        let bytes = named.iter().map(|(_, b)| b.size()).sum();
-        Ok(SceneBuffers { named, bytes })
+        Ok(SceneBuffers { named })
     }
 
     /// The binding for the variable `name`, if it is one of the scene's.

@@ -2,10 +2,10 @@
 
 use serde_json::{Map, Value, json};
 
-use crate::cube::{BLOCK, Header};
+use crate::cube::{self, BLOCK, Header};
 use crate::gpu::upload;
 use crate::render::prepare::{Features, Prepared};
-use crate::render::wave::{DeviceLimits, WavePlan};
+use crate::render::wave::{Budget, DeviceLimits, WavePlan};
 use crate::scene::Scene;
 use crate::{Error, Result};
 
@@ -91,25 +91,24 @@ pub fn feature_lines(prepared: &Prepared, waves: &WavePlan) -> Vec<FeatureLine> 
         ),
         line(
             "windowed geometry",
-            upload::windows(prepared, waves.binding).is_ok_and(|w| w.nodes.count > 1 || w.primitives.count > 1),
+            upload::windows(prepared, waves.limits.binding).is_ok_and(|w| w.nodes.count > 1 || w.primitives.count > 1),
             "a switch per load".into(),
         ),
     ]
 }
 
-/// Memory of a render, bytes.
+/// Memory of a render on the host, bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Memory {
-    /// The flattened scene, on the host and on every device: BVH, primitives, materials, lights, spectra.
+pub struct HostMemory {
+    /// The flattened scene: BVH, primitives, materials, lights, spectra.
     pub scene: u64,
-    /// Path buffers, means and staging on the device.
-    pub waves: u64,
-    /// The finished cube.
-    pub disk: u64,
+    /// What each device's thread holds while it merges. The units themselves are merged from where the device put them,
+    /// in its two transfers.
+    pub merge: u64,
 }
 
-/// Adds up what `prepared` takes with these waves and this cube.
-pub fn memory(prepared: &Prepared, waves: &WavePlan, header: &Header) -> Memory {
+/// Adds up what `prepared` and merging into a cube of `header` take.
+pub fn host_memory(prepared: &Prepared, header: &Header) -> HostMemory {
     let accel = &prepared.accel;
     let scene = size_of_val(accel.nodes.as_slice())
         + size_of_val(accel.primitives.as_slice())
@@ -119,12 +118,13 @@ pub fn memory(prepared: &Prepared, waves: &WavePlan, header: &Header) -> Memory 
         + size_of_val(prepared.tables.strata.as_slice())
         + size_of_val(prepared.tables.knots.as_slice())
         + size_of_val(prepared.tables.knot_starts.as_slice());
-    Memory { scene: scene as u64, waves: waves.device_bytes(), disk: header.store_bytes() }
+    HostMemory { scene: scene as u64, merge: cube::merge_bytes(header) }
 }
 
 /// Waves for a device that is not there: what a GPU of common limits would get.
-pub fn waves_without_device(prepared: &Prepared, tile: [u32; 2]) -> Result<WavePlan> {
-    WavePlan::new(prepared, tile, DeviceLimits { binding: 128 << 20, software: false, max_paths: None })
+pub fn waves_without_device(prepared: &Prepared, tile: [u32; 2], budget: Budget) -> Result<WavePlan> {
+    let limits = DeviceLimits { binding: 128 << 20, uniform_alignment: 256, software: false };
+    WavePlan::new(prepared, tile, limits, budget)
 }
 
 /// Refuses what cannot work, before anything is written.

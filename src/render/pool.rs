@@ -11,6 +11,7 @@ use crate::gpu::layout::Counters;
 use crate::gpu::self_test;
 use crate::render::prepare::Prepared;
 use crate::render::queue::{Group, Next, Queue};
+use crate::render::wave::Budget;
 use crate::render::worker::{Collected, Interrupt, Profile, UnitRect, Worker};
 use crate::{Error, Result};
 
@@ -23,6 +24,8 @@ pub struct Pool<'a> {
     pub tile: [u32; 2],
     /// Samples of a full epoch.
     pub full_epoch: u32,
+    /// Bytes of each device that may be used.
+    pub memory: Option<u64>,
     pub profile: bool,
     pub interrupt: &'a Arc<Interrupt>,
 }
@@ -44,8 +47,32 @@ struct Taken {
     collected: u32,
     /// The means of each tile over these, where several epochs are merged at once.
     means: Vec<Vec<f32>>,
-    counters: Counters,
+    tally: Tally,
     bad: Option<[u32; 4]>,
+}
+
+/// Sums of what the passes counted.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Tally {
+    pub rays: u64,
+    /// Samples of a channel that were not finite, and that were negative.
+    pub non_finite: u64,
+    pub negative: u64,
+}
+
+impl std::ops::AddAssign for Tally {
+    fn add_assign(&mut self, other: Tally) {
+        self.rays += other.rays;
+        self.non_finite += other.non_finite;
+        self.negative += other.negative;
+    }
+}
+
+impl From<Counters> for Tally {
+    fn from(counters: Counters) -> Tally {
+        let [non_finite, negative] = [counters.non_finite, counters.negative].map(u64::from);
+        Tally { rays: counters.rays(), non_finite, negative }
+    }
 }
 
 /// A group of units in the cube.
@@ -53,7 +80,7 @@ pub struct Merged {
     pub group: Group,
     /// Paths of the pixels in the image.
     pub paths: u64,
-    pub counters: Counters,
+    pub tally: Tally,
     /// Column, row, epoch and sample of a bad sample, where there was one.
     pub bad: Option<[u32; 4]>,
     /// Seconds that merging took, and since when the device has been without work, in all.
@@ -81,12 +108,13 @@ impl Pool<'_> {
 
     fn start(&self, gpu: Gpu, report: &impl Fn(Report)) -> Result<Worker> {
         self_test::run(&gpu)?;
-        let mut worker = Worker::new(gpu, Arc::clone(self.prepared), self.tile, None)?;
+        let budget = Budget { memory: self.memory, paths: None };
+        let mut worker = Worker::new(gpu, Arc::clone(self.prepared), self.tile, budget)?;
         worker.watch(self.interrupt);
         if self.profile {
             worker.enable_profile();
         }
-        report(Report::Ready { bytes: worker.device_bytes() });
+        report(Report::Ready { bytes: worker.plan.device_bytes() });
         Ok(worker)
     }
 
@@ -163,13 +191,13 @@ impl Pool<'_> {
                 self.cube().merge_unit(tile, n_before, samples, unit)?;
             }
         }
-        let Some(Taken { group, counters, bad, .. }) = taken.pop_front() else { return Ok(()) };
+        let Some(Taken { group, tally, bad, .. }) = taken.pop_front() else { return Ok(()) };
         self.queue.done(&group);
         let merged = u64::from(n_before + samples - samples_before(group.epoch, self.full_epoch));
         let grid = self.cube().cube().grid();
         let paths = group.tiles.iter().map(|&tile| grid.rect(tile).pixels() * merged).sum();
         let (merge_s, idle_s) = (began.elapsed().as_secs_f64(), collected.idle_s);
-        report(Report::Merged(Merged { group, paths, counters, bad, merge_s, idle_s }));
+        report(Report::Merged(Merged { group, paths, tally, bad, merge_s, idle_s }));
         Ok(())
     }
 
@@ -184,13 +212,11 @@ impl Pool<'_> {
 
 impl Taken {
     fn new(group: Group) -> Taken {
-        Taken { group, collected: 0, means: Vec::new(), counters: Counters::default(), bad: None }
+        Taken { group, collected: 0, means: Vec::new(), tally: Tally::default(), bad: None }
     }
 
     fn note(&mut self, counters: Counters, epoch: u32, bad_sample: impl FnOnce() -> [u32; 3]) {
-        self.counters.non_finite += counters.non_finite;
-        self.counters.negative += counters.negative;
-        self.counters.rays += counters.rays;
+        self.tally += counters.into();
         if counters.bad_sample > 0 && self.bad.is_none() {
             let [x, y, sample] = bad_sample();
             self.bad = Some([x, y, epoch, sample]);

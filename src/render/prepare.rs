@@ -306,8 +306,8 @@ fn frame(
         environment_spectrum,
         // Next-event estimation at every scattering event, and emission where a surface or the sky emits.
         max_records: bounces + if features.emitters { bounces + 1 } else { 1 },
-        channels: scene.channels.len() as u32,
         stratum_bits,
+        unused: 0,
     }
 }
 
@@ -322,6 +322,8 @@ mod tests {
             for quads in (1..300).chain([500, 512, 1250, 2500]) {
                 let s = EvaluateShape::new(quads, software);
                 let (threads, needed) = (s.lanes * s.blocks, quads.div_ceil(s.vectors));
+                // Each of a pixel's workgroups has channels: evaluation counts on that.
+                assert_eq!(quads.div_ceil(s.lanes * s.vectors), s.blocks, "{quads}: {s:?}");
                 assert!(threads >= needed && s.lanes * s.pixels <= 256, "{quads}: {s:?}");
                 assert!(threads < 2 * needed || threads < needed + width * s.blocks, "{quads}: {s:?}");
             }

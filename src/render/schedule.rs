@@ -1,6 +1,6 @@
 //! The render: epochs of the whole image, decided one after the other; devices that pull their units; what is known so far.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -14,9 +14,8 @@ use crate::cube::{
     Existing, Header, Writer, check_target, epoch_samples, epochs_in, reduction, samples_before, whole_epochs,
 };
 use crate::gpu::adapter::{Gpu, Selection};
-use crate::gpu::layout::Counters;
 use crate::render::plan;
-use crate::render::pool::{Merged, Pool, Report};
+use crate::render::pool::{Merged, Pool, Report, Tally};
 use crate::render::prepare::Prepared;
 use crate::render::queue::Queue;
 use crate::render::worker::{Interrupt, Profile, check_interrupt};
@@ -63,6 +62,8 @@ pub struct Job {
     pub preview: Option<Preview>,
     pub profile: bool,
     pub devices: Selection,
+    /// Bytes of each device that may be used.
+    pub memory: Option<u64>,
 }
 
 /// How far a render is.
@@ -117,7 +118,7 @@ pub struct Summary {
     pub device_bytes: u64,
     /// EV of the last preview written.
     pub exposure: Option<f64>,
-    pub counters: Counters,
+    pub tally: Tally,
 }
 
 impl StopRule {
@@ -169,6 +170,7 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
         cube: &cube,
         tile,
         full_epoch: job.scene.integrator.epoch,
+        memory: job.memory,
         profile: job.profile,
         interrupt,
     };
@@ -216,7 +218,7 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
         merge_s: render.merge_s,
         device_bytes: render.device_bytes,
         exposure: preview?,
-        counters: render.counters,
+        tally: render.tally,
         status: render.status,
     })
 }
@@ -269,7 +271,7 @@ struct Render<'a> {
     active: usize,
     /// Units merged of the current epoch and of those after it.
     merged: VecDeque<u32>,
-    counters: Counters,
+    tally: Tally,
     /// Column, row, epoch and sample of the first bad sample, for the report.
     first_bad: Option<[u32; 4]>,
     /// When the preview file may be rewritten.
@@ -311,19 +313,19 @@ impl<'a> Render<'a> {
                 devices,
             },
             merged: VecDeque::new(),
-            counters: Counters::default(),
+            tally: Tally::default(),
             first_bad: None,
             next_preview: None,
         }
     }
 
-    /// Waits until every device holds the scene, or has left.
+    /// Waits until every device holds the scene, or has left: one that cannot is left out, unless none can.
     fn wait_for_devices(
         &mut self,
         reports: &Receiver<(usize, Report)>,
         observe: &mut dyn FnMut(Event) -> Result<()>,
     ) -> Result<()> {
-        let mut ready = 0;
+        let (mut ready, mut refused) = (0, BTreeMap::new());
         while ready < self.active {
             let (device, report) = reports.recv().map_err(|_| no_cube())?;
             match report {
@@ -334,8 +336,22 @@ impl<'a> Render<'a> {
                     ready += 1;
                     self.device_bytes += bytes;
                 }
+                Report::Left {
+                    result: Err(error @ (Error::Usage(_) | Error::NoDevice(_) | Error::DevicesLost(_))),
+                } => {
+                    self.active -= 1;
+                    refused.insert(device, error);
+                }
                 report => self.left(device, report, observe)?,
             }
+        }
+        if ready == 0
+            && let Some((_, error)) = refused.pop_first()
+        {
+            return Err(error);
+        }
+        for (device, error) in refused {
+            observe(Event::Warning(format!("device {} is left out: {error}", device + 1)))?;
         }
         Ok(())
     }
@@ -472,12 +488,11 @@ impl<'a> Render<'a> {
         }
         self.merged.range_mut(epochs).for_each(|count| *count += merged.group.tiles.len() as u32);
         self.status.units.0 = self.merged[0];
-        self.counters.non_finite += merged.counters.non_finite;
-        self.counters.negative += merged.counters.negative;
+        self.tally += merged.tally;
         self.first_bad = self.first_bad.or(merged.bad);
         self.merge_s += merged.merge_s;
         self.status.paths += merged.paths;
-        self.status.rays += u64::from(merged.counters.rays);
+        self.status.rays += merged.tally.rays;
         self.update_clock();
         let rendering_s = self.status.rendering_s;
         let of_device = &mut self.status.devices[device];
@@ -543,8 +558,8 @@ impl<'a> Render<'a> {
             "paths": self.status.paths,
             "rays": self.status.rays,
             "samples": self.status.samples,
-            "non_finite_samples": self.counters.non_finite,
-            "negative_samples": self.counters.negative,
+            "non_finite_samples": self.tally.non_finite,
+            "negative_samples": self.tally.negative,
             "version": env!("CARGO_PKG_VERSION"),
         });
         let folder = cube.cube().path().join(".spectile");
@@ -555,7 +570,7 @@ impl<'a> Render<'a> {
     /// Bad samples are bugs, never silent.
     fn report_counters(&self, observe: &mut dyn FnMut(Event) -> Result<()>) -> Result<()> {
         let Some([x, y, epoch, sample]) = self.first_bad else { return Ok(()) };
-        let Counters { non_finite, negative, .. } = self.counters;
+        let Tally { non_finite, negative, .. } = self.tally;
         observe(Event::Warning(format!(
             "{non_finite} samples of a channel were not finite (counted as 0) and {negative} were negative (counted as they \
              are), first seen in pixel {x} {y}, epoch {epoch}, up to sample {sample}: this is a bug in Spectile, please report it \

@@ -1,7 +1,10 @@
 //! How a unit, or several, is cut into waves: never so that it changes a bit of the result.
 
-use crate::gpu::layout::{Step, Wave};
+use crate::files::format_bytes;
+use crate::gpu::buffer;
+use crate::gpu::layout::{Counters, Step, Wave};
 use crate::gpu::self_test::LOOP_LIMIT;
+use crate::gpu::upload;
 use crate::render::prepare::Prepared;
 use crate::{Error, Result};
 
@@ -12,16 +15,30 @@ const HEAD_BYTES: u64 = 8;
 const QUEUE_BYTES: u64 = 8;
 const THROUGHPUT_BYTES: u64 = 4;
 const RECORD_BYTES: u64 = 8;
+/// Bytes of a unit's rectangle.
+const UNIT_BYTES: u64 = 16;
+
+/// Paths of the smallest waves: a few workgroups. With fewer, dispatches cost more than what they do.
+const LEAST_PATHS: u64 = 256;
 
 /// What a device allows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DeviceLimits {
     /// Largest binding, bytes.
     pub binding: u64,
+    /// Distance of uniforms that one binding shows in turn, bytes.
+    pub uniform_alignment: u32,
     /// Software devices work best on waves that stay in the processor's caches; GPUs need many paths to be full.
     pub software: bool,
-    /// Upper bound on paths per wave, for tests and small memories.
-    pub max_paths: Option<u32>,
+}
+
+/// What a device may be used for: bounds on the waves that the device itself does not set.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Budget {
+    /// Scene, path buffers, means and transfers together, bytes.
+    pub memory: Option<u64>,
+    /// Paths of a wave (tests).
+    pub paths: Option<u32>,
 }
 
 /// Sizes of the waves and of their buffers.
@@ -36,15 +53,18 @@ pub struct WavePlan {
     /// Most units of one wave.
     pub units: u32,
     pub channels: u32,
+    pub max_bounces: u32,
     pub max_records: u32,
     pub roulette: bool,
-    /// Largest binding of the device, bytes.
-    pub binding: u64,
+    pub limits: DeviceLimits,
+    /// The scene on the device, bytes.
+    pub scene_bytes: u64,
 }
 
 impl WavePlan {
-    /// Errors: a tile whose channels, or a path whose records, exceed what the device can bind.
-    pub fn new(prepared: &Prepared, tile: [u32; 2], limits: DeviceLimits) -> Result<WavePlan> {
+    /// The largest waves that are worth it and fit. Errors: a tile whose channels, or a path whose records, exceed what
+    /// the device can bind; a scene of more windows than bindings; a budget that does not hold the smallest waves.
+    pub fn new(prepared: &Prepared, tile: [u32; 2], limits: DeviceLimits, budget: Budget) -> Result<WavePlan> {
         let (channels, records) = (prepared.channels as u64, u64::from(prepared.max_records()));
         let tile_pixels = u64::from(tile[0]) * u64::from(tile[1]);
         let tile_bytes = tile_pixels * channels * 4;
@@ -58,34 +78,79 @@ impl WavePlan {
                 limits.binding >> 20
             )));
         }
-        // Measured: on lavapipe 16 k to 64 k paths are alike, fewer pay for dispatches and more for cache misses; a GPU
-        // wants a few hundred thousand threads in flight. Many channels lengthen evaluation: keep a dispatch near 200 ms.
-        let wanted: u64 =
-            if limits.software { (1 << 15).min((1 << 26) / channels) } else { (1 << 20).min((1 << 31) / channels) };
         let bindable = limits.binding / (RECORD_BYTES * records).max(STATE_BYTES);
-        let mut paths = wanted.max(256).min(bindable);
-        if let Some(max) = limits.max_paths {
-            paths = paths.min(u64::from(max));
-        }
-        if paths == 0 {
+        let most = bindable.min(budget.paths.map_or(u64::MAX, u64::from));
+        if most == 0 {
             return Err(Error::Usage(
                 "a single path exceeds what this device binds: lower integrator.max_bounces".into(),
             ));
         }
-        // One invocation of `evaluate` walks all samples of a pixel.
-        let samples = (u64::from(LOOP_LIMIT) / (records + 1)).clamp(1, 64).min(paths);
-        let by_memory = (if limits.software { 32 << 20 } else { 128 << 20 }) / tile_bytes;
-        let units = (paths / tile_pixels).min(by_memory).max(1);
-        Ok(WavePlan {
+        let windows = upload::windows(prepared, limits.binding)?;
+        let mut plan = WavePlan {
             tile,
-            paths: paths as u32,
-            samples: 1 << samples.ilog2(),
-            units: units as u32,
+            paths: LEAST_PATHS.min(most) as u32,
+            samples: 1,
+            units: 1,
             channels: channels as u32,
+            max_bounces: prepared.frame.max_bounces,
             max_records: records as u32,
             roulette: prepared.features.roulette,
-            binding: limits.binding,
-        })
+            limits,
+            scene_bytes: upload::scene_bytes(prepared, &windows),
+        };
+        // What is left when the smallest waves have theirs goes to paths first, then to further units.
+        let mut left = match budget.memory {
+            None => u64::MAX,
+            Some(memory) if memory < plan.device_bytes() => return Err(plan.too_large_for(memory)),
+            Some(memory) => memory - buffer::WGPU_BYTES - plan.scene_bytes - plan.wave_bytes(),
+        };
+        let more_paths = (wanted_paths(limits.software, channels, records).min(most))
+            .saturating_sub(u64::from(plan.paths))
+            .min(left / plan.path_bytes());
+        // In fours, so that every buffer grows by exactly what its paths take, alignment included.
+        let more_paths = more_paths - more_paths % 4;
+        plan.paths += more_paths as u32;
+        left -= more_paths * plan.path_bytes();
+        plan.samples = plan.most_samples();
+
+        // Means and transfers are aligned once for all units.
+        let unit_bytes = UNIT_BYTES + 3 * plan.mean_bytes();
+        let left = left.saturating_sub(3 * 16);
+        let shared = (if limits.software { 32 << 20 } else { 128 << 20 }).min(limits.binding) / tile_bytes;
+        let units = (u64::from(plan.paths) / tile_pixels).min(shared).min(1 + left / unit_bytes);
+        plan.units = units.max(1) as u32;
+        Ok(plan)
+    }
+
+    /// Waves of half the size, or the smallest; `None` where these are the smallest already.
+    pub fn halved(&self) -> Option<WavePlan> {
+        let paths = (self.paths / 2).max(self.paths.min(LEAST_PATHS as u32));
+        let mut half = WavePlan { paths, units: (self.units / 2).max(1), ..*self };
+        half.samples = half.most_samples();
+        ((half.paths, half.units) != (self.paths, self.units)).then_some(half)
+    }
+
+    /// Samples per pixel of a wave: one invocation of `evaluate` walks all of them.
+    fn most_samples(&self) -> u32 {
+        let samples = (LOOP_LIMIT / (self.max_records + 1)).clamp(1, 64).min(self.paths);
+        1 << samples.ilog2()
+    }
+
+    fn too_large_for(&self, memory: u64) -> Error {
+        let [width, height] = self.tile;
+        let least = self.device_bytes();
+        Error::Usage(format!(
+            "{memory} bytes of memory do not hold this render on a device: the least is {least} bytes ({}), that is {} for \
+             the scene, {} for a tile of {width} x {height} pixels with {} channels and its two transfers, {} for {} paths at a \
+             time, and {} of wgpu's own: raise --memory, or choose a smaller --tile, fewer channels or fewer triangles",
+            format_bytes(least),
+            format_bytes(self.scene_bytes),
+            format_bytes(self.mean_bytes() + 2 * self.staging_bytes()),
+            self.channels,
+            format_bytes(u64::from(self.paths) * self.path_bytes()),
+            self.paths,
+            format_bytes(buffer::WGPU_BYTES),
+        ))
     }
 
     pub fn tile_pixels(&self) -> u32 {
@@ -118,9 +183,44 @@ impl WavePlan {
         u64::from(self.units) * u64::from(self.tile_pixels()) * u64::from(self.channels) * 4
     }
 
-    /// Everything but the scene that a device holds: path buffers, means, and two staging buffers of that size.
+    /// A staging buffer: the means of all units of a wave, and the counters.
+    pub fn staging_bytes(&self) -> u64 {
+        self.mean_bytes() + size_of::<Counters>() as u64
+    }
+
+    pub fn unit_list_bytes(&self) -> u64 {
+        u64::from(self.units) * UNIT_BYTES
+    }
+
+    /// Distance of the [`steps`] in their buffer.
+    pub fn step_stride(&self) -> u32 {
+        self.limits.uniform_alignment.max(16)
+    }
+
+    pub fn step_bytes(&self) -> u64 {
+        (u64::from(self.max_bounces) + 1) * u64::from(self.step_stride())
+    }
+
+    /// How long each list of paths under way became.
+    pub fn queue_length_bytes(&self) -> u64 {
+        (u64::from(self.max_bounces) + 1) * 4
+    }
+
+    /// Everything but the scene that a device holds: path buffers, means, and two staging buffers.
+    pub fn wave_bytes(&self) -> u64 {
+        let fixed =
+            [size_of::<Wave>() as u64, size_of::<Counters>() as u64, self.step_bytes(), self.queue_length_bytes()];
+        let by_paths = [self.state_bytes(), self.head_bytes(), self.record_bytes(), self.queue_bytes()];
+        let by_units = [self.unit_list_bytes(), self.mean_bytes(), self.staging_bytes(), self.staging_bytes()];
+        let throughputs = self.roulette.then(|| self.throughput_bytes());
+        let sizes = [fixed, by_paths, by_units];
+        sizes.iter().flatten().copied().chain(throughputs).map(buffer::allocated).sum()
+    }
+
+    /// The most that a device holds at any moment: the scene, and then the waves' buffers; before those are there, what
+    /// is on its way into the scene's. Code and the driver's own are not known.
     pub fn device_bytes(&self) -> u64 {
-        u64::from(self.paths) * self.path_bytes() + 3 * self.mean_bytes()
+        buffer::WGPU_BYTES + self.scene_bytes + self.wave_bytes().max(self.scene_bytes.min(buffer::PIECE_BYTES))
     }
 
     /// Bytes of one saved path, all its records included.
@@ -142,7 +242,7 @@ impl WavePlan {
         }
     }
 
-    /// The waves of `units` units of one epoch, in the order in which they must run.
+    /// The waves of `units` units of one epoch, in the order in which they must run; whoever runs them numbers them.
     pub fn waves(&self, units: u32, epoch: u32, epoch_samples: u32) -> Vec<Wave> {
         let pixels = units * self.tile_pixels();
         let samples = epoch_samples.min(self.samples);
@@ -161,11 +261,23 @@ impl WavePlan {
                     tile_pixels: self.tile_pixels(),
                     epoch,
                     epoch_mask: epoch_samples - 1,
+                    sequence: 0,
                 });
             }
         }
         waves
     }
+}
+
+/// Paths of a wave where memory does not matter.
+///
+/// Measured: on lavapipe 16 k to 64 k paths are alike, fewer pay for dispatches and more for cache misses; a GPU wants a
+/// few hundred thousand threads in flight. Many channels and long paths lengthen evaluation, at most paths x channels x
+/// records: on lavapipe 0.6 ns each on one slow core, of a modest GPU 4e10 a second are assumed, so that a dispatch ends
+/// within about 200 ms (GPU watchdogs, DESIGN section 7).
+fn wanted_paths(software: bool, channels: u64, records: u64) -> u64 {
+    let (most, evaluations) = if software { (1 << 15, 1 << 29) } else { (1 << 20, 1 << 33) };
+    (evaluations / (channels * records)).clamp(LEAST_PATHS, most)
 }
 
 /// The dispatches of a wave, one a bounce, and the one that sees what the last direction meets.
@@ -176,9 +288,109 @@ pub fn steps(max_bounces: u32) -> Vec<Step> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Sides;
+    use crate::scene_builder::{Builder, room, sphere};
+    use crate::spectral::Channels;
+    use glam::DVec3;
+
+    const LIMITS: DeviceLimits = DeviceLimits { binding: 128 << 20, uniform_alignment: 256, software: false };
 
     fn plan(paths: u32, samples: u32, tile: [u32; 2]) -> WavePlan {
-        WavePlan { tile, paths, samples, units: 4, channels: 8, max_records: 11, roulette: false, binding: 128 << 20 }
+        WavePlan {
+            tile,
+            paths,
+            samples,
+            units: 4,
+            channels: 8,
+            max_bounces: 5,
+            max_records: 11,
+            roulette: false,
+            limits: LIMITS,
+            scene_bytes: 0,
+        }
+    }
+
+    fn prepared(channels: usize, bounces: u32, roulette: u32) -> Prepared {
+        let scene = Builder::new()
+            .channels(Channels::equal(400.0, 700.0, channels))
+            .bounces(bounces)
+            .roulette(roulette)
+            .diffuse(room(DVec3::NEG_ONE, DVec3::ONE), 0.5)
+            .lamp(sphere(DVec3::ZERO, 0.1), 1.0, Sides::Front)
+            .build();
+        Prepared::new(&scene, 0).expect("a scene")
+    }
+
+    /// What a plan takes is within any budget that it accepts, more memory never makes smaller waves, all of it is used
+    /// until there is enough, and a byte less than the least is refused, with that number.
+    #[test]
+    fn plans_keep_their_budgets() {
+        for (channels, bounces, roulette, tile) in
+            [(1, 0, 0, [64, 64]), (400, 5, 2, [64, 64]), (3, 5, 0, [7, 5]), (5000, 1, 0, [16, 16]), (7, 800, 1, [3, 1])]
+        {
+            let prepared = prepared(channels, bounces, roulette);
+            for software in [false, true] {
+                let limits = DeviceLimits { software, ..LIMITS };
+                let with = |memory| WavePlan::new(&prepared, tile, limits, Budget { memory, paths: None });
+                let refusal = with(Some(1)).expect_err("one byte").to_string();
+                let least = refusal.split("the least is ").nth(1).and_then(|s| s.split(' ').next()).expect("a number");
+                let least: u64 = least.parse().expect("bytes");
+                assert_eq!(with(Some(least - 1)).expect_err("too little").exit_code(), 2);
+
+                let unbounded = with(None).expect("a plan");
+                let mut last = with(Some(least)).expect("the least is enough");
+                assert_eq!(last.device_bytes(), least);
+                let mut memory = least;
+                while memory < 2 * unbounded.device_bytes() {
+                    let plan = with(Some(memory)).expect("more than the least");
+                    assert!(plan.device_bytes() <= memory, "{memory}: {plan:?}");
+                    assert!(plan.paths >= last.paths && plan.samples >= last.samples, "{memory}: {plan:?}, {last:?}");
+                    let unused = memory - plan.device_bytes();
+                    let unit_bytes = 3 * plan.mean_bytes() / u64::from(plan.units) + 16;
+                    assert!(
+                        (plan.paths, plan.units) == (unbounded.paths, unbounded.units)
+                            || unused < unit_bytes.max(4 * plan.path_bytes()) + 48,
+                        "{unused} bytes of {memory} unused: {plan:?}"
+                    );
+                    (last, memory) = (plan, memory + memory / 7 + 13);
+                }
+                assert_eq!(with(Some(memory)).expect("plenty"), unbounded);
+            }
+        }
+    }
+
+    #[test]
+    fn waves_are_halved_down_to_the_smallest() {
+        let mut plan = WavePlan::new(&prepared(40, 5, 1), [16, 16], LIMITS, Budget::default()).expect("a plan");
+        let least = WavePlan { paths: 256, samples: 64, units: 1, ..plan };
+        let mut steps = 0;
+        while let Some(half) = plan.halved() {
+            assert!(half.wave_bytes() < plan.wave_bytes() && half.paths >= plan.paths / 2, "{half:?}");
+            (plan, steps) = (half, steps + 1);
+        }
+        assert_eq!(plan, least);
+        assert!((10..=12).contains(&steps), "{steps} steps from a million paths to 256");
+        // A bound below that stays.
+        let few = Budget { paths: Some(7), memory: None };
+        let plan = WavePlan::new(&prepared(40, 5, 1), [16, 16], LIMITS, few).expect("a plan");
+        assert_eq!((plan.paths, plan.samples, plan.halved()), (7, 4, None));
+    }
+
+    /// Many channels and long paths make smaller waves, so that a dispatch ends in time.
+    #[test]
+    fn long_work_comes_in_smaller_waves() {
+        let evaluations = |software: bool, channels: u64, records: u64| {
+            let paths = wanted_paths(software, channels, records);
+            assert!((LEAST_PATHS..=1 << 20).contains(&paths));
+            (paths, paths * channels * records)
+        };
+        assert_eq!(evaluations(true, 400, 11).0, 1 << 15);
+        assert_eq!(evaluations(false, 400, 11).0, 1 << 20);
+        for (channels, bounces) in [(400, 100), (5000, 5), (1, 16_383), (2000, 30)] {
+            assert!(evaluations(true, channels, 2 * bounces + 1).1 <= 1 << 29);
+            assert!(evaluations(false, channels, 2 * bounces + 1).1 <= 1 << 33);
+        }
+        assert_eq!(evaluations(true, 5000, 32_767).0, LEAST_PATHS);
     }
 
     /// Every (pixel, sample) once, a pixel's samples in order.

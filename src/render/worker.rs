@@ -7,12 +7,12 @@ use std::time::Instant;
 
 use crate::gpu::adapter::Gpu;
 use crate::gpu::buffer;
-use crate::gpu::layout::{Counters, Wave};
+use crate::gpu::layout::{Counters, Proof, Wave};
 use crate::gpu::pass::Pass;
 use crate::gpu::shader;
 use crate::gpu::upload::{self, SceneBuffers};
 use crate::render::prepare::{EvaluateShape, Prepared};
-use crate::render::wave::{self, DeviceLimits, WavePlan};
+use crate::render::wave::{self, Budget, DeviceLimits, WavePlan};
 use crate::{Error, Result};
 
 /// A rectangle x0, y0, x1, y1 of the full film: one tile in one epoch.
@@ -52,7 +52,7 @@ pub struct Profile {
 
 /// A device with everything a scene needs on it.
 pub struct Worker {
-    pub gpu: Gpu,
+    pub gpu: Arc<Gpu>,
     pub plan: WavePlan,
     pub profile: Profile,
     prepared: Arc<Prepared>,
@@ -61,11 +61,12 @@ pub struct Worker {
     evaluate: Stage,
     shape: EvaluateShape,
     path_buffers: PathBuffers,
-    scene_bytes: u64,
     timestamps: Option<Timestamps>,
     slots: Vec<Slot>,
     next_slot: usize,
     waves: VecDeque<wgpu::SubmissionIndex>,
+    /// Waves submitted so far.
+    sequence: u64,
     interrupt: Arc<Interrupt>,
     /// Since when nothing is under way; `None` before the first unit.
     idle_since: Option<Instant>,
@@ -104,6 +105,7 @@ struct Slot {
 struct Pending {
     units: Vec<UnitRect>,
     submission: wgpu::SubmissionIndex,
+    proof: Proof,
 }
 
 /// What a group of units brought back.
@@ -117,13 +119,18 @@ pub struct Collected<'a> {
 }
 
 impl Worker {
-    /// Uploads the scene and compiles its passes. `max_paths` bounds the waves (tests, small memories).
-    pub fn new(gpu: Gpu, prepared: Arc<Prepared>, tile: [u32; 2], max_paths: Option<u32>) -> Result<Worker> {
-        let limits = DeviceLimits { binding: binding_limit(&gpu), software: gpu.is_software, max_paths };
-        let plan = WavePlan::new(&prepared, tile, limits)?;
-        let windows = upload::windows(&prepared, limits.binding)?;
+    /// Uploads the scene and compiles its passes, with waves as large as `budget` lets them be.
+    pub fn new(gpu: impl Into<Arc<Gpu>>, prepared: Arc<Prepared>, tile: [u32; 2], budget: Budget) -> Result<Worker> {
+        let gpu = gpu.into();
+        let plan = WavePlan::new(&prepared, tile, device_limits(&gpu), budget)?;
+        Worker::with_waves(gpu, prepared, plan)
+    }
+
+    /// As [`Worker::new`], with waves as planned.
+    pub fn with_waves(gpu: Arc<Gpu>, prepared: Arc<Prepared>, plan: WavePlan) -> Result<Worker> {
+        let windows = upload::windows(&prepared, plan.limits.binding)?;
         let scene = SceneBuffers::new(&gpu, &prepared, &windows)?;
-        let path_buffers = PathBuffers::new(&gpu, &prepared, &plan);
+        let path_buffers = PathBuffers::new(&gpu, &plan);
 
         let shape = EvaluateShape::new(prepared.tables.channels_padded as u32 / 4, gpu.is_software);
         let defines = prepared.defines(&windows);
@@ -142,7 +149,7 @@ impl Worker {
                 staging: buffer::empty(
                     &gpu,
                     "staging",
-                    plan.mean_bytes() + size_of::<Counters>() as u64,
+                    plan.staging_bytes(),
                     wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
                 ),
                 pending: None,
@@ -161,11 +168,11 @@ impl Worker {
             evaluate,
             shape,
             path_buffers,
-            scene_bytes: scene.bytes,
             timestamps,
             slots,
             next_slot: 0,
             waves: VecDeque::new(),
+            sequence: 0,
             interrupt: Arc::default(),
             idle_since: None,
             idle_s: 0.0,
@@ -201,7 +208,9 @@ impl Worker {
         let buffers = &self.path_buffers;
         self.gpu.queue.write_buffer(&buffers.units, 0, bytemuck::cast_slice(units));
         let ahead = if self.gpu.is_software { WAVES_AHEAD_SOFTWARE } else { WAVES_AHEAD };
-        for wave in self.plan.waves(units.len() as u32, epoch, epoch_samples) {
+        for mut wave in self.plan.waves(units.len() as u32, epoch, epoch_samples) {
+            self.sequence += 1;
+            wave.sequence = self.sequence as u32;
             check_interrupt(&self.interrupt)?;
             while self.waves.len() >= ahead
                 && let Some(oldest) = self.waves.pop_front()
@@ -221,7 +230,8 @@ impl Worker {
         encoder.clear_buffer(&buffers.counters, 0, None);
         let submission = self.gpu.queue.submit([encoder.finish()]);
         buffer::map(staging);
-        self.slots[slot].pending = Some(Pending { units: units.to_vec(), submission });
+        let proof = self.proof(units, epoch_samples);
+        self.slots[slot].pending = Some(Pending { units: units.to_vec(), submission, proof });
         Ok(())
     }
 
@@ -246,6 +256,10 @@ impl Worker {
             let end = size + size_of::<Counters>() as u64;
             let view = staging.slice(..end).get_mapped_range().map_err(lost)?;
             let counters: Counters = bytemuck::pod_read_unaligned(&view[size as usize..]);
+            if let Some(what) = counters.missing(&pending.proof) {
+                let what = format!("{}: a unit came back incomplete: {what}", self.gpu.name);
+                return Err(Error::DevicesLost(what));
+            }
             collected(Collected {
                 units: &pending.units,
                 means: bytemuck::cast_slice(&view[..size as usize]),
@@ -262,9 +276,16 @@ impl Worker {
         self.slots.iter().all(|slot| slot.pending.is_none())
     }
 
-    /// Scene and buffers on the device, bytes.
-    pub fn device_bytes(&self) -> u64 {
-        self.scene_bytes + self.plan.device_bytes()
+    /// What the counters must show after the last wave of `units`.
+    fn proof(&self, units: &[UnitRect], epoch_samples: u32) -> Proof {
+        let samples = u64::from(epoch_samples);
+        let pixels = |[x0, y0, x1, y1]: &UnitRect| u64::from(x1 - x0) * u64::from(y1 - y0);
+        let slots = units.len() as u64 * u64::from(self.plan.tile_pixels());
+        Proof {
+            paths: units.iter().map(pixels).sum::<u64>() * samples,
+            folded: slots * samples * u64::from(self.shape.blocks),
+            sequence: self.sequence,
+        }
     }
 
     fn unit_bytes(&self) -> u64 {
@@ -326,9 +347,15 @@ impl Worker {
     }
 }
 
-/// What one binding may show: the device's limit, but no more than 1 GiB, so that offsets stay within 32 bits of words.
-pub fn binding_limit(gpu: &Gpu) -> u64 {
-    gpu.limits.max_storage_buffer_binding_size.min(gpu.limits.max_buffer_size).min(1 << 30)
+/// What `gpu` allows. A binding shows no more than 1 GiB, so that offsets stay within 32 bits of words, and leaves room
+/// for the counters that follow the means in a staging buffer.
+pub fn device_limits(gpu: &Gpu) -> DeviceLimits {
+    let buffer = gpu.limits.max_buffer_size - buffer::allocated(size_of::<Counters>() as u64);
+    DeviceLimits {
+        binding: gpu.limits.max_storage_buffer_binding_size.min(buffer).min(1 << 30),
+        uniform_alignment: gpu.limits.min_uniform_buffer_offset_alignment,
+        software: gpu.is_software,
+    }
 }
 
 /// Workgroup counts in x and y for at least `groups` groups: a dimension takes at most 65,535.
@@ -347,20 +374,19 @@ impl Stage {
 }
 
 impl PathBuffers {
-    fn new(gpu: &Gpu, prepared: &Prepared, plan: &WavePlan) -> PathBuffers {
+    fn new(gpu: &Gpu, plan: &WavePlan) -> PathBuffers {
         use wgpu::BufferUsages as U;
         let storage = U::STORAGE | U::COPY_SRC | U::COPY_DST;
-        let step_stride = gpu.limits.min_uniform_buffer_offset_alignment.max(16);
-        let steps = wave::steps(prepared.frame.max_bounces);
-        let mut step_bytes = vec![0u8; steps.len() * step_stride as usize];
-        for (step, bytes) in steps.iter().zip(step_bytes.chunks_mut(step_stride as usize)) {
+        let step_stride = plan.step_stride();
+        let mut step_bytes = vec![0u8; plan.step_bytes() as usize];
+        for (step, bytes) in wave::steps(plan.max_bounces).iter().zip(step_bytes.chunks_mut(step_stride as usize)) {
             bytes[..size_of_val(step)].copy_from_slice(bytemuck::bytes_of(step));
         }
-        let steps = buffer::empty(gpu, "steps", step_bytes.len() as u64, U::UNIFORM | U::COPY_DST);
+        let steps = buffer::empty(gpu, "steps", plan.step_bytes(), U::UNIFORM | U::COPY_DST);
         gpu.queue.write_buffer(&steps, 0, &step_bytes);
         PathBuffers {
             wave: buffer::empty(gpu, "wave", size_of::<Wave>() as u64, U::UNIFORM | U::COPY_DST),
-            units: buffer::empty(gpu, "units", u64::from(plan.units) * size_of::<UnitRect>() as u64, storage),
+            units: buffer::empty(gpu, "units", plan.unit_list_bytes(), storage),
             steps,
             step_stride,
             states: buffer::empty(gpu, "states", plan.state_bytes(), storage),
@@ -368,12 +394,7 @@ impl PathBuffers {
             records: buffer::empty(gpu, "records", plan.record_bytes(), storage),
             throughputs: plan.roulette.then(|| buffer::empty(gpu, "throughputs", plan.throughput_bytes(), storage)),
             queue: buffer::empty(gpu, "queue", plan.queue_bytes(), storage),
-            queue_lengths: buffer::empty(
-                gpu,
-                "queue_lengths",
-                4 * wave::steps(prepared.frame.max_bounces).len() as u64,
-                storage,
-            ),
+            queue_lengths: buffer::empty(gpu, "queue_lengths", plan.queue_length_bytes(), storage),
             counters: buffer::empty(gpu, "counters", size_of::<Counters>() as u64, storage),
             means: buffer::empty(gpu, "means", plan.mean_bytes(), storage),
         }
@@ -427,5 +448,53 @@ impl Timestamps {
         let ticks: Vec<u64> = buffer::read(gpu, &self.resolved, 32)?;
         let period = f64::from(gpu.queue.get_timestamp_period()) * 1e-9;
         Ok([0, 2].map(|i| ticks[i + 1].saturating_sub(ticks[i]) as f64 * period))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::mem::offset_of;
+
+    use glam::DVec3;
+
+    use super::*;
+    use crate::scene::Sides;
+    use crate::scene_builder::{Builder, room, sphere};
+
+    /// A lamp in a closed room, so that every path goes all the way.
+    fn worker() -> Worker {
+        let scene = Builder::new()
+            .bounces(3)
+            .diffuse(room(DVec3::splat(-2.0), DVec3::splat(2.0)), 0.5)
+            .lamp(sphere(DVec3::new(0.0, 1.0, 0.0), 0.1), 1.0, Sides::Front)
+            .build();
+        let prepared = Arc::new(Prepared::new(&scene, 0).expect("a scene"));
+        Worker::new(Gpu::open().expect("a device"), prepared, [4, 4], Budget::default()).expect("a worker")
+    }
+
+    /// The counters of 64 samples of 3 x 2 pixels.
+    fn counters(worker: &mut Worker) -> Result<Counters> {
+        let mut found = None;
+        let mut note = |collected: Collected| {
+            found = Some(collected.counters);
+            Ok(())
+        };
+        worker.submit(&[[0, 0, 3, 2]], 0, 64, &mut note)?;
+        worker.collect(&mut note)?;
+        Ok(found.expect("collected"))
+    }
+
+    /// The count of rays goes on beyond 32 bits, from wherever it crosses them.
+    #[test]
+    fn rays_do_not_wrap() {
+        let mut worker = worker();
+        let rays = counters(&mut worker).expect("counters").rays();
+        // 384 paths of up to 4 vertices, each with its shadow ray but the last.
+        assert!((384 * 2..=384 * 7).contains(&rays), "{rays}");
+        for before in [u32::MAX, u32::MAX - 100, u32::MAX - rays as u32, u32::MAX - rays as u32 + 1] {
+            let at = offset_of!(Counters, rays_low) as u64;
+            worker.gpu.queue.write_buffer(&worker.path_buffers.counters, at, &before.to_le_bytes());
+            assert_eq!(counters(&mut worker).expect("counters").rays(), u64::from(before) + rays);
+        }
     }
 }

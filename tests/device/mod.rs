@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use spectile::gpu::adapter::Gpu;
 use spectile::gpu::layout::Counters;
 use spectile::render::prepare::Prepared;
+use spectile::render::wave::Budget;
 use spectile::render::worker::{UnitRect, Worker};
 use spectile::scene::Scene;
 
@@ -17,8 +18,8 @@ use crate::statistics::Estimate;
 pub struct Settings {
     pub seed: u64,
     pub tile: [u32; 2],
-    /// Upper bound on paths per wave.
-    pub max_paths: Option<u32>,
+    /// Upper bounds on the waves.
+    pub budget: Budget,
     /// Units submitted together at most.
     pub units: usize,
     /// Run the shaders with the translator's bounds checks.
@@ -29,7 +30,14 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Settings { seed: 0, tile: [16, 16], max_paths: None, units: usize::MAX, checked: false, binding: None }
+        Settings {
+            seed: 0,
+            tile: [16, 16],
+            budget: Budget { memory: None, paths: None },
+            units: usize::MAX,
+            checked: false,
+            binding: None,
+        }
     }
 }
 
@@ -41,6 +49,7 @@ pub struct Epochs {
     /// `means[epoch][(y * width + x) * channels + k]`.
     pub means: Vec<Vec<f32>>,
     pub counters: Counters,
+    pub rays: u64,
 }
 
 /// One device at a time: two cores gain nothing from more.
@@ -60,7 +69,7 @@ pub fn render(scene: &Scene, epochs: u32, samples: u32, settings: Settings) -> E
         gpu.limits.max_storage_buffer_binding_size = binding;
     }
     let prepared = Arc::new(Prepared::new(scene, settings.seed).expect("a scene that fits"));
-    let mut worker = Worker::new(gpu, prepared, settings.tile, settings.max_paths).expect("a worker");
+    let mut worker = Worker::new(gpu, prepared, settings.tile, settings.budget).expect("a worker");
     let [x0, y0, x1, y1] = scene.film.crop;
     let [tw, th] = settings.tile;
     let tiles: Vec<UnitRect> = (y0..y1)
@@ -68,7 +77,7 @@ pub fn render(scene: &Scene, epochs: u32, samples: u32, settings: Settings) -> E
         .flat_map(|y| (x0..x1).step_by(tw as usize).map(move |x| [x, y, (x + tw).min(x1), (y + th).min(y1)]))
         .collect();
     let (width, height, channels) = ((x1 - x0) as usize, (y1 - y0) as usize, scene.channels.len());
-    let mut counters = Counters::default();
+    let (mut counters, mut rays) = (Counters::default(), 0);
     let means = (0..epochs)
         .map(|epoch| {
             let mut image = vec![f32::NAN; width * height * channels];
@@ -76,7 +85,7 @@ pub fn render(scene: &Scene, epochs: u32, samples: u32, settings: Settings) -> E
                 counters.overflow += collected.counters.overflow;
                 counters.non_finite += collected.counters.non_finite;
                 counters.negative += collected.counters.negative;
-                counters.rays += collected.counters.rays;
+                rays += collected.counters.rays();
                 let unit_size = (tw * th) as usize * channels;
                 for (unit, means) in collected.units.iter().zip(collected.means.chunks(unit_size)) {
                     for y in unit[1]..unit[3] {
@@ -97,7 +106,7 @@ pub fn render(scene: &Scene, epochs: u32, samples: u32, settings: Settings) -> E
             image
         })
         .collect();
-    Epochs { width, height, channels, means, counters }
+    Epochs { width, height, channels, means, counters, rays }
 }
 
 impl Epochs {

@@ -122,7 +122,7 @@ fn roulette_survives_with_the_albedo() {
         let paths = 16.0 * 16.0 * 64.0;
         let expected = paths * 2.0 / (1.0 - rho);
         let deviation = 2.0 * (paths * rho).sqrt() / (1.0 - rho);
-        let rays = f64::from(rendered.counters.rays);
+        let rays = rendered.rays as f64;
         assert!((rays - expected).abs() < 4.0 * deviation, "{rho}: {rays} rays instead of {expected}");
     }
 }

@@ -2,6 +2,7 @@
 //! there.
 
 mod json;
+mod memory;
 mod outcome;
 mod resume;
 mod running;

@@ -67,6 +67,8 @@ fn a_render_that_cannot_fit() {
         &["o.zarr", "free there"],
     );
     let whole = ["--size", "1024x1024", "--tile", "1024", "--set", "channels.equal.count=600"];
+    let expected = ["1000 bytes", "the least is", "for the scene", "for a tile of 24 x 20 pixels", "raise --memory"];
+    fails(&place, &render(&["--memory", "1kB"]), 2, &expected);
     fails(&place, &render(&whole), 2, &["1024 x 1024 pixels with 600 channels", "smaller --tile"]);
 }
 

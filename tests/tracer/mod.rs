@@ -7,7 +7,7 @@ use spectile::gpu::pass::Pass;
 use spectile::gpu::shader::{self, Module};
 use spectile::gpu::upload::{self, SceneBuffers};
 use spectile::render::prepare::Prepared;
-use spectile::render::worker::binding_limit;
+use spectile::render::worker::device_limits;
 
 const TRACE: Module = Module { name: "tests/tracer/trace.wgsl", text: include_str!("trace.wgsl") };
 
@@ -31,7 +31,7 @@ pub struct Hit {
 /// The nearest hits of `rays`, at most four million.
 pub fn trace(prepared: &Prepared, rays: &[Ray]) -> Vec<Hit> {
     let gpu = Gpu::open().expect("a device");
-    let windows = upload::windows(prepared, binding_limit(&gpu)).expect("a scene that fits");
+    let windows = upload::windows(prepared, device_limits(&gpu).binding).expect("a scene that fits");
     let scene = SceneBuffers::new(&gpu, prepared, &windows).expect("buffers");
     let mut modules = prepared.bounce_modules();
     // Everything but the pass itself.
@@ -43,7 +43,7 @@ pub fn trace(prepared: &Prepared, rays: &[Ray]) -> Vec<Hit> {
         .iter()
         .map(|Ray { origin: [x, y, z], direction: [u, v, w] }| [*x, *y, *z, 3.0e38, *u, *v, *w, 0.0])
         .collect();
-    let input = buffer::storage(&gpu, "rays", &packed);
+    let input = buffer::storage(&gpu, "rays", &packed).expect("a buffer");
     let size = 16 * rays.len() as u64;
     let output = buffer::empty(&gpu, "hits", size, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC);
     let groups = [0, 1].map(|group| {
