@@ -5,7 +5,7 @@ mod common;
 use std::fs;
 
 use common::{Random, Written, create, header, pattern, patterned, unit};
-use spectile::cube::{Cube, Existing, Header, Rect, compare};
+use spectile::cube::{Cube, Existing, Header, Rect, Writer, compare};
 use spectile::spectral::Channels;
 use tempfile::tempdir;
 
@@ -505,4 +505,46 @@ fn compare_follows_the_definitions() {
     let channels = Channels::equal(380.0, 781.0, 3);
     let other_channels = create(folder.path(), "channels.zarr", Header { channels, ..header(size, [8, 8], 3) });
     assert!(compare(&a, &other_channels).unwrap_err().to_string().contains("channel 0 is 380-"));
+}
+
+/// The picture shows every unit as soon as it is merged, also before it is committed; readers see it a commit later.
+#[test]
+fn the_preview_follows_every_unit() {
+    let folder = tempdir().expect("folder");
+    let header = Header { epoch: 1, ..header([40, 24], [16, 16], 3) };
+    let path = folder.path().join("cube.zarr");
+    let writer = Writer::open(&path, &header, Existing::Refuse, 0..6, &mut |what| panic!("{what}")).expect("a cube");
+    let cube = writer.cube();
+    let mut shown = writer.preview(1).expect("preview");
+    assert!(shown.rgb.iter().all(|v| v.is_nan()));
+    for epoch in 0..3 {
+        for tile in 0..6 {
+            writer
+                .merge_unit(tile, epoch, 1, &unit(cube, tile, |x, y, k| pattern(x, y, k) * epoch as f32))
+                .expect("merged");
+            let now = writer.preview(1).expect("preview");
+            let rect = cube.grid().rect(tile);
+            let mut changed = 0;
+            for (i, (now, before)) in now.rgb.chunks(3).zip(shown.rgb.chunks(3)).enumerate() {
+                let (x, y) = (i as u32 % 40, i as u32 / 40);
+                let inside = (rect.x0..rect.x1).contains(&x) && (rect.y0..rect.y1).contains(&y);
+                let same =
+                    now.iter().zip(before).all(|(a, b)| a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan()));
+                assert!(inside || same, "tile {tile} changed pixel {x} {y}");
+                changed += u64::from(!same);
+            }
+            assert_eq!(changed, rect.pixels(), "tile {tile}, epoch {epoch}");
+            shown = now;
+        }
+        if epoch == 0 {
+            assert!(cube.preview().expect("preview").rgb.iter().all(|v| v.is_nan()), "nothing is committed yet");
+        }
+        writer.flush().expect("committed");
+        assert_eq!(cube.preview().expect("preview"), shown);
+    }
+    // Reduced: means of 8 x 8 pixels, as in the overview.
+    let reduced = writer.preview(8).expect("preview");
+    assert_eq!(reduced.size, [5, 3]);
+    let mean = (0..64).map(|i| f64::from(shown.rgb[((8 + i / 8) * 40 + 16 + i % 8) * 3 + 1])).sum::<f64>() / 64.0;
+    assert!((f64::from(reduced.rgb[(5 + 2) * 3 + 1]) / mean - 1.0).abs() < 1e-6);
 }

@@ -3,6 +3,7 @@
 
 mod json;
 mod memory;
+mod out_of_core;
 mod outcome;
 mod resume;
 mod running;

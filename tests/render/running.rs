@@ -225,3 +225,18 @@ mod signals {
         }
     }
 }
+
+/// Of a full-HD picture with 400 channels there is something to see two seconds after the first dispatch.
+#[test]
+fn the_first_preview_comes_soon() {
+    let place = Place::new();
+    let large = ["--size", "1920x1080", "--set", "channels.equal.count=400", "--set", "environment.radiance=1.0"];
+    let mut child = place.start("cube.zarr", &[&large[..], &["--preview", "now.png", "--json"]].concat());
+    let first = first_progress(&mut child);
+    let (picture, _) = (png(&place.path().join("now.png")), child.0.kill().expect("killed"));
+    assert_eq!(picture.0, [1920, 1080]);
+    assert!(picture.1.iter().any(|&v| v > 0), "the tiles that are there are lit");
+    // Paths by the second count from the moment a device was ready, before its first dispatch.
+    let seconds = first["paths"].as_f64().expect("paths") / first["paths_per_s"].as_f64().expect("a rate");
+    assert!(seconds < 2.0, "{seconds} s");
+}
