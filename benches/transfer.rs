@@ -21,7 +21,7 @@ const TILE: u32 = 64;
 
 fn main() -> Result<()> {
     let measure = std::env::args().any(|a| a == "--bench");
-    let [channels, samples, rounds] = if measure { [512, 256, 9] } else { [32, 16, 1] };
+    let [channels, samples, rounds] = if measure { [512, 128, 9] } else { [32, 16, 1] };
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell/cornell.toml");
     let set = |key: &str, value: &str| (key.to_owned(), value.to_owned());
     let size = TILE.to_string();
@@ -37,16 +37,16 @@ fn main() -> Result<()> {
     worker.submit(&[unit], 0, 1, &mut |_| Ok(()))?;
     worker.collect(&mut |_| Ok(()))?;
 
-    let portions: Vec<u32> = (0..7).map(|i| 1 << i).filter(|n| n * 4 <= samples).collect();
+    let portions: Vec<u32> = (0..7).map(|i| 1 << i).filter(|n| n * 2 <= samples).collect();
     let mut seconds = vec![Vec::new(); portions.len()];
     let mut extra = vec![Vec::new(); portions.len()];
     let mut walls = vec![Vec::new(); portions.len()];
     for _ in 0..rounds {
+        let [without, _] = timed(|| {
+            worker.submit(&[unit], 0, samples, &mut |_| Ok(()))?;
+            worker.collect(&mut |_| Ok(()))
+        })?;
         for (i, &portion) in portions.iter().enumerate() {
-            let [without, _] = timed(|| {
-                worker.submit(&[unit], 0, samples, &mut |_| Ok(()))?;
-                worker.collect(&mut |_| Ok(()))
-            })?;
             let [with, wall] = timed(|| into_cube(&mut worker, &header, unit, samples, portion))?;
             seconds[i].push(with);
             walls[i].push(wall);
@@ -82,12 +82,17 @@ fn into_cube(worker: &mut Worker, header: &Header, unit: UnitRect, samples: u32,
     };
     std::thread::scope(|threads| {
         let committer = threads.spawn(|| cube.commit_regularly());
-        for epoch in 0..samples / portion {
-            worker.submit(&[unit], epoch, portion, &mut |c| merge(c.means))?;
-        }
-        worker.collect(&mut |c| merge(c.means))?;
+        let mut render = || {
+            for epoch in 0..samples / portion {
+                worker.submit(&[unit], epoch, portion, &mut |c| merge(c.means))?;
+            }
+            worker.collect(&mut |c| merge(c.means))
+        };
+        let rendered = render();
+        // Also after an error: the committer would wait for ever.
         cube.close();
         committer.join().expect("no panic")?;
+        rendered?;
         cube.flush()
     })
 }
