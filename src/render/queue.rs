@@ -1,11 +1,13 @@
 //! Which unit comes next: tiles in order, epochs of a tile in order, a tile on one device at a time.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::{Condvar, Mutex, MutexGuard};
 
 /// Units of one epoch that a device takes together.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Group {
+    /// Numbers each taking of units, so that the late result of one that was superseded is told by it.
+    pub attempt: u64,
     pub epoch: u32,
     pub tiles: Vec<u32>,
 }
@@ -34,13 +36,35 @@ struct State {
     /// Epochs below this may be rendered.
     allowed: u32,
     closed: bool,
+    /// Attempts so far, and those under way: who took what.
+    attempts: u64,
+    taken: BTreeMap<u64, (usize, Group)>,
+    /// Devices that get nothing any more.
+    expelled: BTreeSet<usize>,
+}
+
+impl State {
+    /// Units that were taken and not merged come first again.
+    fn put_back(&mut self, group: Group) {
+        for tile in group.tiles.into_iter().rev() {
+            self.ready.push_front((group.epoch, tile));
+        }
+    }
 }
 
 impl Queue {
     /// Every tile from its first epoch on; nothing may be taken before [`Queue::allow`].
     pub fn new(tiles: u32) -> Queue {
         let undecided = (0..tiles).map(|tile| (0, tile)).collect();
-        let state = State { ready: VecDeque::new(), undecided, allowed: 0, closed: false };
+        let state = State {
+            ready: VecDeque::new(),
+            undecided,
+            allowed: 0,
+            closed: false,
+            attempts: 0,
+            taken: BTreeMap::new(),
+            expelled: BTreeSet::new(),
+        };
         Queue { state: Mutex::new(state), changed: Condvar::new() }
     }
 
@@ -48,15 +72,25 @@ impl Queue {
         self.state.lock().unwrap_or_else(|e| e.into_inner())
     }
 
-    /// Takes up to `at_once(epoch)` units of one epoch.
-    pub fn next(&self, at_once: impl Fn(u32) -> usize) -> Next {
+    /// Takes up to `at_once(epoch)` units of one epoch for `device`.
+    pub fn next(&self, device: usize, at_once: impl Fn(u32) -> usize) -> Next {
         let mut state = self.state();
-        if state.closed {
+        if state.closed || state.expelled.contains(&device) {
             return Next::Never;
         }
         let Some(&(epoch, _)) = state.ready.front() else { return Next::Later };
         let same = state.ready.iter().take(at_once(epoch).max(1)).take_while(|unit| unit.0 == epoch).count();
-        Next::Units(Group { epoch, tiles: state.ready.drain(..same).map(|unit| unit.1).collect() })
+        let tiles = state.ready.drain(..same).map(|unit| unit.1).collect();
+        state.attempts += 1;
+        let group = Group { attempt: state.attempts, epoch, tiles };
+        state.taken.insert(group.attempt, (device, group.clone()));
+        Next::Units(group)
+    }
+
+    /// Whether the result of `group` is wanted, which is asked before it is merged: not if its units were taken back. From a
+    /// yes on they cannot be.
+    pub fn claim(&self, group: &Group) -> bool {
+        self.state().taken.remove(&group.attempt).is_some()
     }
 
     /// Waits until [`Queue::next`] would have another answer than `Later`.
@@ -77,11 +111,22 @@ impl Queue {
         self.changed.notify_all();
     }
 
-    /// Puts back units that were taken and not merged; they come first.
+    /// Puts back units that were taken and not merged, unless they were taken back or claimed.
     pub fn give_back(&self, group: Group) {
         let mut state = self.state();
-        for tile in group.tiles.into_iter().rev() {
-            state.ready.push_front((group.epoch, tile));
+        if state.taken.remove(&group.attempt).is_some() {
+            state.put_back(group);
+        }
+        self.changed.notify_all();
+    }
+
+    /// Takes back from `device` all that it has and has not claimed, and gives it nothing any more.
+    pub fn expel(&self, device: usize) {
+        let mut state = self.state();
+        state.expelled.insert(device);
+        let of_device = state.taken.extract_if(.., |_, (holder, _)| *holder == device).collect::<Vec<_>>();
+        for (_, (_, group)) in of_device.into_iter().rev() {
+            state.put_back(group);
         }
         self.changed.notify_all();
     }
@@ -109,38 +154,65 @@ impl Queue {
 mod tests {
     use super::*;
 
-    fn units(next: Next) -> (u32, Vec<u32>) {
+    fn group(next: Next) -> Group {
         match next {
-            Next::Units(group) => (group.epoch, group.tiles),
+            Next::Units(group) => group,
             other => panic!("{other:?} instead of units"),
         }
+    }
+
+    fn units(next: Next) -> (u32, Vec<u32>) {
+        let Group { epoch, tiles, .. } = group(next);
+        (epoch, tiles)
     }
 
     #[test]
     fn epochs_of_a_tile_come_in_order_and_only_when_decided() {
         let queue = Queue::new(3);
-        assert_eq!(queue.next(|_| 2), Next::Later);
+        assert_eq!(queue.next(0, |_| 2), Next::Later);
         queue.allow(2);
-        assert_eq!(units(queue.next(|_| 2)), (0, vec![0, 1]));
+        let lost = group(queue.next(0, |_| 1));
+        assert_eq!((lost.epoch, &lost.tiles[..]), (0, &[0][..]));
+        assert_eq!(units(queue.next(0, |_| 1)), (0, vec![1]));
         queue.done(0, 1);
         // Tile 2 still owes its first epoch, and a group never mixes epochs.
-        assert_eq!(units(queue.next(|_| 9)), (0, vec![2]));
-        assert_eq!(units(queue.next(|_| 9)), (1, vec![1]));
-        assert_eq!(queue.next(|_| 9), Next::Later);
+        assert_eq!(units(queue.next(0, |_| 9)), (0, vec![2]));
+        assert_eq!(units(queue.next(0, |_| 9)), (1, vec![1]));
+        assert_eq!(queue.next(0, |_| 9), Next::Later);
         // What a lost device gives back comes first.
         queue.done(0, 2);
-        queue.give_back(Group { epoch: 0, tiles: vec![0] });
-        assert_eq!(units(queue.next(|_| 1)), (0, vec![0]));
+        queue.give_back(lost);
+        assert_eq!(units(queue.next(0, |_| 1)), (0, vec![0]));
         for (epoch, tile) in [(0, 0), (1, 1)] {
             queue.done(epoch, tile);
         }
-        assert_eq!(units(queue.next(|_| 9)), (1, vec![2, 0]));
+        assert_eq!(units(queue.next(0, |_| 9)), (1, vec![2, 0]));
         queue.done(1, 2);
         queue.done(1, 0);
-        assert_eq!(queue.next(|_| 9), Next::Later);
+        assert_eq!(queue.next(0, |_| 9), Next::Later);
         queue.allow(3);
-        assert_eq!(units(queue.next(|_| 9)), (2, vec![0, 1, 2]));
+        assert_eq!(units(queue.next(0, |_| 9)), (2, vec![0, 1, 2]));
         queue.close();
-        assert_eq!(queue.next(|_| 9), Next::Never);
+        assert_eq!(queue.next(0, |_| 9), Next::Never);
+    }
+
+    #[test]
+    fn what_a_device_is_relieved_of_is_superseded() {
+        let queue = Queue::new(4);
+        queue.allow(1);
+        let [first, second] = [0, 0].map(|device| group(queue.next(device, |_| 1)));
+        let other = group(queue.next(1, |_| 1));
+        // The first is being merged already: it stays with its device.
+        assert!(queue.claim(&first));
+        queue.expel(0);
+        assert!(!queue.claim(&second) && queue.claim(&other));
+        assert_eq!(queue.next(0, |_| 9), Next::Never);
+        // Neither the claimed nor the superseded come back by themselves.
+        queue.give_back(first);
+        queue.give_back(second.clone());
+        let again = group(queue.next(1, |_| 9));
+        assert_eq!((&again.tiles[..], again.attempt > second.attempt), (&[1, 3][..], true));
+        assert_eq!(queue.next(1, |_| 9), Next::Later);
+        assert!(!queue.claim(&second) && queue.claim(&again) && !queue.claim(&again));
     }
 }

@@ -2,7 +2,6 @@
 
 use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{self, Receiver};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
@@ -15,6 +14,7 @@ use crate::render::plan;
 use crate::render::pool::{Merged, Pool, Report};
 use crate::render::prepare::Prepared;
 use crate::render::queue::Queue;
+use crate::render::watch::Reports;
 use crate::render::worker::{Interrupt, Profile, check_interrupt};
 use crate::scene::Scene;
 use crate::{Error, Result, files, format};
@@ -163,39 +163,30 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
         observe(Event::Warning(what))?;
     }
 
-    let (queue, cube) = (Queue::new(header.grid().count()), OnceLock::new());
-    let pool = Pool {
-        prepared: &prepared,
-        queue: &queue,
-        cube: &cube,
+    let pool = Arc::new(Pool {
+        prepared,
+        queue: Queue::new(header.grid().count()),
+        cube: OnceLock::new(),
         tile,
         full_epoch: job.scene.integrator.epoch,
         memory: job.memory,
         profile: job.profile,
-        interrupt,
-    };
+        interrupt: Arc::clone(interrupt),
+    });
     let names = gpus.iter().map(|gpu| gpu.name.clone()).collect();
     let mut render = Render::new(job, names, header.grid().count(), samples_limit, started);
-    let result = std::thread::scope(|threads| {
-        let (sender, reports) = mpsc::channel();
-        for (device, gpu) in gpus.into_iter().enumerate() {
-            let (pool, sender) = (&pool, sender.clone());
-            threads.spawn(move || pool.work(device, gpu, &sender));
-        }
-        drop(sender);
-        let result = render.wait_for_devices(&reports, observe).and_then(|()| {
-            check_interrupt(interrupt)?;
-            // Only now is anything written: whatever can be refused has been.
-            let made = Cube::create(&job.output, header, job.overwrite)?;
-            render.epochs(cube.get_or_init(|| made), &queue, &reports, observe)
-        });
-        // At the end nobody has a unit any more; after an error those under way are dropped.
-        queue.close();
-        reports.iter().for_each(|(_, report)| render.note_profile(report));
-        result
+    let mut reports = pool.start(gpus)?;
+    let result = render.wait_for_devices(&mut reports, observe).and_then(|()| {
+        check_interrupt(interrupt)?;
+        // Only now is anything written: whatever can be refused has been.
+        let made = Cube::create(&job.output, header, job.overwrite)?;
+        render.epochs(pool.cube.get_or_init(|| made), &pool.queue, &mut reports, observe)
     });
+    // At the end nobody has a unit any more; after an error those under way are dropped.
+    pool.queue.close();
+    reports.for_each(|(_, report)| render.note_profile(report));
     // What ended the epochs is the error to report, whatever else fails for the same reason.
-    let Some(cube) = cube.get() else { return Err(result.err().unwrap_or_else(no_cube)) };
+    let Some(cube) = pool.cube.get() else { return Err(result.err().unwrap_or_else(no_cube)) };
     let preview = render.write_preview(cube);
     let facts = render.write_run_facts(cube);
     let warned = render.report_counters(observe);
@@ -270,14 +261,10 @@ impl<'a> Render<'a> {
     }
 
     /// Waits until every device holds the scene, or has left: one that cannot is left out, unless none can.
-    fn wait_for_devices(
-        &mut self,
-        reports: &Receiver<(usize, Report)>,
-        observe: &mut dyn FnMut(Event) -> Result<()>,
-    ) -> Result<()> {
+    fn wait_for_devices(&mut self, reports: &mut Reports, observe: &mut dyn FnMut(Event) -> Result<()>) -> Result<()> {
         let (mut ready, mut refused) = (0, BTreeMap::new());
         while ready < self.active {
-            let (device, report) = reports.recv().map_err(|_| no_cube())?;
+            let (device, report) = reports.next().ok_or_else(no_cube)?;
             match report {
                 Report::Ready { bytes } => {
                     if ready == 0 {
@@ -286,9 +273,7 @@ impl<'a> Render<'a> {
                     ready += 1;
                     self.device_bytes += bytes;
                 }
-                Report::Left {
-                    result: Err(error @ (Error::Usage(_) | Error::NoDevice(_) | Error::DevicesLost(_))),
-                } => {
+                Report::Left { result: Err(error) } if error.may_be_of_one_device() => {
                     self.active -= 1;
                     refused.insert(device, error);
                 }
@@ -311,7 +296,7 @@ impl<'a> Render<'a> {
         &mut self,
         cube: &Cube,
         queue: &Queue,
-        reports: &Receiver<(usize, Report)>,
+        reports: &mut Reports,
         observe: &mut dyn FnMut(Event) -> Result<()>,
     ) -> Result<()> {
         let full = self.job.scene.integrator.epoch;
@@ -327,7 +312,7 @@ impl<'a> Render<'a> {
                 })?;
             self.status.units.0 = self.merged.front().copied().unwrap_or(0);
             while self.status.units.0 < self.status.units.1 {
-                let (device, report) = reports.recv().map_err(|_| no_cube())?;
+                let (device, report) = reports.next().ok_or_else(no_cube)?;
                 match report {
                     Report::Merged(merged) => self.note_merged(cube, epoch, device, merged, observe)?,
                     report => self.left(device, report, observe)?,
@@ -365,7 +350,11 @@ impl<'a> Render<'a> {
 
     /// A device has left. The others go on without it, if it was lost and there are others.
     fn left(&mut self, device: usize, report: Report, observe: &mut dyn FnMut(Event) -> Result<()>) -> Result<()> {
-        let Report::Left { result } = report else { return Ok(()) };
+        let result = match report {
+            Report::Left { result } => result,
+            Report::Warning(what) => return observe(Event::Warning(what)),
+            Report::Ready { .. } | Report::Merged(_) => return Ok(()),
+        };
         self.active -= 1;
         match result {
             Err(Error::DevicesLost(what) | Error::NoDevice(what)) if self.active > 0 => {
