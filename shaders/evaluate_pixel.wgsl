@@ -171,10 +171,14 @@ fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
 #endif
 
     var bad = BadSamples(0u, 0u, 0u);
+    var ended = 0u;
     for (var i = 0u; i < wave.samples; i += 1u) {
         let path = local_slot * wave.samples + i;
         let head = heads[path];
         let s = spectral_sample(head.x);
+        // Records in the low half; in the high one the wave, once the path has ended.
+        let used = head.y & 0xffffu;
+        ended += select(0u, 1u, head.y >> 16u == wave.sequence);
 #if REGISTERS
 #repeat VECTORS v
 #repeat FACTORS i
@@ -201,7 +205,7 @@ fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
         var radiance_$v = vec4<f32>(0.0);
 #end
         let first_record = path * frame.max_records;
-        for (var r = first_record; r < first_record + head.y; r += 1u) {
+        for (var r = first_record; r < first_record + used; r += 1u) {
             let record = records[r];
             let factor_id = record.x & 0xffffu;
             let source_id = record.x >> 16u;
@@ -235,8 +239,8 @@ fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
     store_mean(out_$v, channels_$v, mean_$v);
 #end
     // A kernel that a driver drops without a word is noticed by this.
-    if (thread == 0u) {
-        atomicAdd(&counters[COUNTER_FOLDED], wave.samples * min(PIXELS_PER_GROUP, wave.pixel_count - local_slot));
+    if (thread % LANES == 0u) {
+        atomicAdd(&counters[COUNTER_FOLDED], ended);
         if (local_slot == 0u && group.z == 0u) {
             atomicStore(&counters[COUNTER_SEQUENCE], wave.sequence);
         }

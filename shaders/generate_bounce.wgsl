@@ -41,7 +41,7 @@ fn end_path(list: RecordList, rays: u32) {
     if (atomicAdd(&counters[COUNTER_RAYS], rays) > 0xffffffffu - rays) {
         atomicAdd(&counters[COUNTER_RAYS_HIGH], 1u);
     }
-    heads[list.path].y = list.used;
+    heads[list.path].y = list.used | (wave.sequence << 16u);
 }
 
 @compute @workgroup_size(64)

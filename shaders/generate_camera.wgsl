@@ -43,7 +43,7 @@ fn generate_camera(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     let in_tile = slot % wave.tile_pixels;
     let pixel = unit.xy + vec2<u32>(in_tile % wave.tile_width, in_tile / wave.tile_width);
     if (any(pixel >= unit.zw)) {
-        heads[path] = vec2<u32>(0u, 0u);
+        heads[path] = vec2<u32>(0u, wave.sequence << 16u);
         states[2u * path + 1u].w = ENDED;
         return;
     }

@@ -15,6 +15,9 @@ pub enum Error {
     /// Arguments that make no sense, or a render that cannot fit.
     #[error("{0}")]
     Usage(String),
+    /// A device's memory does not hold what it is given.
+    #[error("{0}")]
+    DeviceMemory(String),
     /// No adapter that can run the shaders.
     #[error("{0}")]
     NoDevice(String),
@@ -44,12 +47,17 @@ impl Error {
         match self {
             Error::BrokenPipe => 0,
             Error::Check(_) | Error::Internal(_) => 1,
-            Error::Input(_) | Error::Usage(_) => 2,
+            Error::Input(_) | Error::Usage(_) | Error::DeviceMemory(_) => 2,
             Error::NoDevice(_) => 3,
             Error::DevicesLost(_) => 4,
             Error::Storage { .. } => 5,
             Error::Interrupted { signal } => 128 + signal,
         }
+    }
+
+    /// Whether another device may do what one could not: this one is too small, computes wrong or is lost.
+    pub fn may_be_of_one_device(&self) -> bool {
+        matches!(self, Error::Usage(_) | Error::DeviceMemory(_) | Error::NoDevice(_) | Error::DevicesLost(_))
     }
 
     /// A storage error about `path`.

@@ -48,7 +48,7 @@ struct Wave {
     epoch: u32,
     // Samples of the epoch - 1, a power of two - 1.
     epoch_mask: u32,
-    // Counts the waves of a device.
+    // Marks what this wave writes: 1 to 65,535, not that of any of the last waves.
     sequence: u32,
 }
 
@@ -120,7 +120,7 @@ const COUNTER_BAD_SAMPLE: u32 = 4u;
 // Rays traced by the paths that ended: low and high word.
 const COUNTER_RAYS: u32 = 5u;
 const COUNTER_RAYS_HIGH: u32 = 6u;
-// Proof that evaluation took place: samples folded (of all pixel slots, by each workgroup of a pixel, modulo 2^32), and
-// the sequence number of the last wave.
+// Proof that all took place: samples folded whose paths have ended in the same wave (of all pixel slots, by each workgroup
+// of a pixel, modulo 2^32), and the sequence number of the last wave.
 const COUNTER_FOLDED: u32 = 7u;
 const COUNTER_SEQUENCE: u32 = 8u;

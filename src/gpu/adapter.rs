@@ -1,9 +1,11 @@
 //! Adapters and devices: which there are, what they can do, and one opened for work.
 
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::time::Duration;
 
 use serde::Serialize;
 
+use crate::gpu::deadline::Deadline;
 use crate::{Error, Result};
 
 /// What `spectile devices` says of one adapter.
@@ -33,13 +35,21 @@ pub struct Gpu {
     pub timestamps: bool,
     /// Checks that the shader translator adds; all off but in tests.
     pub shader_checks: wgpu::ShaderRuntimeChecks,
+    /// Until when the thread that works with it must be back from its driver.
+    pub deadline: Arc<Deadline>,
+    #[cfg(test)]
+    pub faults: Arc<crate::gpu::fault::Faults>,
     trouble: Arc<Mutex<Option<Trouble>>>,
     _instance: wgpu::Instance,
 }
 
-/// The first thing that went wrong on a device.
-enum Trouble {
+/// What went wrong on a device: the first thing, unless it is lost.
+#[derive(Debug)]
+pub(crate) enum Trouble {
     Memory,
+    /// It did not answer.
+    Hung(Duration),
+    Lost(String),
     Other(String),
 }
 
@@ -236,21 +246,17 @@ impl Gpu {
         .map_err(|e| Error::NoDevice(format!("{}: cannot be opened: {e}", info.name)))?;
 
         let trouble = Arc::new(Mutex::new(None));
-        let note = |trouble: &Arc<Mutex<Option<Trouble>>>| {
-            let trouble = Arc::clone(trouble);
-            move |what: Trouble| {
-                trouble.lock().unwrap_or_else(|e| e.into_inner()).get_or_insert(what);
-            }
-        };
-        let (on_error, on_lost) = (note(&trouble), note(&trouble));
+        let (on_error, on_lost) = (Arc::clone(&trouble), Arc::clone(&trouble));
         device.on_uncaptured_error(Arc::new(move |e: wgpu::Error| {
-            on_error(match e {
+            let what = match e {
                 wgpu::Error::OutOfMemory { .. } => Trouble::Memory,
-                e => Trouble::Other(e.to_string()),
-            });
+                // Its text is a paragraph.
+                e => Trouble::Other(e.to_string().split_whitespace().collect::<Vec<_>>().join(" ")),
+            };
+            note(&on_error, what);
         }));
         device.set_device_lost_callback(move |reason, message| {
-            on_lost(Trouble::Other(format!("device lost ({reason:?}) {message}")));
+            note(&on_lost, Trouble::Lost(format!("device lost ({reason:?}) {message}")));
         });
         Ok(Gpu {
             name: info.name,
@@ -260,22 +266,55 @@ impl Gpu {
             shader_checks: wgpu::ShaderRuntimeChecks::unchecked(),
             device,
             queue,
+            deadline: Arc::default(),
+            #[cfg(test)]
+            faults: crate::gpu::fault::planned(),
             trouble,
             _instance: instance,
         })
     }
 
+    /// Notes what [`Gpu::check`] will say.
+    pub(crate) fn note(&self, what: Trouble) {
+        note(&self.trouble, what);
+    }
+
+    fn trouble(&self) -> MutexGuard<'_, Option<Trouble>> {
+        self.trouble.lock().unwrap_or_else(|e| e.into_inner())
+    }
+
     /// Whether the device still works; errors that nobody waited for end up here.
     pub fn check(&self) -> Result<()> {
-        match self.trouble.lock().unwrap_or_else(|e| e.into_inner()).as_ref() {
-            Some(Trouble::Other(what)) => Err(Error::DevicesLost(format!("{}: {what}", self.name))),
-            Some(Trouble::Memory) => Err(Error::Usage(format!(
-                "{}: its memory does not hold the scene and one tile with all its channels: choose a smaller --tile \
-                 (`spectile plan` says what is needed)",
-                self.name
-            ))),
+        let name = &self.name;
+        match self.trouble().as_ref() {
             None => Ok(()),
+            Some(Trouble::Memory) => Err(Error::DeviceMemory(format!(
+                "{name}: its memory does not hold the scene and one tile with all its channels: choose a smaller --tile \
+                 (`spectile plan` says what is needed)"
+            ))),
+            Some(Trouble::Hung(waited)) => {
+                Err(Error::DevicesLost(format!("{name}: hung: no answer in {:.0} s", waited.as_secs_f64())))
+            }
+            Some(Trouble::Lost(what) | Trouble::Other(what)) => Err(Error::DevicesLost(format!("{name}: {what}"))),
         }
+    }
+
+    /// Forgets that memory ran out, when what took it is free again.
+    pub fn forget_out_of_memory(&self) {
+        self.trouble().take_if(|trouble| matches!(trouble, Trouble::Memory));
+    }
+
+    /// Whether it stopped to answer: then it cannot be closed either, since closing waits for its work.
+    pub fn is_hung(&self) -> bool {
+        matches!(*self.trouble(), Some(Trouble::Hung(_)))
+    }
+}
+
+/// The first trouble stays, since what follows is its consequence; but a lost device is that and nothing else.
+fn note(trouble: &Mutex<Option<Trouble>>, what: Trouble) {
+    let mut trouble = trouble.lock().unwrap_or_else(|e| e.into_inner());
+    if trouble.is_none() || matches!(what, Trouble::Lost(_)) {
+        *trouble = Some(what);
     }
 }
 

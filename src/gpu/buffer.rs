@@ -2,11 +2,14 @@
 
 use std::time::Duration;
 
-use crate::gpu::adapter::Gpu;
+use crate::gpu::adapter::{Gpu, Trouble};
 use crate::{Error, Result};
 
-/// How long one submission may take before the device counts as hung.
-const TIMEOUT: Duration = Duration::from_secs(600);
+/// How long the first work on a device may take: drivers compile then, for minutes at worst.
+pub const WARM_UP: Duration = Duration::from_secs(600);
+
+/// A device counts as hung after so many waits in a row that timed out.
+const TIMEOUTS: u32 = 2;
 
 /// The most that is under way to the device at a time: wgpu keeps a copy of what is written until it has arrived.
 pub const PIECE_BYTES: u64 = 4 << 20;
@@ -20,7 +23,7 @@ pub fn storage<T: bytemuck::NoUninit>(gpu: &Gpu, label: &str, data: &[T]) -> Res
     let buffer = empty(gpu, label, bytes.len() as u64, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST);
     for (i, piece) in bytes.chunks(PIECE_BYTES as usize).enumerate() {
         gpu.queue.write_buffer(&buffer, i as u64 * PIECE_BYTES, piece);
-        wait(gpu, gpu.queue.submit([]))?;
+        wait(gpu, gpu.queue.submit([]), WARM_UP)?;
     }
     Ok(buffer)
 }
@@ -40,21 +43,49 @@ pub fn allocated(size: u64) -> u64 {
     size.max(16).next_multiple_of(16)
 }
 
-/// Waits until a submission is done.
-pub fn wait(gpu: &Gpu, submission: wgpu::SubmissionIndex) -> Result<()> {
-    let poll = wgpu::PollType::Wait { submission_index: Some(submission), timeout: Some(TIMEOUT) };
-    gpu.device.poll(poll).map_err(|e| Error::DevicesLost(format!("{}: no answer ({e})", gpu.name)))?;
+/// Waits until a submission is done. Errors: whatever went wrong on the device; or it is not done after twice `limit`, and
+/// the device counts as hung.
+pub fn wait(gpu: &Gpu, submission: wgpu::SubmissionIndex, limit: Duration) -> Result<()> {
+    poll(gpu, Some(submission), limit)
+}
+
+/// Gets over a shortage of memory: forgets it, and waits until nothing is under way and what has been dropped is free.
+pub fn recover(gpu: &Gpu) -> Result<()> {
+    gpu.forget_out_of_memory();
+    poll(gpu, None, WARM_UP)
+}
+
+fn poll(gpu: &Gpu, submission: Option<wgpu::SubmissionIndex>, limit: Duration) -> Result<()> {
+    let _watched = gpu.deadline.watch(limit.saturating_mul(TIMEOUTS));
+    for _ in 0..TIMEOUTS {
+        #[cfg(test)]
+        if gpu.faults.hangs() {
+            continue;
+        }
+        let wait = wgpu::PollType::Wait { submission_index: submission.clone(), timeout: Some(limit) };
+        match gpu.device.poll(wait) {
+            Ok(_) => return gpu.check(),
+            Err(wgpu::PollError::Timeout) => gpu.check()?,
+            Err(e) => {
+                // A device that is gone says so only when it is asked once more.
+                let _ = gpu.device.poll(wgpu::PollType::Poll);
+                gpu.check()?;
+                return Err(Error::DevicesLost(format!("{}: {e}", gpu.name)));
+            }
+        }
+    }
+    gpu.note(Trouble::Hung(limit.saturating_mul(TIMEOUTS)));
     gpu.check()
 }
 
-/// Copies `size` bytes of `source` to the host: for small buffers and tests.
-pub fn read<T: bytemuck::Pod>(gpu: &Gpu, source: &wgpu::Buffer, size: u64) -> Result<Vec<T>> {
+/// Copies `size` bytes of `source` to the host, waiting as [`wait`] does: for small buffers and tests.
+pub fn read<T: bytemuck::Pod>(gpu: &Gpu, source: &wgpu::Buffer, size: u64, limit: Duration) -> Result<Vec<T>> {
     let staging = empty(gpu, "read back", size, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST);
     let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("read back") });
     encoder.copy_buffer_to_buffer(source, 0, &staging, 0, size);
     let submission = gpu.queue.submit([encoder.finish()]);
     map(&staging);
-    wait(gpu, submission)?;
+    wait(gpu, submission, limit)?;
     let view =
         staging.slice(..size).get_mapped_range().map_err(|e| Error::DevicesLost(format!("{}: {e}", gpu.name)))?;
     Ok(bytemuck::pod_collect_to_vec(&view))

@@ -116,7 +116,7 @@ pub struct Proof {
     /// Samples of all pixel slots, times the workgroups that share a pixel.
     pub folded: u64,
     /// Of the last wave.
-    pub sequence: u64,
+    pub sequence: u32,
 }
 
 impl Counters {
@@ -126,10 +126,10 @@ impl Counters {
 
     /// What a kernel left out, if one did: drivers have dropped work without a word.
     pub fn missing(&self, proof: &Proof) -> Option<String> {
-        if self.sequence != proof.sequence as u32 {
-            Some(format!("its last wave is number {}, not {}", self.sequence, proof.sequence as u32))
+        if self.sequence != proof.sequence {
+            Some(format!("its last wave is number {}, not {}", self.sequence, proof.sequence))
         } else if self.folded != proof.folded as u32 {
-            Some(format!("{} samples are folded, not {} (modulo 2^32)", self.folded, proof.folded as u32))
+            Some(format!("{} samples have paths that ended, not {} (modulo 2^32)", self.folded, proof.folded as u32))
         } else if self.rays() < proof.paths {
             Some(format!("{} rays were traced for {} camera paths", self.rays(), proof.paths))
         } else {
@@ -222,14 +222,14 @@ mod tests {
 
     #[test]
     fn what_a_kernel_left_out_is_noticed() {
-        let proof = Proof { paths: 100, folded: (1 << 32) + 128, sequence: (1 << 32) + 7 };
+        let proof = Proof { paths: 100, folded: (1 << 32) + 128, sequence: 7 };
         let done = Counters { rays_low: 100, folded: 128, sequence: 7, ..Counters::default() };
         assert_eq!(done.missing(&proof), None);
         assert_eq!(Counters { rays_low: 0, rays_high: 1, ..done }.missing(&proof), None);
         let missing = |counters: Counters| counters.missing(&proof).expect("something is missing");
         assert!(missing(Counters::default()).contains("last wave is number 0, not 7"));
         assert!(missing(Counters { sequence: 6, ..done }).contains("number 6"));
-        assert!(missing(Counters { folded: 64, ..done }).contains("64 samples are folded, not 128"));
+        assert!(missing(Counters { folded: 64, ..done }).contains("64 samples have paths that ended, not 128"));
         assert!(missing(Counters { rays_low: 99, ..done }).contains("99 rays"));
     }
 }

@@ -2,6 +2,9 @@
 
 pub mod adapter;
 pub mod buffer;
+pub mod deadline;
+#[cfg(test)]
+pub mod fault;
 pub mod layout;
 pub mod pass;
 pub mod self_test;

@@ -16,6 +16,7 @@ const SEED: u64 = 0x0123_4567_89ab_cdef;
 
 /// Runs the kernel and compares every word with what it must be.
 pub fn run(gpu: &Gpu) -> Result<()> {
+    let _watched = gpu.deadline.watch(buffer::WARM_UP);
     let source = shader::compose(&[shader::RNG, shader::SELF_TEST], &Defines::default());
     let pass = Pass::new(gpu, &source)?;
     let input = buffer::storage(gpu, "self-test input", &[LOOP_LIMIT, SEED as u32, (SEED >> 32) as u32, NAN_BITS])?;
@@ -35,8 +36,8 @@ pub fn run(gpu: &Gpu) -> Result<()> {
         compute.dispatch_workgroups(1, 1, 1);
     }
     let submission = gpu.queue.submit([encoder.finish()]);
-    buffer::wait(gpu, submission)?;
-    let got: Vec<u32> = buffer::read(gpu, &results, size)?;
+    buffer::wait(gpu, submission, buffer::WARM_UP)?;
+    let got: Vec<u32> = buffer::read(gpu, &results, size, buffer::WARM_UP)?;
     for lane in 0..LANES {
         let at = lane as usize * WORDS;
         let expected = expected(lane);

@@ -1,11 +1,15 @@
 //! The render: plan → units → waves on a device → host merge.
 
+#[cfg(test)]
+mod fault_tests;
 pub mod lights;
+pub mod patience;
 pub mod plan;
 pub mod pool;
 pub mod prepare;
 pub mod queue;
 pub mod rng;
 pub mod schedule;
+pub mod watch;
 pub mod wave;
 pub mod worker;

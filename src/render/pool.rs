@@ -1,41 +1,50 @@
 //! The devices of a render, a thread each: they pull units from the queue, render them, and merge them into the cube.
 
 use std::collections::VecDeque;
-use std::sync::mpsc::Sender;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::mpsc::{self, Sender};
 use std::sync::{Arc, OnceLock};
+use std::thread;
 use std::time::Instant;
 
 use crate::cube::{Writer, epoch_samples, merge_means, samples_before};
+use crate::files::format_bytes;
 use crate::gpu::adapter::Gpu;
+use crate::gpu::buffer::{self, WARM_UP};
+#[cfg(test)]
+use crate::gpu::fault::Phase;
 use crate::gpu::layout::Counters;
 use crate::gpu::self_test;
 use crate::render::prepare::Prepared;
 use crate::render::queue::{Group, Next, Queue};
-use crate::render::wave::Budget;
-use crate::render::worker::{Collected, Interrupt, Profile, UnitRect, Worker};
+use crate::render::watch::{Device, Reports};
+use crate::render::wave::{Budget, WavePlan};
+use crate::render::worker::{Collected, Interrupt, Profile, UnitRect, Worker, device_limits};
 use crate::{Error, Result};
 
-/// What all devices of a render share.
-pub struct Pool<'a> {
-    pub prepared: &'a Arc<Prepared>,
-    pub queue: &'a Queue,
+/// What all devices of a render share. Nobody borrows it: a thread that is stuck in its driver keeps it for good.
+pub struct Pool {
+    pub prepared: Arc<Prepared>,
+    pub queue: Queue,
     /// Set before the first unit may be taken.
-    pub cube: &'a OnceLock<Writer>,
+    pub cube: OnceLock<Writer>,
     pub tile: [u32; 2],
     /// Samples of a full epoch.
     pub full_epoch: u32,
     /// Bytes of each device that may be used.
     pub memory: Option<u64>,
     pub profile: bool,
-    pub interrupt: &'a Arc<Interrupt>,
+    pub interrupt: Arc<Interrupt>,
 }
 
-/// What a device tells the thread that started it.
+/// What a device tells the thread that decides.
 pub enum Report {
     /// It passed the self-test and holds the scene; scene and buffers take this many bytes.
     Ready { bytes: u64 },
     /// A group of units is merged.
     Merged(Merged),
+    /// It goes on, but users should know.
+    Warning(String),
     /// It has left: at the end, or with an error, after which its units are back in the queue.
     Left { result: Result<Option<Profile>> },
 }
@@ -88,54 +97,135 @@ pub struct Merged {
     pub idle_s: f64,
 }
 
-impl Pool<'_> {
-    /// The life of device number `device`.
-    pub fn work(&self, device: usize, gpu: Gpu, reports: &Sender<(usize, Report)>) {
-        let report = |r: Report| {
-            // Nobody listens any more only when the render has ended already.
-            let _ = reports.send((device, r));
-        };
-        let mut taken = VecDeque::new();
-        let result = self.start(gpu, &report).and_then(|mut worker| {
-            self.pull(&mut worker, &mut taken, &report)?;
-            Ok((self.profile && worker.gpu.timestamps).then_some(worker.profile))
-        });
-        for taken in taken.into_iter().rev() {
-            self.queue.give_back(taken.group);
+/// A device at work: its number, the groups that it has under way, the oldest first, and to whom it reports.
+struct Post<'a> {
+    device: usize,
+    taken: VecDeque<Taken>,
+    reports: &'a Sender<(usize, Report)>,
+    /// Whether it was ready once, and what it measured.
+    ready: bool,
+    profile: Option<Profile>,
+}
+
+impl Post<'_> {
+    fn report(&self, report: Report) {
+        // Nobody listens any more only when the render has ended already.
+        let _ = self.reports.send((self.device, report));
+    }
+}
+
+impl Pool {
+    /// Sets every device to work on a thread of its own.
+    pub fn start(self: &Arc<Self>, gpus: Vec<Gpu>) -> Result<Reports> {
+        let (sender, receiver) = mpsc::channel();
+        let mut devices = Vec::new();
+        for (device, gpu) in gpus.into_iter().enumerate() {
+            let (name, deadline) = (gpu.name.clone(), Arc::clone(&gpu.deadline));
+            let (pool, sender) = (Arc::clone(self), sender.clone());
+            let thread = thread::Builder::new().name(format!("device {}", device + 1));
+            let thread = thread.spawn(move || pool.work(device, gpu, &sender));
+            let thread = thread.map_err(|e| Error::Internal(format!("no thread for device {}: {e}", device + 1)))?;
+            devices.push(Device { name, deadline, thread: Some(thread) });
         }
-        report(Report::Left { result });
+        Ok(Reports::new(Arc::clone(self), receiver, devices))
     }
 
-    fn start(&self, gpu: Gpu, report: &impl Fn(Report)) -> Result<Worker> {
-        self_test::run(&gpu)?;
+    /// The life of device number `device`.
+    fn work(&self, device: usize, gpu: Gpu, reports: &Sender<(usize, Report)>) {
+        let gpu = Arc::new(gpu);
+        let mut post = Post { device, taken: VecDeque::new(), reports, ready: false, profile: None };
+        let result = catch_unwind(AssertUnwindSafe(|| self.serve(&gpu, &mut post)));
+        let result =
+            result.unwrap_or_else(|_| Err(Error::Internal(format!("the thread of device {} panicked", device + 1))));
+        self.give_back(&mut post);
+        if gpu.is_hung() {
+            // Closing it would wait for its work, for good. It is lost with whatever it holds.
+            std::mem::forget(gpu);
+        } else {
+            let _watched = gpu.deadline.watch(WARM_UP);
+            drop(gpu);
+        }
+        let profile = post.profile;
+        post.report(Report::Left { result: result.map(|()| profile) });
+    }
+
+    fn give_back(&self, post: &mut Post) {
+        for taken in post.taken.drain(..).rev() {
+            self.queue.give_back(taken.group);
+        }
+    }
+
+    /// Renders until there is nothing more to do. A device that runs out of memory goes on with waves of half the size, as
+    /// long as there are smaller ones.
+    fn serve(&self, gpu: &Arc<Gpu>, post: &mut Post) -> Result<()> {
+        self_test::run(gpu)?;
         let budget = Budget { memory: self.memory, paths: None };
-        let mut worker = Worker::new(gpu, Arc::clone(self.prepared), self.tile, budget)?;
-        worker.watch(self.interrupt);
+        let mut waves = WavePlan::new(&self.prepared, self.tile, device_limits(gpu), budget)?;
+        let (mut shortage, mut told) = (false, false);
+        loop {
+            let result = self.start_worker(gpu, waves, post).and_then(|mut worker| {
+                if shortage && !told {
+                    told = true;
+                    post.report(Report::Warning(format!(
+                        "device {} ({}) ran out of memory and goes on with {} at most in smaller waves; --memory keeps it from \
+                         trying more",
+                        post.device + 1,
+                        gpu.name,
+                        format_bytes(waves.device_bytes())
+                    )));
+                }
+                let result = self.pull(&mut worker, post);
+                if worker.gpu.timestamps && self.profile {
+                    let sum = post.profile.get_or_insert_default();
+                    sum.generate_s += worker.profile.generate_s;
+                    sum.evaluate_s += worker.profile.evaluate_s;
+                }
+                result
+            });
+            let Err(Error::DeviceMemory(what)) = result else { return result };
+            // First of all, others may go on with its units.
+            self.give_back(post);
+            let Some(smaller) = waves.halved() else {
+                return Err(if post.ready { Error::DevicesLost(what) } else { Error::DeviceMemory(what) });
+            };
+            buffer::recover(gpu)?;
+            (waves, shortage) = (smaller, true);
+        }
+    }
+
+    fn start_worker(&self, gpu: &Arc<Gpu>, waves: WavePlan, post: &mut Post) -> Result<Worker> {
+        let mut worker = Worker::with_waves(Arc::clone(gpu), Arc::clone(&self.prepared), waves)?;
+        worker.watch(&self.interrupt);
         if self.profile {
             worker.enable_profile();
         }
-        report(Report::Ready { bytes: worker.plan.device_bytes() });
+        if !post.ready {
+            post.ready = true;
+            post.report(Report::Ready { bytes: waves.device_bytes() });
+        }
         Ok(worker)
     }
 
-    /// Renders what the queue has, until it has nothing any more. `taken`: groups under way, the oldest first.
-    fn pull(&self, worker: &mut Worker, taken: &mut VecDeque<Taken>, report: &impl Fn(Report)) -> Result<()> {
+    /// Renders what the queue has, until it has nothing any more.
+    fn pull(&self, worker: &mut Worker, post: &mut Post) -> Result<()> {
         loop {
+            #[cfg(test)]
+            worker.gpu.faults.reach(Phase::Between, &worker.gpu);
             let plan = worker.plan;
-            match self.queue.next(|epoch| plan.units_at_once(epoch_samples(epoch, self.full_epoch))) {
+            match self.queue.next(post.device, |epoch| plan.units_at_once(epoch_samples(epoch, self.full_epoch))) {
                 Next::Units(group) => {
                     let units: Vec<UnitRect> = group.tiles.iter().map(|&tile| self.unit_rect(tile)).collect();
                     let epochs = group.epoch..group.epoch + group.epochs;
-                    taken.push_back(Taken::new(group));
+                    post.taken.push_back(Taken::new(group));
                     for epoch in epochs {
                         let samples = epoch_samples(epoch, self.full_epoch);
-                        worker.submit(&units, epoch, samples, &mut |c| self.merge(&c, taken, report))?;
+                        worker.submit(&units, epoch, samples, &mut |c| self.merge(&c, post))?;
                     }
                 }
                 // What this device holds back may be what others, or it itself, wait for.
                 Next::Later if worker.is_idle() => self.queue.wait(),
-                Next::Later => worker.collect(&mut |c| self.merge(&c, taken, report))?,
-                Next::Never => return worker.collect(&mut |c| self.merge(&c, taken, report)),
+                Next::Later => worker.collect(&mut |c| self.merge(&c, post))?,
+                Next::Never => return worker.collect(&mut |c| self.merge(&c, post)),
             }
         }
     }
@@ -151,8 +241,25 @@ impl Pool<'_> {
         [x + rect.x0, y + rect.y0, x + rect.x1, y + rect.y1]
     }
 
-    /// Takes what came back of the oldest group under way; merges it into the cube when all has.
-    fn merge(&self, collected: &Collected, taken: &mut VecDeque<Taken>, report: &impl Fn(Report)) -> Result<()> {
+    /// Takes what came back of the oldest group under way; merges it into the cube when all has, unless somebody else has
+    /// been asked for it meanwhile.
+    fn merge(&self, collected: &Collected, post: &mut Post) -> Result<()> {
+        let Some(oldest) = post.taken.front_mut() else {
+            return Err(Error::Internal("a device returned units that it had not taken".into()));
+        };
+        let epoch = oldest.group.epoch + oldest.collected;
+        oldest.collected += 1;
+        let last = oldest.collected == oldest.group.epochs;
+        if !(if last { self.queue.claim(&oldest.group) } else { self.queue.is_wanted(&oldest.group) }) {
+            if last {
+                post.taken.pop_front();
+            }
+            #[cfg(test)]
+            collected.gpu.faults.discarded.fetch_add(1, std::sync::atomic::Ordering::SeqCst);
+            return Ok(());
+        }
+        #[cfg(test)]
+        collected.gpu.faults.reach(Phase::Merge, collected.gpu);
         let counters = collected.counters;
         if counters.overflow > 0 {
             let [x0, y0, x1, y1] = collected.units[0];
@@ -163,16 +270,10 @@ impl Pool<'_> {
             )));
         }
         let began = Instant::now();
-        let Some(oldest) = taken.front_mut() else {
-            return Err(Error::Internal("a device returned units that it had not taken".into()));
-        };
-        let epoch = oldest.group.epoch + oldest.collected;
         oldest.note(counters, epoch, || self.bad_sample(collected));
-        oldest.collected += 1;
         let (n_before, samples) = (samples_before(epoch, self.full_epoch), epoch_samples(epoch, self.full_epoch));
         let unit_len = collected.means.len() / collected.units.len();
         let units = collected.means.chunks(unit_len);
-        let last = oldest.collected == oldest.group.epochs;
         if oldest.group.epochs > 1 {
             // The same arithmetic as in the cube, but nothing is written before the last of these epochs.
             if oldest.means.is_empty() {
@@ -191,13 +292,13 @@ impl Pool<'_> {
                 self.cube().merge_unit(tile, n_before, samples, unit)?;
             }
         }
-        let Some(Taken { group, tally, bad, .. }) = taken.pop_front() else { return Ok(()) };
+        let Some(Taken { group, tally, bad, .. }) = post.taken.pop_front() else { return Ok(()) };
         self.queue.done(&group);
         let merged = u64::from(n_before + samples - samples_before(group.epoch, self.full_epoch));
         let grid = self.cube().cube().grid();
         let paths = group.tiles.iter().map(|&tile| grid.rect(tile).pixels() * merged).sum();
         let (merge_s, idle_s) = (began.elapsed().as_secs_f64(), collected.idle_s);
-        report(Report::Merged(Merged { group, paths, tally, bad, merge_s, idle_s }));
+        post.report(Report::Merged(Merged { group, paths, tally, bad, merge_s, idle_s }));
         Ok(())
     }
 

@@ -1,12 +1,14 @@
 //! Which unit comes next: tiles in order, epochs of a tile in order, a tile on one device at a time.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::{Condvar, Mutex, MutexGuard};
 
 /// Units that a device takes together: those of some tiles in one epoch, or in all epochs from the first one on that are
 /// merged at once.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Group {
+    /// Numbers each taking of units, so that the late result of one that was superseded is told by it.
+    pub attempt: u64,
     /// The first of them, and how many.
     pub epoch: u32,
     pub epochs: u32,
@@ -39,12 +41,35 @@ struct State {
     /// Epochs that a new tile gets at once.
     together: u32,
     closed: bool,
+    /// Attempts so far, and those under way: who took what.
+    attempts: u64,
+    taken: BTreeMap<u64, (usize, Group)>,
+    /// Devices that get nothing any more.
+    expelled: BTreeSet<usize>,
+}
+
+impl State {
+    /// Units that were taken and not merged come first again.
+    fn put_back(&mut self, group: Group) {
+        for tile in group.tiles.into_iter().rev() {
+            self.ready.push_front((group.epoch, tile));
+        }
+    }
 }
 
 impl Queue {
     /// A queue without units.
     pub fn new() -> Queue {
-        let state = State { ready: VecDeque::new(), undecided: Vec::new(), allowed: 0, together: 1, closed: false };
+        let state = State {
+            ready: VecDeque::new(),
+            undecided: Vec::new(),
+            allowed: 0,
+            together: 1,
+            closed: false,
+            attempts: 0,
+            taken: BTreeMap::new(),
+            expelled: BTreeSet::new(),
+        };
         Queue { state: Mutex::new(state), changed: Condvar::new() }
     }
 
@@ -60,17 +85,31 @@ impl Queue {
         self.state.lock().unwrap_or_else(|e| e.into_inner())
     }
 
-    /// Takes up to `at_once(epoch)` tiles, `epoch` being the largest they get.
-    pub fn next(&self, at_once: impl Fn(u32) -> usize) -> Next {
+    /// Takes up to `at_once(epoch)` tiles for `device`, `epoch` being the largest they get.
+    pub fn next(&self, device: usize, at_once: impl Fn(u32) -> usize) -> Next {
         let mut state = self.state();
-        if state.closed {
+        if state.closed || state.expelled.contains(&device) {
             return Next::Never;
         }
         let Some(&(epoch, _)) = state.ready.front() else { return Next::Later };
         let epochs = if epoch == 0 { state.together } else { 1 };
         let at_once = at_once(epoch + epochs - 1).max(1);
         let same = state.ready.iter().take(at_once).take_while(|unit| unit.0 == epoch).count();
-        Next::Units(Group { epoch, epochs, tiles: state.ready.drain(..same).map(|unit| unit.1).collect() })
+        let tiles = state.ready.drain(..same).map(|unit| unit.1).collect();
+        state.attempts += 1;
+        let group = Group { attempt: state.attempts, epoch, epochs, tiles };
+        state.taken.insert(group.attempt, (device, group.clone()));
+        Next::Units(group)
+    }
+
+    /// Whether the result of `group` is still wanted: not if its units were taken back.
+    pub fn is_wanted(&self, group: &Group) -> bool {
+        self.state().taken.contains_key(&group.attempt)
+    }
+
+    /// [`Queue::is_wanted`], which is asked before the result is merged: from a yes on the units cannot be taken back.
+    pub fn claim(&self, group: &Group) -> bool {
+        self.state().taken.remove(&group.attempt).is_some()
     }
 
     /// Waits until [`Queue::next`] would have another answer than `Later`.
@@ -92,11 +131,22 @@ impl Queue {
         self.changed.notify_all();
     }
 
-    /// Puts back units that were taken and not merged; they come first.
+    /// Puts back units that were taken and not merged, unless they were taken back or claimed.
     pub fn give_back(&self, group: Group) {
         let mut state = self.state();
-        for tile in group.tiles.into_iter().rev() {
-            state.ready.push_front((group.epoch, tile));
+        if state.taken.remove(&group.attempt).is_some() {
+            state.put_back(group);
+        }
+        self.changed.notify_all();
+    }
+
+    /// Takes back from `device` all that it has and has not claimed, and gives it nothing any more.
+    pub fn expel(&self, device: usize) {
+        let mut state = self.state();
+        state.expelled.insert(device);
+        let of_device = state.taken.extract_if(.., |_, (holder, _)| *holder == device).collect::<Vec<_>>();
+        for (_, (_, group)) in of_device.into_iter().rev() {
+            state.put_back(group);
         }
         self.changed.notify_all();
     }
@@ -124,42 +174,68 @@ impl Queue {
 mod tests {
     use super::*;
 
-    fn units(next: Next) -> (u32, Vec<u32>) {
+    fn group(next: Next) -> Group {
         match next {
-            Next::Units(group) => (group.epoch, group.tiles),
+            Next::Units(group) => group,
             other => panic!("{other:?} instead of units"),
         }
     }
 
-    fn group(epoch: u32, tiles: &[u32]) -> Group {
-        Group { epoch, epochs: 1, tiles: tiles.to_vec() }
+    fn units(next: Next) -> (u32, Vec<u32>) {
+        let Group { epoch, tiles, .. } = group(next);
+        (epoch, tiles)
     }
 
     #[test]
     fn epochs_of_a_tile_come_in_order_and_only_when_decided() {
         let queue = Queue::new();
         queue.fill((0..3).map(|tile| (tile, 0)), 1);
-        assert_eq!(queue.next(|_| 2), Next::Later);
+        assert_eq!(queue.next(0, |_| 2), Next::Later);
         queue.allow(2);
-        assert_eq!(units(queue.next(|_| 2)), (0, vec![0, 1]));
-        queue.done(&group(0, &[1]));
+        let lost = group(queue.next(0, |_| 1));
+        assert_eq!((lost.epoch, &lost.tiles[..]), (0, &[0][..]));
+        let second = group(queue.next(0, |_| 1));
+        assert_eq!((second.epoch, &second.tiles[..]), (0, &[1][..]));
+        queue.done(&second);
         // Tile 2 still owes its first epoch, and a group never mixes epochs.
-        assert_eq!(units(queue.next(|_| 9)), (0, vec![2]));
-        assert_eq!(units(queue.next(|_| 9)), (1, vec![1]));
-        assert_eq!(queue.next(|_| 9), Next::Later);
+        assert_eq!(units(queue.next(0, |_| 9)), (0, vec![2]));
+        assert_eq!(units(queue.next(0, |_| 9)), (1, vec![1]));
+        assert_eq!(queue.next(0, |_| 9), Next::Later);
         // What a lost device gives back comes first.
-        queue.done(&group(0, &[2]));
-        queue.give_back(group(0, &[0]));
-        assert_eq!(units(queue.next(|_| 1)), (0, vec![0]));
-        queue.done(&group(0, &[0]));
-        queue.done(&group(1, &[1]));
-        assert_eq!(units(queue.next(|_| 9)), (1, vec![2, 0]));
-        queue.done(&group(1, &[2, 0]));
-        assert_eq!(queue.next(|_| 9), Next::Later);
+        queue.done(&Group { tiles: vec![2], ..second.clone() });
+        queue.give_back(lost);
+        let again = group(queue.next(0, |_| 1));
+        assert_eq!((again.epoch, &again.tiles[..]), (0, &[0][..]));
+        queue.done(&again);
+        queue.done(&Group { epoch: 1, ..second.clone() });
+        assert_eq!(units(queue.next(0, |_| 9)), (1, vec![2, 0]));
+        queue.done(&Group { epoch: 1, tiles: vec![2, 0], ..second });
+        assert_eq!(queue.next(0, |_| 9), Next::Later);
         queue.allow(3);
-        assert_eq!(units(queue.next(|_| 9)), (2, vec![0, 1, 2]));
+        assert_eq!(units(queue.next(0, |_| 9)), (2, vec![0, 1, 2]));
         queue.close();
-        assert_eq!(queue.next(|_| 9), Next::Never);
+        assert_eq!(queue.next(0, |_| 9), Next::Never);
+    }
+
+    #[test]
+    fn what_a_device_is_relieved_of_is_superseded() {
+        let queue = Queue::new();
+        queue.fill((0..4).map(|tile| (tile, 0)), 1);
+        queue.allow(1);
+        let [first, second] = [0, 0].map(|device| group(queue.next(device, |_| 1)));
+        let other = group(queue.next(1, |_| 1));
+        // The first is being merged already: it stays with its device.
+        assert!(queue.claim(&first));
+        queue.expel(0);
+        assert!(!queue.claim(&second) && queue.claim(&other));
+        assert_eq!(queue.next(0, |_| 9), Next::Never);
+        // Neither the claimed nor the superseded come back by themselves.
+        queue.give_back(first);
+        queue.give_back(second.clone());
+        let again = group(queue.next(1, |_| 9));
+        assert_eq!((&again.tiles[..], again.attempt > second.attempt), (&[1, 3][..], true));
+        assert_eq!(queue.next(1, |_| 9), Next::Later);
+        assert!(!queue.claim(&second) && queue.claim(&again) && !queue.claim(&again));
     }
 
     /// Tiles of which something is there already go on from there; only new ones get epochs together.
@@ -168,12 +244,12 @@ mod tests {
         let queue = Queue::new();
         queue.fill([(0, 3), (1, 0), (2, 0), (3, 8)], 7);
         queue.allow(8);
-        let taken = queue.next(|epoch| if epoch == 6 { 9 } else { 0 });
-        let new = Group { epoch: 0, epochs: 7, tiles: vec![1, 2] };
-        assert_eq!(taken, Next::Units(new.clone()));
-        assert_eq!(queue.next(|_| 9), Next::Units(group(3, &[0])));
-        assert_eq!(queue.next(|_| 9), Next::Later);
+        let new = group(queue.next(0, |epoch| if epoch == 6 { 9 } else { 0 }));
+        assert_eq!((new.epoch, new.epochs, &new.tiles[..]), (0, 7, &[1, 2][..]));
+        assert!(queue.is_wanted(&new) && queue.claim(&new) && !queue.is_wanted(&new));
+        assert_eq!(units(queue.next(0, |_| 9)), (3, vec![0]));
+        assert_eq!(queue.next(0, |_| 9), Next::Later);
         queue.done(&new);
-        assert_eq!(queue.next(|_| 9), Next::Units(group(7, &[1, 2])));
+        assert_eq!(units(queue.next(0, |_| 9)), (7, vec![1, 2]));
     }
 }

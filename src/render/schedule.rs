@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, VecDeque};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
-use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::sync::{Arc, OnceLock};
+use std::thread;
 use std::time::{Duration, Instant};
 
 use serde_json::json;
@@ -18,6 +18,7 @@ use crate::render::plan;
 use crate::render::pool::{Merged, Pool, Report, Tally};
 use crate::render::prepare::Prepared;
 use crate::render::queue::Queue;
+use crate::render::watch::{Polled, Reports};
 use crate::render::worker::{Interrupt, Profile, check_interrupt};
 use crate::scene::Scene;
 use crate::{Error, Result, files, format};
@@ -29,8 +30,6 @@ const PREVIEW_INTERVAL: Duration = Duration::from_secs(1);
 const PREVIEW_SHARE: u32 = 20;
 /// Most pixels of the preview file: 4K. Larger pictures are reduced, so that memory does not grow with the cube.
 pub const PREVIEW_PIXELS: u64 = 3840 * 2160;
-/// How soon a signal is noticed while no device has anything to report.
-const SIGNAL_INTERVAL: Duration = Duration::from_millis(200);
 
 /// When to stop; the first that is reached does, at the end of an epoch of the whole image.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -163,47 +162,42 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
         observe(Event::Warning(what))?;
     }
 
-    let (queue, cube) = (Queue::new(), OnceLock::new());
-    let pool = Pool {
-        prepared: &prepared,
-        queue: &queue,
-        cube: &cube,
+    let pool = Arc::new(Pool {
+        prepared,
+        queue: Queue::new(),
+        cube: OnceLock::new(),
         tile,
         full_epoch: job.scene.integrator.epoch,
         memory: job.memory,
         profile: job.profile,
-        interrupt,
-    };
+        interrupt: Arc::clone(interrupt),
+    });
     let names = gpus.iter().map(|gpu| gpu.name.clone()).collect();
     let mut render = Render::new(job, names, samples_limit, interrupt, started);
-    let result = std::thread::scope(|threads| {
-        let (sender, reports) = mpsc::channel();
-        for (device, gpu) in gpus.into_iter().enumerate() {
-            let (pool, sender) = (&pool, sender.clone());
-            threads.spawn(move || pool.work(device, gpu, &sender));
-        }
-        drop(sender);
-        let result = render.wait_for_devices(&reports, observe).and_then(|()| {
-            check_interrupt(interrupt)?;
-            // Only now is anything written: whatever can be refused has been.
-            let mut warnings = Vec::new();
-            let opened = Writer::open(&job.output, &header, job.existing, tiles, &mut |what| warnings.push(what));
-            warnings.into_iter().try_for_each(|what| observe(Event::Warning(what)))?;
-            let opened = opened?;
-            let cube = cube.get_or_init(|| opened);
-            threads.spawn(|| cube.commit_regularly());
-            render.epochs(cube, &queue, &reports, observe)
-        });
-        // At the end nobody has a unit any more; after an error those under way are dropped.
-        queue.close();
-        reports.iter().for_each(|(_, report)| render.note_profile(report));
-        if let Some(cube) = cube.get() {
-            cube.close();
-        }
-        result
+    let mut reports = pool.start(gpus)?;
+    let mut committer = None;
+    let result = render.wait_for_devices(&mut reports, observe).and_then(|()| {
+        check_interrupt(interrupt)?;
+        // Only now is anything written: whatever can be refused has been.
+        let mut warnings = Vec::new();
+        let opened = Writer::open(&job.output, &header, job.existing, tiles, &mut |what| warnings.push(what));
+        warnings.into_iter().try_for_each(|what| observe(Event::Warning(what)))?;
+        let opened = opened?;
+        let cube = pool.cube.get_or_init(|| opened);
+        let commits = Arc::clone(&pool);
+        // What goes wrong there is what the next unit, or the last commit, ends with.
+        committer = Some(thread::spawn(move || commits.cube.get().map(Writer::commit_regularly)));
+        render.epochs(cube, &pool.queue, &mut reports, observe)
     });
+    // At the end nobody has a unit any more; after an error those under way are dropped.
+    pool.queue.close();
+    reports.for_each(|(_, report)| render.note_profile(report));
     // What ended the epochs is the error to report, whatever else fails for the same reason.
-    let Some(cube) = cube.get() else { return Err(result.err().unwrap_or_else(no_cube)) };
+    let Some(cube) = pool.cube.get() else { return Err(result.err().unwrap_or_else(no_cube)) };
+    cube.close();
+    if committer.is_some_and(|committer| committer.join().is_err()) {
+        return Err(Error::Internal("the thread that commits panicked".into()));
+    }
     let flushed = cube.flush();
     let preview = render.write_preview(cube);
     let facts = render.write_run_facts(cube);
@@ -320,14 +314,10 @@ impl<'a> Render<'a> {
     }
 
     /// Waits until every device holds the scene, or has left: one that cannot is left out, unless none can.
-    fn wait_for_devices(
-        &mut self,
-        reports: &Receiver<(usize, Report)>,
-        observe: &mut dyn FnMut(Event) -> Result<()>,
-    ) -> Result<()> {
+    fn wait_for_devices(&mut self, reports: &mut Reports, observe: &mut dyn FnMut(Event) -> Result<()>) -> Result<()> {
         let (mut ready, mut refused) = (0, BTreeMap::new());
         while ready < self.active {
-            let (device, report) = reports.recv().map_err(|_| no_cube())?;
+            let (device, report) = reports.next().ok_or_else(no_cube)?;
             match report {
                 Report::Ready { bytes } => {
                     if ready == 0 {
@@ -336,9 +326,7 @@ impl<'a> Render<'a> {
                     ready += 1;
                     self.device_bytes += bytes;
                 }
-                Report::Left {
-                    result: Err(error @ (Error::Usage(_) | Error::NoDevice(_) | Error::DevicesLost(_))),
-                } => {
+                Report::Left { result: Err(error) } if error.may_be_of_one_device() => {
                     self.active -= 1;
                     refused.insert(device, error);
                 }
@@ -360,7 +348,7 @@ impl<'a> Render<'a> {
     fn next_report(
         &self,
         cube: &Writer,
-        reports: &Receiver<(usize, Report)>,
+        reports: &mut Reports,
         observe: &mut dyn FnMut(Event) -> Result<()>,
     ) -> Result<(usize, Report)> {
         loop {
@@ -368,10 +356,10 @@ impl<'a> Render<'a> {
                 cube.flush()?;
                 observe(Event::Asked(&self.status))?;
             }
-            match reports.recv_timeout(SIGNAL_INTERVAL) {
-                Ok(report) => return Ok(report),
-                Err(RecvTimeoutError::Timeout) => check_interrupt(self.interrupt)?,
-                Err(RecvTimeoutError::Disconnected) => return Err(no_cube()),
+            match reports.poll() {
+                Polled::Said(device, report) => return Ok((device, report)),
+                Polled::Silence => check_interrupt(self.interrupt)?,
+                Polled::End => return Err(no_cube()),
             }
         }
     }
@@ -405,7 +393,7 @@ impl<'a> Render<'a> {
         &mut self,
         cube: &Writer,
         queue: &Queue,
-        reports: &Receiver<(usize, Report)>,
+        reports: &mut Reports,
         observe: &mut dyn FnMut(Event) -> Result<()>,
     ) -> Result<()> {
         let full = self.job.scene.integrator.epoch;
@@ -460,7 +448,11 @@ impl<'a> Render<'a> {
 
     /// A device has left. The others go on without it, if it was lost and there are others.
     fn left(&mut self, device: usize, report: Report, observe: &mut dyn FnMut(Event) -> Result<()>) -> Result<()> {
-        let Report::Left { result } = report else { return Ok(()) };
+        let result = match report {
+            Report::Left { result } => result,
+            Report::Warning(what) => return observe(Event::Warning(what)),
+            Report::Ready { .. } | Report::Merged(_) => return Ok(()),
+        };
         self.active -= 1;
         match result {
             Err(Error::DevicesLost(what) | Error::NoDevice(what)) if self.active > 0 => {

@@ -3,14 +3,17 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use crate::gpu::adapter::Gpu;
 use crate::gpu::buffer;
+#[cfg(test)]
+use crate::gpu::fault::Phase;
 use crate::gpu::layout::{Counters, Proof, Wave};
 use crate::gpu::pass::Pass;
 use crate::gpu::shader;
 use crate::gpu::upload::{self, SceneBuffers};
+use crate::render::patience::Patience;
 use crate::render::prepare::{EvaluateShape, Prepared};
 use crate::render::wave::{self, Budget, DeviceLimits, WavePlan};
 use crate::{Error, Result};
@@ -64,14 +67,26 @@ pub struct Worker {
     timestamps: Option<Timestamps>,
     slots: Vec<Slot>,
     next_slot: usize,
-    waves: VecDeque<wgpu::SubmissionIndex>,
+    /// Waves under way, the oldest first.
+    waves: VecDeque<InFlight>,
     /// Waves submitted so far.
-    sequence: u64,
+    submitted: u64,
+    patience: Patience,
+    /// Since when the device has been at work on the oldest wave, or will be from its submission.
+    at_work_since: Instant,
     interrupt: Arc<Interrupt>,
     /// Since when nothing is under way; `None` before the first unit.
     idle_since: Option<Instant>,
     /// Seconds without work between the first unit and the last.
     idle_s: f64,
+}
+
+/// A wave on the device.
+struct InFlight {
+    /// The number of waves submitted, this one included.
+    number: u64,
+    paths: u32,
+    submission: wgpu::SubmissionIndex,
 }
 
 /// A pass with its bind groups.
@@ -105,11 +120,15 @@ struct Slot {
 struct Pending {
     units: Vec<UnitRect>,
     submission: wgpu::SubmissionIndex,
+    /// The number of its last wave.
+    last_wave: u64,
     proof: Proof,
 }
 
 /// What a group of units brought back.
 pub struct Collected<'a> {
+    #[cfg(test)]
+    pub gpu: &'a Gpu,
     pub units: &'a [UnitRect],
     /// [unit][row of the full tile][column][channel]; slots outside a unit's rectangle hold zeros.
     pub means: &'a [f32],
@@ -128,9 +147,20 @@ impl Worker {
 
     /// As [`Worker::new`], with waves as planned.
     pub fn with_waves(gpu: Arc<Gpu>, prepared: Arc<Prepared>, plan: WavePlan) -> Result<Worker> {
+        let _watched = gpu.deadline.watch(buffer::WARM_UP);
         let windows = upload::windows(&prepared, plan.limits.binding)?;
         let scene = SceneBuffers::new(&gpu, &prepared, &windows)?;
         let path_buffers = PathBuffers::new(&gpu, &plan);
+        let slots = (0..SLOTS)
+            .map(|_| {
+                let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
+                Slot { staging: buffer::empty(&gpu, "staging", plan.staging_bytes(), usage), pending: None }
+            })
+            .collect();
+        #[cfg(test)]
+        gpu.faults.reach(Phase::Start, &gpu);
+        // Before shaders are compiled in vain.
+        gpu.check()?;
 
         let shape = EvaluateShape::new(prepared.tables.channels_padded as u32 / 4, gpu.is_software);
         let defines = prepared.defines(&windows);
@@ -144,17 +174,6 @@ impl Worker {
         let camera = stage(&prepared.camera_modules(), &defines)?;
         let bounce = stage(&prepared.bounce_modules(), &defines)?;
         let evaluate = stage(&prepared.evaluate_modules(), &prepared.evaluate_defines(shape))?;
-        let slots = (0..SLOTS)
-            .map(|_| Slot {
-                staging: buffer::empty(
-                    &gpu,
-                    "staging",
-                    plan.staging_bytes(),
-                    wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-                ),
-                pending: None,
-            })
-            .collect();
         gpu.check()?;
         let profile = Profile::default();
         let timestamps = None;
@@ -172,7 +191,9 @@ impl Worker {
             slots,
             next_slot: 0,
             waves: VecDeque::new(),
-            sequence: 0,
+            submitted: 0,
+            patience: Patience::default(),
+            at_work_since: Instant::now(),
             interrupt: Arc::default(),
             idle_since: None,
             idle_s: 0.0,
@@ -208,19 +229,17 @@ impl Worker {
         let buffers = &self.path_buffers;
         self.gpu.queue.write_buffer(&buffers.units, 0, bytemuck::cast_slice(units));
         let ahead = if self.gpu.is_software { WAVES_AHEAD_SOFTWARE } else { WAVES_AHEAD };
-        for mut wave in self.plan.waves(units.len() as u32, epoch, epoch_samples) {
-            self.sequence += 1;
-            wave.sequence = self.sequence as u32;
+        for wave in self.plan.waves(units.len() as u32, epoch, epoch_samples) {
             check_interrupt(&self.interrupt)?;
-            while self.waves.len() >= ahead
-                && let Some(oldest) = self.waves.pop_front()
-            {
-                buffer::wait(&self.gpu, oldest)?;
+            while self.waves.len() >= ahead {
+                self.wait_for_wave()?;
             }
-            let submission = self.submit_wave(&wave)?;
-            self.waves.push_back(submission);
+            #[cfg(test)]
+            self.gpu.faults.reach(Phase::of(&wave), &self.gpu);
+            self.submit_wave(wave)?;
         }
 
+        let _watched = self.gpu.deadline.watch(self.limit());
         let mut encoder = self.encoder("transfer");
         let buffers = &self.path_buffers;
         let size = self.unit_bytes() * units.len() as u64;
@@ -230,8 +249,36 @@ impl Worker {
         encoder.clear_buffer(&buffers.counters, 0, None);
         let submission = self.gpu.queue.submit([encoder.finish()]);
         buffer::map(staging);
-        let proof = self.proof(units, epoch_samples);
-        self.slots[slot].pending = Some(Pending { units: units.to_vec(), submission, proof });
+        let (last_wave, proof) = (self.submitted, self.proof(units, epoch_samples));
+        self.slots[slot].pending = Some(Pending { units: units.to_vec(), submission, last_wave, proof });
+        #[cfg(test)]
+        self.gpu.faults.reach(Phase::Transfer, &self.gpu);
+        Ok(())
+    }
+
+    /// How long whatever is under way may take.
+    fn limit(&self) -> Duration {
+        self.patience.limit(self.waves.iter().map(|wave| u64::from(wave.paths)).sum())
+    }
+
+    /// Waits for the oldest wave under way.
+    fn wait_for_wave(&mut self) -> Result<()> {
+        let Some(oldest) = self.waves.front() else { return Ok(()) };
+        let (number, submission) = (oldest.number, oldest.submission.clone());
+        self.wait(submission, number)
+    }
+
+    /// Waits for a submission after which the waves up to number `done` have been done.
+    fn wait(&mut self, submission: wgpu::SubmissionIndex, done: u64) -> Result<()> {
+        buffer::wait(&self.gpu, submission, self.limit())?;
+        let mut paths = 0;
+        while let Some(wave) = self.waves.pop_front_if(|wave| wave.number <= done) {
+            paths += u64::from(wave.paths);
+        }
+        if paths > 0 {
+            self.patience.note(paths, self.at_work_since.elapsed());
+            self.at_work_since = Instant::now();
+        }
         Ok(())
     }
 
@@ -245,7 +292,7 @@ impl Worker {
 
     fn collect_slot(&mut self, slot: usize, collected: &mut dyn FnMut(Collected) -> Result<()>) -> Result<()> {
         let Some(pending) = self.slots[slot].pending.take() else { return Ok(()) };
-        buffer::wait(&self.gpu, pending.submission)?;
+        self.wait(pending.submission, pending.last_wave)?;
         if self.is_idle() {
             self.idle_since = Some(Instant::now());
         }
@@ -254,13 +301,22 @@ impl Worker {
         {
             let lost = |e| Error::DevicesLost(format!("{}: {e}", self.gpu.name));
             let end = size + size_of::<Counters>() as u64;
-            let view = staging.slice(..end).get_mapped_range().map_err(lost)?;
+            let view = {
+                let _watched = self.gpu.deadline.watch(self.limit());
+                #[cfg(test)]
+                self.gpu.faults.reach(Phase::Mapping, &self.gpu);
+                // A shortage of memory, say, is why there may be nothing to see.
+                self.gpu.check()?;
+                staging.slice(..end).get_mapped_range().map_err(lost)?
+            };
             let counters: Counters = bytemuck::pod_read_unaligned(&view[size as usize..]);
             if let Some(what) = counters.missing(&pending.proof) {
                 let what = format!("{}: a unit came back incomplete: {what}", self.gpu.name);
                 return Err(Error::DevicesLost(what));
             }
             collected(Collected {
+                #[cfg(test)]
+                gpu: &self.gpu,
                 units: &pending.units,
                 means: bytemuck::cast_slice(&view[..size as usize]),
                 counters,
@@ -284,7 +340,7 @@ impl Worker {
         Proof {
             paths: units.iter().map(pixels).sum::<u64>() * samples,
             folded: slots * samples * u64::from(self.shape.blocks),
-            sequence: self.sequence,
+            sequence: sequence(self.submitted),
         }
     }
 
@@ -297,13 +353,24 @@ impl Worker {
     }
 
     /// Generate: camera rays, then a bounce at a time. Evaluate: all channels along the saved paths.
-    fn submit_wave(&mut self, wave: &Wave) -> Result<wgpu::SubmissionIndex> {
-        self.gpu.queue.write_buffer(&self.path_buffers.wave, 0, bytemuck::bytes_of(wave));
+    fn submit_wave(&mut self, mut wave: Wave) -> Result<()> {
+        if self.waves.is_empty() {
+            self.at_work_since = Instant::now();
+        }
+        self.submitted += 1;
+        wave.sequence = sequence(self.submitted);
+        let paths = wave.path_count;
+        let [groups, pixel_groups] = [paths.div_ceil(64), wave.pixel_count.div_ceil(self.shape.pixels)];
+        #[cfg(test)]
+        self.gpu.faults.silence(&mut wave);
+
+        let _watched = self.gpu.deadline.watch(self.limit());
+        self.gpu.queue.write_buffer(&self.path_buffers.wave, 0, bytemuck::bytes_of(&wave));
         let mut encoder = self.encoder("wave");
         encoder.clear_buffer(&self.path_buffers.queue_lengths, 0, None);
         {
             let mut pass = self.begin(&mut encoder, "generate", 0);
-            let [x, y] = fold(wave.path_count.div_ceil(64));
+            let [x, y] = fold(groups);
             self.camera.set(&mut pass, &[]);
             pass.dispatch_workgroups(x, y, 1);
             for step in wave::steps(self.prepared.frame.max_bounces) {
@@ -313,7 +380,7 @@ impl Worker {
         }
         {
             let mut pass = self.begin(&mut encoder, "evaluate", 1);
-            let [x, y] = fold(wave.pixel_count.div_ceil(self.shape.pixels));
+            let [x, y] = fold(pixel_groups);
             self.evaluate.set(&mut pass, &[]);
             pass.dispatch_workgroups(x, y, self.shape.blocks);
         }
@@ -321,13 +388,13 @@ impl Worker {
             timestamps.resolve(&mut encoder);
         }
         let submission = self.gpu.queue.submit([encoder.finish()]);
+        self.waves.push_back(InFlight { number: self.submitted, paths, submission });
         if let Some(timestamps) = &self.timestamps {
-            buffer::wait(&self.gpu, submission.clone())?;
-            let [generate, evaluate] = timestamps.read(&self.gpu)?;
+            let [generate, evaluate] = timestamps.read(&self.gpu, self.limit())?;
             self.profile.generate_s += generate;
             self.profile.evaluate_s += evaluate;
         }
-        Ok(submission)
+        Ok(())
     }
 
     fn begin<'e>(
@@ -356,6 +423,11 @@ pub fn device_limits(gpu: &Gpu) -> DeviceLimits {
         uniform_alignment: gpu.limits.min_uniform_buffer_offset_alignment,
         software: gpu.is_software,
     }
+}
+
+/// What marks wave `number` on the device: 16 bits, never 0.
+fn sequence(number: u64) -> u32 {
+    (number % 65_535) as u32 + 1
 }
 
 /// Workgroup counts in x and y for at least `groups` groups: a dimension takes at most 65,535.
@@ -443,9 +515,9 @@ impl Timestamps {
         encoder.resolve_query_set(&self.queries, 0..4, &self.resolved, 0);
     }
 
-    /// Seconds of generate and evaluate.
-    fn read(&self, gpu: &Gpu) -> Result<[f64; 2]> {
-        let ticks: Vec<u64> = buffer::read(gpu, &self.resolved, 32)?;
+    /// Seconds of generate and evaluate, when they are done.
+    fn read(&self, gpu: &Gpu, limit: Duration) -> Result<[f64; 2]> {
+        let ticks: Vec<u64> = buffer::read(gpu, &self.resolved, 32, limit)?;
         let period = f64::from(gpu.queue.get_timestamp_period()) * 1e-9;
         Ok([0, 2].map(|i| ticks[i + 1].saturating_sub(ticks[i]) as f64 * period))
     }

@@ -63,8 +63,8 @@ pub fn trace(prepared: &Prepared, rays: &[Ray]) -> Vec<Hit> {
         compute.dispatch_workgroups((rays.len() as u32).div_ceil(64), 1, 1);
     }
     let submission = gpu.queue.submit([encoder.finish()]);
-    buffer::wait(&gpu, submission).expect("results");
-    let hits: Vec<[u32; 4]> = buffer::read(&gpu, &output, size).expect("results");
+    buffer::wait(&gpu, submission, buffer::WARM_UP).expect("results");
+    let hits: Vec<[u32; 4]> = buffer::read(&gpu, &output, size, buffer::WARM_UP).expect("results");
     hits.iter()
         .map(|[distance, primitive, overflow, _]| Hit {
             distance: f32::from_bits(*distance),
