@@ -21,7 +21,7 @@ const TILE: u32 = 64;
 
 fn main() -> Result<()> {
     let measure = std::env::args().any(|a| a == "--bench");
-    let [channels, samples, rounds] = if measure { [512, 128, 9] } else { [32, 16, 1] };
+    let [channels, samples, rounds] = if measure { [512, 128, 5] } else { [32, 16, 1] };
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell/cornell.toml");
     let set = |key: &str, value: &str| (key.to_owned(), value.to_owned());
     let size = TILE.to_string();

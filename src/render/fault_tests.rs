@@ -84,14 +84,24 @@ impl Outcome {
     }
 }
 
-/// Renders on `devices` devices, whose faults have been planned. Few paths fit: every unit takes several waves.
+/// Renders into a cube of its own.
 fn render(devices: usize, samples: u32, observe: &mut dyn FnMut(&Event)) -> Outcome {
     let folder = tempfile::tempdir().expect("a folder");
-    let output = folder.path().join("cube.zarr");
+    render_into(&folder.path().join("cube.zarr"), Existing::Refuse, devices, samples, observe)
+}
+
+/// Renders on `devices` devices, whose faults have been planned. Few paths fit: every unit takes several waves.
+fn render_into(
+    output: &Path,
+    existing: Existing,
+    devices: usize,
+    samples: u32,
+    observe: &mut dyn FnMut(&Event),
+) -> Outcome {
     let job = Job {
         scene: scene(),
-        output: output.clone(),
-        existing: Existing::Refuse,
+        output: output.to_owned(),
+        existing,
         tiles: None,
         seed: 3,
         tile: Some(TILE),
@@ -112,7 +122,7 @@ fn render(devices: usize, samples: u32, observe: &mut dyn FnMut(&Event)) -> Outc
         Ok(())
     });
     let mut tiles = BTreeMap::new();
-    if let Ok(cube) = Cube::open(&output) {
+    if let Ok(cube) = Cube::open(output) {
         for tile in 0..cube.grid().count() {
             if let Some(chunk) = cube.chunk(tile).expect("read") {
                 let bits = chunk.values().iter().map(|v| v.to_bits()).collect();
@@ -120,7 +130,7 @@ fn render(devices: usize, samples: u32, observe: &mut dyn FnMut(&Event)) -> Outc
             }
         }
     }
-    let arrays = if output.exists() { arrays(&output) } else { Arrays::new() };
+    let arrays = if output.exists() { arrays(output) } else { Arrays::new() };
     Outcome { result, arrays, warnings, units, tiles }
 }
 
@@ -174,7 +184,7 @@ fn another_device_finishes_with_the_same_bytes() {
 }
 
 /// Alone, the render ends as lost, and the cube holds what was merged: whole units, bit for bit those of an undisturbed
-/// render, and all that had been reported.
+/// render, and all that had been reported. Gone on with, it ends with the bytes of one.
 #[test]
 fn alone_every_merged_unit_stays() {
     let _turn = turn();
@@ -189,7 +199,9 @@ fn alone_every_merged_unit_stays() {
     for (name, kind, said, phases) in fatal() {
         for &phase in phases {
             let faults = plan(phase, 4, kind.clone());
-            let outcome = render(1, SAMPLES, &mut |_| ());
+            let folder = tempfile::tempdir().expect("a folder");
+            let output = folder.path().join("cube.zarr");
+            let outcome = render_into(&output, Existing::Refuse, 1, SAMPLES, &mut |_| ());
             assert_eq!(faults.fired(), 1, "{name}, {phase:?}");
             match &outcome.result {
                 Err(error @ Error::DevicesLost(what)) => {
@@ -207,6 +219,15 @@ fn alone_every_merged_unit_stays() {
             assert_eq!(units, outcome.units, "{name}, {phase:?}: what is there, and what was reported");
             assert!(units > 0, "{name}, {phase:?}: nothing had been merged");
             faults.release();
+            // A thread that was stuck holds the cube until it returns.
+            let cube = Cube::open(&output).expect("a cube");
+            while cube.in_use().is_some() {
+                std::thread::sleep(std::time::Duration::from_millis(1));
+            }
+            let resumed = render_into(&output, Existing::Resume, 1, SAMPLES, &mut |_| ());
+            resumed.succeeded();
+            assert!(resumed.warnings.is_empty(), "{name}, {phase:?}: {:?}", resumed.warnings);
+            assert!(resumed.arrays == straight[&SAMPLES].arrays, "{name}, {phase:?}");
         }
     }
 }

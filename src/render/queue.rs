@@ -57,9 +57,9 @@ impl State {
     }
 }
 
-impl Queue {
+impl Default for Queue {
     /// A queue without units.
-    pub fn new() -> Queue {
+    fn default() -> Queue {
         let state = State {
             ready: VecDeque::new(),
             undecided: Vec::new(),
@@ -72,7 +72,9 @@ impl Queue {
         };
         Queue { state: Mutex::new(state), changed: Condvar::new() }
     }
+}
 
+impl Queue {
     /// Adds tiles, each with the epoch that it goes on from; nothing of them may be taken before [`Queue::allow`]. A new
     /// tile gets its first `together` epochs at once.
     pub fn fill(&self, tiles: impl IntoIterator<Item = (u32, u32)>, together: u32) {
@@ -188,7 +190,7 @@ mod tests {
 
     #[test]
     fn epochs_of_a_tile_come_in_order_and_only_when_decided() {
-        let queue = Queue::new();
+        let queue = Queue::default();
         queue.fill((0..3).map(|tile| (tile, 0)), 1);
         assert_eq!(queue.next(0, |_| 2), Next::Later);
         queue.allow(2);
@@ -219,7 +221,7 @@ mod tests {
 
     #[test]
     fn what_a_device_is_relieved_of_is_superseded() {
-        let queue = Queue::new();
+        let queue = Queue::default();
         queue.fill((0..4).map(|tile| (tile, 0)), 1);
         queue.allow(1);
         let [first, second] = [0, 0].map(|device| group(queue.next(device, |_| 1)));
@@ -241,7 +243,7 @@ mod tests {
     /// Tiles of which something is there already go on from there; only new ones get epochs together.
     #[test]
     fn new_tiles_may_get_several_epochs_at_once() {
-        let queue = Queue::new();
+        let queue = Queue::default();
         queue.fill([(0, 3), (1, 0), (2, 0), (3, 8)], 7);
         queue.allow(8);
         let new = group(queue.next(0, |epoch| if epoch == 6 { 9 } else { 0 }));

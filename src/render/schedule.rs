@@ -164,7 +164,7 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
 
     let pool = Arc::new(Pool {
         prepared,
-        queue: Queue::new(),
+        queue: Queue::default(),
         cube: OnceLock::new(),
         tile,
         full_epoch: job.scene.integrator.epoch,
