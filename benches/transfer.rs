@@ -21,7 +21,7 @@ const TILE: u32 = 64;
 
 fn main() -> Result<()> {
     let measure = std::env::args().any(|a| a == "--bench");
-    let [channels, samples, rounds] = if measure { [512, 128, 5] } else { [32, 16, 1] };
+    let [channels, samples, rounds] = if measure { [512, 64, 9] } else { [32, 16, 1] };
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell/cornell.toml");
     let set = |key: &str, value: &str| (key.to_owned(), value.to_owned());
     let size = TILE.to_string();
@@ -37,7 +37,7 @@ fn main() -> Result<()> {
     worker.submit(&[unit], 0, 1, &mut |_| Ok(()))?;
     worker.collect(&mut |_| Ok(()))?;
 
-    let portions: Vec<u32> = (0..7).map(|i| 1 << i).filter(|n| n * 2 <= samples).collect();
+    let portions: Vec<u32> = (0..7).map(|i| 1 << i).filter(|n| *n <= samples).collect();
     let mut seconds = vec![Vec::new(); portions.len()];
     let mut extra = vec![Vec::new(); portions.len()];
     let mut walls = vec![Vec::new(); portions.len()];

@@ -171,14 +171,16 @@ fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
 #endif
 
     var bad = BadSamples(0u, 0u, 0u);
-    var ended = 0u;
+    // Bits in which the mark of a path's end differs from this wave's.
+    var foreign = 0u;
+    let mark = wave.sequence << 16u;
     for (var i = 0u; i < wave.samples; i += 1u) {
         let path = local_slot * wave.samples + i;
         let head = heads[path];
         let s = spectral_sample(head.x);
         // Records in the low half; in the high one the wave, once the path has ended.
         let used = head.y & 0xffffu;
-        ended += select(0u, 1u, head.y >> 16u == wave.sequence);
+        foreign |= head.y ^ mark;
 #if REGISTERS
 #repeat VECTORS v
 #repeat FACTORS i
@@ -240,7 +242,7 @@ fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
 #end
     // A kernel that a driver drops without a word is noticed by this.
     if (thread % LANES == 0u) {
-        atomicAdd(&counters[COUNTER_FOLDED], ended);
+        atomicAdd(&counters[COUNTER_FOLDED], select(wave.samples, 0u, foreign > 0xffffu));
         if (local_slot == 0u && group.z == 0u) {
             atomicStore(&counters[COUNTER_SEQUENCE], wave.sequence);
         }

@@ -120,7 +120,7 @@ const COUNTER_BAD_SAMPLE: u32 = 4u;
 // Rays traced by the paths that ended: low and high word.
 const COUNTER_RAYS: u32 = 5u;
 const COUNTER_RAYS_HIGH: u32 = 6u;
-// Proof that all took place: samples folded whose paths have ended in the same wave (of all pixel slots, by each workgroup
-// of a pixel, modulo 2^32), and the sequence number of the last wave.
+// Proof that all took place: samples folded, of pixels all of whose paths have ended in the same wave (of all pixel slots,
+// by each workgroup of a pixel, modulo 2^32), and the sequence number of the last wave.
 const COUNTER_FOLDED: u32 = 7u;
 const COUNTER_SEQUENCE: u32 = 8u;

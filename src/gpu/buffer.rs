@@ -56,7 +56,7 @@ pub fn recover(gpu: &Gpu) -> Result<()> {
 }
 
 fn poll(gpu: &Gpu, submission: Option<wgpu::SubmissionIndex>, limit: Duration) -> Result<()> {
-    let _watched = gpu.deadline.watch(limit.saturating_mul(TIMEOUTS));
+    let _watched = gpu.deadline.watch(limit);
     for _ in 0..TIMEOUTS {
         #[cfg(test)]
         if gpu.faults.hangs() {

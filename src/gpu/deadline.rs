@@ -8,9 +8,6 @@ use std::time::{Duration, Instant};
 /// No deadline: the thread is not in the driver.
 const NONE: u64 = u64::MAX;
 
-/// What a thread may be late by for reasons of its own before it counts as stuck.
-const GRACE: Duration = Duration::from_secs(10);
-
 /// The deadline of one device.
 pub struct Deadline {
     origin: Instant,
@@ -31,10 +28,11 @@ impl Default for Deadline {
 }
 
 impl Deadline {
-    /// From now on until the result is dropped, what this thread does in the driver may take `limit`.
+    /// From now on until the result is dropped, what this thread does in the driver should take no longer than `limit`; the
+    /// deadline is twice that.
     pub fn watch(self: &Arc<Self>, limit: Duration) -> Watched {
-        let at = self.origin.elapsed().saturating_add(limit).saturating_add(GRACE).as_millis().min(u128::from(NONE - 1))
-            as u64;
+        let at = self.origin.elapsed().saturating_add(limit.saturating_mul(2));
+        let at = at.as_millis().min(u128::from(NONE - 1)) as u64;
         Watched { deadline: Arc::clone(self), before: self.at.swap(at, Ordering::SeqCst) }
     }
 

@@ -125,7 +125,7 @@ impl Pool {
             let thread = thread::Builder::new().name(format!("device {}", device + 1));
             let thread = thread.spawn(move || pool.work(device, gpu, &sender));
             let thread = thread.map_err(|e| Error::Internal(format!("no thread for device {}: {e}", device + 1)))?;
-            devices.push(Device { name, deadline, thread: Some(thread) });
+            devices.push(Device::new(name, deadline, thread));
         }
         Ok(Reports::new(Arc::clone(self), receiver, devices))
     }
@@ -180,6 +180,8 @@ impl Pool {
                     sum.generate_s += worker.profile.generate_s;
                     sum.evaluate_s += worker.profile.evaluate_s;
                 }
+                let _watched = gpu.deadline.watch(WARM_UP);
+                drop(worker);
                 result
             });
             let Err(Error::DeviceMemory(what)) = result else { return result };

@@ -251,8 +251,6 @@ struct Render<'a> {
     interrupt: &'a Interrupt,
     /// Samples per pixel at which to stop, the end of an epoch.
     samples_limit: Option<u32>,
-    /// Samples per pixel that every tile had before.
-    samples_found: u32,
     /// Paths to trace until the limit.
     paths_needed: Option<f64>,
     started: Instant,
@@ -268,6 +266,8 @@ struct Render<'a> {
     tally: Tally,
     /// Column, row, epoch and sample of the first bad sample, for the report.
     first_bad: Option<[u32; 4]>,
+    /// Samples of the last epoch, and the seconds that it took.
+    last_epoch: Option<(u32, f64)>,
     /// When the preview file may be rewritten.
     next_preview: Option<Instant>,
 }
@@ -286,7 +286,6 @@ impl<'a> Render<'a> {
             job,
             interrupt,
             samples_limit,
-            samples_found: 0,
             paths_needed: None,
             started,
             setup_s: 0.0,
@@ -309,6 +308,7 @@ impl<'a> Render<'a> {
             merged: VecDeque::new(),
             tally: Tally::default(),
             first_bad: None,
+            last_epoch: None,
             next_preview: None,
         }
     }
@@ -373,8 +373,7 @@ impl<'a> Render<'a> {
 
         let first = epochs().map(|(_, epoch)| epoch).min().unwrap_or(0);
         self.status.units.1 = cube.tiles().len() as u32;
-        self.samples_found = samples_before(first, full);
-        self.status.samples = self.samples_found;
+        self.status.samples = samples_before(first, full);
         self.paths_needed = self.samples_limit.map(|limit| {
             tiles().map(|(tile, n)| grid.rect(tile).pixels() as f64 * f64::from(limit.saturating_sub(n))).sum()
         });
@@ -404,6 +403,7 @@ impl<'a> Render<'a> {
             if self.samples_limit.is_some_and(|limit| self.status.samples >= limit) || self.too_late(n) {
                 return Ok(());
             }
+            let began = Instant::now();
             queue.allow(self.decided(epoch));
             self.status.samples_next =
                 self.status.samples.checked_add(n).ok_or_else(|| {
@@ -418,6 +418,7 @@ impl<'a> Render<'a> {
             }
             self.merged.pop_front();
             self.status.samples += n;
+            self.last_epoch = Some((n, began.elapsed().as_secs_f64()));
             self.update_estimate(cube);
             observe(Event::Epoch(&self.status))?;
         }
@@ -435,15 +436,11 @@ impl<'a> Render<'a> {
         self.started.elapsed().as_secs_f64() - self.setup_s
     }
 
-    /// Whether an epoch of `n` samples would not fit into the time that is left.
+    /// Whether an epoch of `n` samples would not fit into the time that is left, at the pace of the last one: the first ones
+    /// of a render also wait for shaders to be compiled.
     fn too_late(&self, n: u32) -> bool {
-        let Some(limit) = self.job.stop.time else { return false };
-        let rendered = self.status.samples - self.samples_found;
-        if rendered == 0 {
-            return false;
-        }
-        let predicted = self.rendering_s() / f64::from(rendered) * f64::from(n);
-        self.started.elapsed().as_secs_f64() + predicted > limit.as_secs_f64()
+        let (Some(limit), Some((samples, seconds))) = (self.job.stop.time, self.last_epoch) else { return false };
+        self.started.elapsed().as_secs_f64() + seconds / f64::from(samples) * f64::from(n) > limit.as_secs_f64()
     }
 
     /// A device has left. The others go on without it, if it was lost and there are others.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::Error;
 use crate::gpu::deadline::Deadline;
@@ -11,6 +11,10 @@ use crate::render::pool::{Pool, Report};
 
 /// How often deadlines are looked at while nobody reports.
 const TICK: Duration = Duration::from_millis(200);
+
+/// A thread is stuck when its deadline has passed at so many looks in a row, 10 s: when the whole process was stopped for a
+/// while, every deadline has passed, and the threads that are well need a moment to say so.
+const LOOKS: u32 = if cfg!(test) { 2 } else { 50 };
 
 /// The reports of all devices in the order of their arrival, until every device has left.
 ///
@@ -20,25 +24,39 @@ pub struct Reports {
     pool: Arc<Pool>,
     receiver: Receiver<(usize, Report)>,
     devices: Vec<Device>,
+    last_look: Instant,
 }
 
 /// A device as seen from outside.
 pub struct Device {
-    pub name: String,
-    pub deadline: Arc<Deadline>,
+    name: String,
+    deadline: Arc<Deadline>,
     /// `None` once it has left.
-    pub thread: Option<JoinHandle<()>>,
+    thread: Option<JoinHandle<()>>,
+    /// Looks in a row at which its deadline had passed.
+    late: u32,
+}
+
+impl Device {
+    pub fn new(name: String, deadline: Arc<Deadline>, thread: JoinHandle<()>) -> Device {
+        Device { name, deadline, thread: Some(thread), late: 0 }
+    }
 }
 
 impl Reports {
     pub fn new(pool: Arc<Pool>, receiver: Receiver<(usize, Report)>, devices: Vec<Device>) -> Reports {
-        Reports { pool, receiver, devices }
+        Reports { pool, receiver, devices, last_look: Instant::now() }
     }
 
     /// A device whose thread is stuck: from now on it has left.
     fn expel_stuck(&mut self) -> Option<(usize, Report)> {
-        let stuck = |d: &Device| d.thread.is_some() && d.deadline.has_passed();
-        let device = self.devices.iter().position(stuck)?;
+        if self.last_look.elapsed() >= TICK {
+            self.last_look = Instant::now();
+            for device in &mut self.devices {
+                device.late = if device.deadline.has_passed() { device.late + 1 } else { 0 };
+            }
+        }
+        let device = self.devices.iter().position(|d| d.thread.is_some() && d.late >= LOOKS)?;
         self.pool.queue.expel(device);
         self.devices[device].thread = None;
         let what = format!("{}: stuck in its driver, which did not return in time", self.devices[device].name);
@@ -70,8 +88,11 @@ impl Reports {
                 let _ = thread.join();
                 Polled::Said(device, report)
             }
-            Some((device, report)) => Polled::Said(device, report),
-            None => Polled::Silence,
+            // One that was expelled may have merged units before; nothing else of it counts.
+            Some((device, report)) if self.devices[device].thread.is_some() || matches!(report, Report::Merged(_)) => {
+                Polled::Said(device, report)
+            }
+            _ => Polled::Silence,
         }
     }
 }

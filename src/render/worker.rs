@@ -226,8 +226,10 @@ impl Worker {
             self.idle_s += since.elapsed().as_secs_f64();
         }
 
-        let buffers = &self.path_buffers;
-        self.gpu.queue.write_buffer(&buffers.units, 0, bytemuck::cast_slice(units));
+        {
+            let _watched = self.gpu.deadline.watch(self.limit());
+            self.gpu.queue.write_buffer(&self.path_buffers.units, 0, bytemuck::cast_slice(units));
+        }
         let ahead = if self.gpu.is_software { WAVES_AHEAD_SOFTWARE } else { WAVES_AHEAD };
         for wave in self.plan.waves(units.len() as u32, epoch, epoch_samples) {
             check_interrupt(&self.interrupt)?;
@@ -323,6 +325,7 @@ impl Worker {
                 idle_s: self.idle_s,
             })?;
         }
+        let _watched = self.gpu.deadline.watch(self.limit());
         staging.unmap();
         Ok(())
     }
