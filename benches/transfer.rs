@@ -18,10 +18,12 @@ use spectile::render::worker::{UnitRect, Worker};
 use spectile::scene;
 
 const TILE: u32 = 64;
+/// Of what is rendered for one measurement.
+const LEAST_SAMPLES: u32 = 8;
 
 fn main() -> Result<()> {
     let measure = std::env::args().any(|a| a == "--bench");
-    let [channels, samples, rounds] = if measure { [512, 64, 9] } else { [32, 16, 1] };
+    let [channels, most, rounds] = if measure { [512, 64, 9] } else { [32, 16, 1] };
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell/cornell.toml");
     let set = |key: &str, value: &str| (key.to_owned(), value.to_owned());
     let size = TILE.to_string();
@@ -37,23 +39,25 @@ fn main() -> Result<()> {
     worker.submit(&[unit], 0, 1, &mut |_| Ok(()))?;
     worker.collect(&mut |_| Ok(()))?;
 
-    let portions: Vec<u32> = (0..7).map(|i| 1 << i).filter(|n| *n <= samples).collect();
+    let portions: Vec<u32> = (0..4).map(|i| 1 << (2 * i)).filter(|n| *n <= most).collect();
     let mut seconds = vec![Vec::new(); portions.len()];
     let mut extra = vec![Vec::new(); portions.len()];
     let mut walls = vec![Vec::new(); portions.len()];
     for _ in 0..rounds {
-        let [without, _] = timed(|| {
-            worker.submit(&[unit], 0, samples, &mut |_| Ok(()))?;
-            worker.collect(&mut |_| Ok(()))
-        })?;
         for (i, &portion) in portions.iter().enumerate() {
+            let samples = portion.max(LEAST_SAMPLES);
+            let [without, _] = timed(|| {
+                worker.submit(&[unit], 0, samples, &mut |_| Ok(()))?;
+                worker.collect(&mut |_| Ok(()))
+            })?;
             let [with, wall] = timed(|| into_cube(&mut worker, &header, unit, samples, portion))?;
-            seconds[i].push(with);
-            walls[i].push(wall);
+            let units = f64::from(samples / portion);
+            seconds[i].push(with / units);
+            walls[i].push(wall / units);
             extra[i].push(with / without - 1.0);
         }
     }
-    println!("samples a unit    CPU s    wall s    above the same without transfers (middle half)");
+    println!("samples a unit  CPU s a unit   wall s    above the same without transfers (middle half)");
     for (i, portion) in portions.iter().enumerate() {
         let [low, median, high] = quartiles(&mut extra[i]);
         println!(
