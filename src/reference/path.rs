@@ -188,7 +188,7 @@ impl<'a> Tracer<'a> {
         let front = hit.point.normal.dot(ray.direction) < 0.0;
         match material.bsdf {
             Bsdf::Diffuse { reflectance } if front || material.two_sided => Some(reflectance),
-            Bsdf::Diffuse { .. } | Bsdf::Black => None,
+            _ => None,
         }
     }
 }
