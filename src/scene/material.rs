@@ -179,7 +179,7 @@ fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Declared<'a>
         Some("plastic") => {
             let fields = kind.table(PLASTIC)?;
             let reflectance = spectrum(&fields, "reflectance", REFLECTANCE, Quantity::Reflectance, spectra);
-            let eta = spectrum(&fields, "eta", ETA, Quantity::Index, spectra);
+            let eta = spectrum(&fields, "eta", ETA, Quantity::CoatIndex, spectra);
             let kind = match (reflectance, eta, roughness(&fields)) {
                 (Some(reflectance), Some(eta), Some(roughness)) => Some(Kind::Plastic { reflectance, eta, roughness }),
                 _ => None,

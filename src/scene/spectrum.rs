@@ -30,6 +30,8 @@ pub enum Quantity {
     Radiance,
     /// Of refraction: dimensionless, above 0; held beyond its table, with a warning.
     Index,
+    /// Of a coat: at least 1; otherwise as [`Quantity::Index`].
+    CoatIndex,
     /// Imaginary part of a complex index, not negative; held beyond its table, with a warning.
     Extinction,
 }
@@ -44,6 +46,7 @@ impl Quantity {
             Quantity::Reflectance => "a reflectance",
             Quantity::Radiance => "a radiance",
             Quantity::Index => "an index of refraction",
+            Quantity::CoatIndex => "the index of refraction of a coat",
             Quantity::Extinction => "an extinction coefficient k",
         }
     }
@@ -53,6 +56,7 @@ impl Quantity {
             Quantity::Reflectance => (0.0..=1.0).contains(&value),
             Quantity::Radiance => (0.0..=BRIGHTEST).contains(&value),
             Quantity::Index => value > 0.0 && value <= DENSEST,
+            Quantity::CoatIndex => (1.0..=DENSEST).contains(&value),
             Quantity::Extinction => (0.0..=DENSEST).contains(&value),
         }
     }
@@ -62,6 +66,7 @@ impl Quantity {
             Quantity::Reflectance => "[0, 1]",
             Quantity::Radiance => "[0, 1e35]",
             Quantity::Index => "(0, 1000]",
+            Quantity::CoatIndex => "[1, 1000]",
             Quantity::Extinction => "[0, 1000]",
         };
         format!("{} must lie in {range}", self.noun())
@@ -239,8 +244,8 @@ impl<'a> Spectra<'a> {
             self.cx.error(source.at, &source.path, message, None);
         };
         let mut warnings = Vec::new();
-        let is_index = matches!(quantity, Quantity::Index | Quantity::Extinction);
-        if quantity == Quantity::Index && source.outside == Some(Outside::Zero) {
+        let is_index = !matches!(quantity, Quantity::Reflectance | Quantity::Radiance);
+        if is_index && !quantity.allows(0.0) && source.outside == Some(Outside::Zero) {
             let help = "remove `outside`, or write outside = \"hold\"";
             let message = format!("an index of refraction cannot be 0 outside its table{used_by}");
             self.cx.error(source.at, &source.path, message, Some(help.to_owned()));
