@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::ggx::Ggx;
-use super::reflection::{Boundary, Mirror, RoughMirror};
+use super::reflection::{Boundary, Mirror};
 use super::{Choice, Lobe, Vertex, cosine_density, cosine_direction, fresnel};
 use crate::scattering::{DielectricAlbedo, ReflectionProbability, index_range};
 use crate::scene::{Scene, SpectrumId};
@@ -22,23 +22,14 @@ pub fn lobes(scene: &Scene, eta: SpectrumId, dispersion: bool, roughness: Option
     let bounds = &scene.channels.bounds;
     let mean = || bounds.iter().map(|b| curve.mean(b[0], b[1])).sum::<f64>() / bounds.len() as f64;
     let index = Index { eta, mean: (!dispersion).then(mean) };
+    let surface = Surface { index, decision: Arc::new(ReflectionProbability::new(curve, &scene.channels)) };
     match roughness.filter(|_| range.iter().any(|eta| (eta - 1.0).abs() >= MATCHED)) {
-        None => {
-            let decision = Arc::new(ReflectionProbability::new(curve, &scene.channels));
-            let surface = Surface { index, decision: Decision::Smooth(decision) };
-            vec![Box::new(Mirror(surface.clone())), Box::new(Refraction(surface))]
-        }
+        None => vec![Box::new(Mirror(surface.clone())), Box::new(Refraction(surface))],
         Some(alpha) => {
             let albedo = Arc::new(DielectricAlbedo::new(alpha, range));
-            let ggx = Ggx { alpha: [alpha; 2] };
-            let surface = Surface { index, decision: Decision::Rough(Arc::clone(&albedo)) };
             let again = |transmits| Box::new(Again { index, albedo: Arc::clone(&albedo), transmits });
-            vec![
-                Box::new(RoughMirror { boundary: surface.clone(), ggx }),
-                Box::new(RoughRefraction { surface, ggx }),
-                again(false),
-                again(true),
-            ]
+            let once = RoughBoundary { surface, ggx: Ggx { alpha: [alpha; 2] }, albedo: Arc::clone(&albedo) };
+            vec![Box::new(once), again(false), again(true)]
         }
     }
 }
@@ -82,17 +73,11 @@ impl Index {
     }
 }
 
+/// A boundary, and the table that decides between reflection and refraction at the cosine with its normal.
 #[derive(Clone)]
 struct Surface {
     index: Index,
-    decision: Decision,
-}
-
-/// What decides between reflection and refraction.
-#[derive(Clone)]
-enum Decision {
-    Smooth(Arc<ReflectionProbability>),
-    Rough(Arc<DielectricAlbedo>),
+    decision: Arc<ReflectionProbability>,
 }
 
 impl Boundary for Surface {
@@ -100,22 +85,8 @@ impl Boundary for Surface {
         self.index.reflectance(at, cosine, k)
     }
 
-    fn albedo(&self, at: &Vertex, k: usize) -> f64 {
-        match &self.decision {
-            Decision::Smooth(table) => table.at(at.inside, at.o.z),
-            Decision::Rough(table) => table.reflected(at.spectra.value(self.index.eta, k), at.inside, at.o.z),
-        }
-    }
-}
-
-impl Surface {
-    /// What passes after one scattering event, for decisions.
-    fn passing(&self, at: &Vertex, k: usize) -> f64 {
-        let lost = match &self.decision {
-            Decision::Smooth(_) => 0.0,
-            Decision::Rough(table) => table.loss(at.spectra.value(self.index.eta, k), at.inside, at.o.z),
-        };
-        1.0 - self.albedo(at, k) - lost
+    fn albedo(&self, at: &Vertex, _k: usize) -> f64 {
+        self.decision.at(at.inside, at.o.z)
     }
 }
 
@@ -124,8 +95,8 @@ impl Surface {
 struct Refraction(Surface);
 
 impl Lobe for Refraction {
-    fn albedo(&self, at: &Vertex, k: usize) -> f64 {
-        self.0.passing(at, k)
+    fn albedo(&self, at: &Vertex, _k: usize) -> f64 {
+        1.0 - self.0.decision.at(at.inside, at.o.z)
     }
 
     fn sample(&self, at: &Vertex, u: [f64; 3]) -> Option<Choice> {
@@ -148,65 +119,60 @@ impl Lobe for Refraction {
     }
 }
 
-/// Single refraction by microfacets (Walter et al. 2007, eq. 21, with their G1 G1).
+/// Single reflection and refraction by microfacets (Walter et al. 2007, eq. 20 and 21: reflection with masking correlated
+/// by height, refraction with their G1 G1). A facet is chosen among the visible ones, then whether it reflects.
 ///
 /// Channels that bend differently have half vectors of their own for one pair of directions. The direction is that of a
 /// channel chosen at random, and weighted by the mean density over the live channels (the balance heuristic over
 /// channels, Wilkie et al. 2014), so that no channel has to stop.
-struct RoughRefraction {
+struct RoughBoundary {
     surface: Surface,
     ggx: Ggx,
+    albedo: Arc<DielectricAlbedo>,
 }
 
-/// The geometry of one pair of directions: the half vector, and |i·h| / (o·h + η i·h)².
+/// The geometry of one pair of directions across the boundary: the half vector, and |i·h| / (o·h + η i·h)².
 struct Half {
     h: DVec3,
     o_h: f64,
     spread: f64,
 }
 
-impl RoughRefraction {
+impl RoughBoundary {
     fn bending(&self, at: &Vertex, k: usize) -> f64 {
         let eta = self.surface.index.bending(at, k);
         if (eta - 1.0).abs() < MATCHED { 1.0 + MATCHED.copysign(eta - 1.0) } else { eta }
     }
 
-    /// The half vector that refracts o into i, if any does. For f32: η o·h-like sums cancel as η nears 1, where the
-    /// bound on |η - 1| keeps 3 digits.
+    /// The half vector that refracts o into i, if any does. For f32: the sums cancel as η nears 1, where the bound on
+    /// |η - 1| leaves three digits.
     fn half(o: DVec3, i: DVec3, eta: f64) -> Option<Half> {
         let h = -(o + eta * i);
         let h = if h.z < 0.0 { -h } else { h }.try_normalize()?;
         let (o_h, i_h) = (o.dot(h), i.dot(h));
-        if i.z >= 0.0 || o_h <= 0.0 || i_h >= 0.0 {
+        if o_h <= 0.0 || i_h >= 0.0 {
             return None;
         }
         Some(Half { h, o_h, spread: -i_h / (o_h + eta * i_h).powi(2) })
     }
 
-    /// f |cosθ_i| without 1 - F.
-    fn geometric(&self, o: DVec3, i: DVec3, half: &Half) -> f64 {
-        // η² of flux and 1/η² of radiance cancel.
-        self.ggx.distribution(half.h) * self.ggx.visible(o) * self.ggx.visible(i) * half.o_h * half.spread / o.z
+    fn refracted_density(&self, at: &Vertex, i: DVec3, k: usize) -> f64 {
+        let eta = self.bending(at, k);
+        let Some(half) = Self::half(at.o, i, eta) else { return 0.0 };
+        let refracts = 1.0 - self.surface.decision.at(at.inside, half.o_h.min(1.0));
+        refracts * self.ggx.visible_density(at.o, half.h) * eta * eta * half.spread
     }
 
-    fn density_for(&self, at: &Vertex, i: DVec3, eta: f64) -> f64 {
-        Self::half(at.o, i, eta).map_or(0.0, |half| self.ggx.visible_density(at.o, half.h) * eta * eta * half.spread)
-    }
-}
-
-impl Lobe for RoughRefraction {
-    fn albedo(&self, at: &Vertex, k: usize) -> f64 {
-        self.surface.passing(at, k)
+    fn evaluate_reflection(&self, at: &Vertex, i: DVec3, scale: f64, out: &mut [f64]) {
+        let h = (at.o + i).normalize();
+        let common = scale * self.ggx.distribution(h) * self.ggx.both_visible(at.o, i) / (4.0 * at.o.z);
+        for k in at.alive.clone() {
+            out[k] += common * self.surface.index.reflectance(at, at.o.dot(h), k);
+        }
     }
 
-    fn sample(&self, at: &Vertex, u: [f64; 3]) -> Option<Choice> {
-        let h = self.ggx.visible_normal(at.o, [u[1], u[2]]);
-        let i = refracted(at.o, h, self.bending(at, one_of(at, u[0])))?;
-        (i.z < 0.0).then_some(Choice::Spread(i))
-    }
-
-    fn evaluate(&self, at: &Vertex, i: DVec3, scale: f64, out: &mut [f64]) {
-        let index = &self.surface.index;
+    fn evaluate_refraction(&self, at: &Vertex, i: DVec3, scale: f64, out: &mut [f64]) {
+        let visible = scale * self.ggx.visible(at.o) * self.ggx.visible(i) / at.o.z;
         // (η, f |cosθ_i| without 1 - F, o·h): channels that bend alike share it.
         let mut shared: Option<(f64, f64, f64)> = None;
         for k in at.alive.clone() {
@@ -214,20 +180,52 @@ impl Lobe for RoughRefraction {
             let (_, geometric, o_h) = match shared {
                 Some(same) if same.0 == eta => same,
                 _ => match Self::half(at.o, i, eta) {
-                    Some(half) => (eta, scale * self.geometric(at.o, i, &half), half.o_h),
+                    // η² of flux and 1/η² of radiance cancel.
+                    Some(half) => (eta, visible * self.ggx.distribution(half.h) * half.o_h * half.spread, half.o_h),
                     None => (eta, 0.0, 1.0),
                 },
             };
             shared = Some((eta, geometric, o_h));
-            out[k] += geometric * (1.0 - index.reflectance(at, o_h, k));
+            out[k] += geometric * (1.0 - self.surface.index.reflectance(at, o_h, k));
+        }
+    }
+}
+
+impl Lobe for RoughBoundary {
+    fn albedo(&self, at: &Vertex, k: usize) -> f64 {
+        1.0 - self.albedo.loss(at.spectra.value(self.surface.index.eta, k), at.inside, at.o.z)
+    }
+
+    fn sample(&self, at: &Vertex, u: [f64; 3]) -> Option<Choice> {
+        let h = self.ggx.visible_normal(at.o, [u[1], u[2]]);
+        let reflects = self.surface.decision.at(at.inside, at.o.dot(h).min(1.0));
+        if u[0] < reflects {
+            let i = 2.0 * at.o.dot(h) * h - at.o;
+            return (i.z > 0.0).then_some(Choice::Spread(i));
+        }
+        let k = one_of(at, (u[0] - reflects) / (1.0 - reflects));
+        let i = refracted(at.o, h, self.bending(at, k))?;
+        (i.z < 0.0).then_some(Choice::Spread(i))
+    }
+
+    fn evaluate(&self, at: &Vertex, i: DVec3, scale: f64, out: &mut [f64]) {
+        if i.z > 0.0 {
+            self.evaluate_reflection(at, i, scale, out);
+        } else if i.z < 0.0 {
+            self.evaluate_refraction(at, i, scale, out);
         }
     }
 
     fn density(&self, at: &Vertex, i: DVec3) -> f64 {
-        if !self.surface.index.disperses(at) {
-            return self.density_for(at, i, self.bending(at, at.alive.start));
+        if i.z >= 0.0 {
+            let h = (at.o + i).normalize();
+            let reflects = self.surface.decision.at(at.inside, at.o.dot(h).min(1.0));
+            return reflects * self.ggx.visible_density(at.o, h) / (4.0 * at.o.dot(h));
         }
-        let sum: f64 = at.alive.clone().map(|k| self.density_for(at, i, self.bending(at, k))).sum();
+        if !self.surface.index.disperses(at) {
+            return self.refracted_density(at, i, at.alive.start);
+        }
+        let sum: f64 = at.alive.clone().map(|k| self.refracted_density(at, i, k)).sum();
         sum / at.alive.len() as f64
     }
 }
