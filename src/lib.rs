@@ -12,6 +12,7 @@ pub mod format;
 pub mod gpu;
 pub mod reference;
 pub mod render;
+pub mod scattering;
 pub mod scene;
 pub mod spectral;
 

@@ -234,7 +234,7 @@ fn many_plain_spectra() {
     let scene = b.lamp(lamp_quad(0.9), jagged(12, 4, 0.5, 2.0), Sides::Both).build();
     let f = features(&scene);
     assert!(!f.registers && f.strata && !f.knots && f.shapes);
-    compare("plain tables", &scene, &USUAL);
+    compare("plain tables", &scene, &Effort { epochs: 40, ..USUAL });
 }
 
 /// Every shape as a lamp, seen from outside, one side and both, under a sky, before one-sided surfaces; three cameras,

@@ -3,4 +3,5 @@
 pub mod obj;
 pub mod plot;
 pub mod png;
+pub mod refractive;
 pub mod text;

@@ -1,4 +1,4 @@
-//! Spectra in text files: CSV (`nm,value`, with more columns by name) and `.spd` (`nm value`).
+//! Spectra in text files: CSV (`nm,value`, with more columns by name; `nm,n,k`) and `.spd` (`nm value`).
 
 use std::path::Path;
 
@@ -17,13 +17,38 @@ pub struct SpectrumTable {
 ///
 /// Errors name the line; without one, the file as a whole could not be read.
 pub fn read_spectrum(path: &Path, column: Option<&str>) -> Result<SpectrumTable, Box<Problem>> {
-    let reader = Reader { path, column };
-    let bytes = std::fs::read(path).map_err(|e| reader.at(None, format!("cannot be read: {e}"), ""))?;
-    parse_spectrum(&bytes, path, column)
+    parse_spectrum(&read(path)?, path, column)
+}
+
+/// The content of the file at `path`.
+pub(super) fn read(path: &Path) -> Result<Vec<u8>, Box<Problem>> {
+    std::fs::read(path).map_err(|e| {
+        let message = format!("cannot be read: {e}");
+        Box::new(Problem { file: path.to_owned(), message, ..Problem::default() })
+    })
 }
 
 /// [`read_spectrum`] on the content of the file; `path` tells `.spd` from CSV and stands in messages.
 pub fn parse_spectrum(bytes: &[u8], path: &Path, column: Option<&str>) -> Result<SpectrumTable, Box<Problem>> {
+    parse(bytes, path, column.map_or(Column::Only, Column::Named))
+}
+
+/// The columns `n` and `k` of an `nm,n,k` file; without a header, the second and the third of three.
+pub fn parse_index(bytes: &[u8], path: &Path) -> Result<[SpectrumTable; 2], Box<Problem>> {
+    Ok([parse(bytes, path, Column::OfIndex("n"))?, parse(bytes, path, Column::OfIndex("k"))?])
+}
+
+/// Which column of a file is wanted.
+#[derive(Clone, Copy)]
+enum Column<'a> {
+    /// The only one beside the wavelength.
+    Only,
+    Named(&'a str),
+    /// `n` or `k`, which stand in this order where there is no header.
+    OfIndex(&'a str),
+}
+
+fn parse(bytes: &[u8], path: &Path, column: Column) -> Result<SpectrumTable, Box<Problem>> {
     // Only comments and names can hold anything but ASCII, so old encodings do no harm.
     let text = String::from_utf8_lossy(bytes);
     let text = text.trim_start_matches('\u{feff}');
@@ -125,7 +150,7 @@ struct Layout {
 /// What every message needs.
 struct Reader<'a> {
     path: &'a Path,
-    column: Option<&'a str>,
+    column: Column<'a>,
 }
 
 impl Reader<'_> {
@@ -140,7 +165,7 @@ impl Reader<'_> {
             return Err(self.at(Some(line), "has one column only".to_owned(), "write lines of `nm,value`"));
         }
         let value = match self.column {
-            Some(_) if !header => {
+            Column::Named(_) if !header => {
                 let help = "name the columns in a first line such as `nm,value`, or leave `column` out";
                 return Err(self.at(
                     Some(line),
@@ -148,18 +173,25 @@ impl Reader<'_> {
                     help,
                 ));
             }
-            Some(wanted) => {
+            Column::OfIndex(wanted) if !header => {
+                if cells.len() != 3 {
+                    let message = format!("has {} columns and no header line", cells.len());
+                    return Err(self.at(Some(line), message, "write lines of `nm,n,k`"));
+                }
+                if wanted == "n" { 1 } else { 2 }
+            }
+            Column::Named(wanted) | Column::OfIndex(wanted) => {
                 let found = cells.iter().skip(1).position(|cell| *cell == wanted);
                 found.map(|i| i + 1).ok_or_else(|| {
                     self.at(Some(line), format!("has no column \"{wanted}\""), &format!("its columns are {}", names()))
                 })?
             }
-            None if cells.len() == 2 => 1,
-            None if header => {
+            Column::Only if cells.len() == 2 => 1,
+            Column::Only if header => {
                 let message = format!("has {} value columns", cells.len() - 1);
                 return Err(self.at(Some(line), message, &format!("pick one with `column`: {}", names())));
             }
-            None => {
+            Column::Only => {
                 let message = format!("has {} columns and no header line", cells.len());
                 return Err(self.at(
                     Some(line),
@@ -200,7 +232,12 @@ impl Reader<'_> {
     /// The table in ascending order, which its lines must have one way or the other.
     fn ascending(&self, mut table: SpectrumTable) -> Result<SpectrumTable, Box<Problem>> {
         if table.nm.len() < 2 {
-            return Err(self.at(None, format!("has {} values", table.nm.len()), "give at least two wavelengths"));
+            let of = match self.column {
+                Column::OfIndex(name) => format!(" of {name}"),
+                _ => String::new(),
+            };
+            let message = format!("has {} values{of}", table.nm.len());
+            return Err(self.at(None, message, "give at least two wavelengths"));
         }
         if let Some(i) = table.nm.iter().position(|nm| !nm.is_finite()) {
             return Err(self.at(Some(table.line[i]), "the wavelength cannot be represented in nm".to_owned(), ""));
@@ -263,6 +300,25 @@ mod tests {
         assert_eq!((b.nm, b.value, b.line), (vec![500.0, 600.0], vec![5.0, 6.0], vec![3, 4]));
         assert!(csv(text, None).unwrap_err().help.unwrap().contains("a, b"));
         assert!(csv(text, Some("c")).unwrap_err().help.unwrap().contains("a, b"));
+    }
+
+    #[test]
+    fn an_index_is_two_columns() {
+        let index = |text: &str| parse_index(text.as_bytes(), Path::new("nk.csv"));
+        for text in ["400,1.5,0\n500,1.4,0.25\n", "k,nm,x\n", "um,k,x,n\n0.4,0,9,1.5\n0.5,0.25,,1.4\n"] {
+            match index(text) {
+                Ok([n, k]) => {
+                    assert_eq!((n.nm, n.value), (vec![400.0, 500.0], vec![1.5, 1.4]), "{text}");
+                    assert_eq!((k.nm, k.value), (vec![400.0, 500.0], vec![0.0, 0.25]), "{text}");
+                }
+                Err(problem) => assert!(text.starts_with('k') && problem.message.contains("no column \"n\"")),
+            }
+        }
+        // Each has the wavelengths at which it is given.
+        let [n, k] = index("nm,n,k\n400,1.5,\n500,1.4,1\n600,1.3,2\n").unwrap();
+        assert_eq!((n.nm.len(), k.nm), (3, vec![500.0, 600.0]));
+        assert!(index("nm,n,k\n400,1.5,\n500,1.4,\n").unwrap_err().message.contains("0 values of k"));
+        assert!(index("400,1.5\n500,1.4\n").unwrap_err().message.contains("2 columns and no header"));
     }
 
     #[test]

@@ -1,9 +1,10 @@
 //! A small, plain, independent f64 path tracer on the CPU that every shader result is tested against.
-//! Shares `scene` and `spectral` with the renderer and nothing else: its random numbers, intersections, sampling
-//! strategies and estimator are its own, so that an agreement means something.
+//! Shares `scene`, `spectral` and the tables of `scattering` with the renderer and nothing else: its random numbers,
+//! intersections, BSDFs, sampling strategies and estimator are its own, so that an agreement means something.
 //!
 //! Every sample is independent (no stratification), which is what makes [`Estimate::standard_error`] honest.
 
+mod bsdf;
 mod camera;
 mod lights;
 mod path;

@@ -1,106 +1,86 @@
 //! One path: from the camera, surface to surface, carrying all K channels.
 
-use std::f64::consts::{PI, TAU};
+use std::ops::Range;
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
+use super::bsdf::{Bsdf, SpectralValues, Vertex};
 use super::camera;
-use super::lights::{Lights, emits};
-use super::primitive::{Ray, SurfacePoint};
+use super::lights::{LightPoint, Lights, emits};
+use super::primitive::Ray;
 use super::rng::Rng;
 use super::world::{Hit, World};
-use crate::scene::{Bsdf, Scene, SpectrumId};
+use crate::scene::{Scene, SpectrumId};
 
 /// What tracing needs of a scene, prepared once and shared by all threads.
 pub struct Tracer<'a> {
     scene: &'a Scene,
     world: World,
     lights: Lights,
+    /// One for each material of the scene.
+    materials: Vec<Bsdf>,
 }
 
 /// The K-channel state of the path under way; reused from path to path.
 pub struct Path<'a> {
-    scene: &'a Scene,
-    /// Wavelength samples λ_k in nm.
-    wavelength: Vec<f64>,
-    /// Product of the reflectances so far.
+    spectra: SpectralValues<'a>,
+    /// Product of what the surfaces did so far.
     throughput: Vec<f64>,
+    /// The channels that have not stopped: all, or the one that ideal dispersive refraction left.
+    alive: Range<usize>,
     /// Radiance gathered so far, W m⁻² sr⁻¹ nm⁻¹.
     pub radiance: Vec<f64>,
-    /// Every spectrum of the scene at the wavelength samples, filled when first asked for.
-    values: Vec<Option<Vec<f64>>>,
+    /// What one vertex does to each channel.
+    factor: Vec<f64>,
 }
 
 impl<'a> Path<'a> {
     pub fn new(scene: &'a Scene) -> Self {
         let channels = scene.channels.len();
         Path {
-            scene,
-            wavelength: vec![0.0; channels],
+            spectra: SpectralValues::new(scene),
             throughput: vec![0.0; channels],
+            alive: 0..channels,
             radiance: vec![0.0; channels],
-            values: vec![None; scene.spectra.len()],
+            factor: vec![0.0; channels],
         }
     }
 
     /// Starts a path with wavelength coordinate `mu` (Eq. 4 of the method: one for all channels).
     fn begin(&mut self, mu: f64) {
-        for (k, wavelength) in self.wavelength.iter_mut().enumerate() {
-            *wavelength = self.scene.channels.wavelength(k, mu);
-        }
+        self.spectra.begin(mu);
         self.throughput.fill(1.0);
         self.radiance.fill(0.0);
-        for (values, spectrum) in self.values.iter_mut().zip(&self.scene.spectra) {
-            if !spectrum.curve.is_constant() {
-                *values = None;
-            }
-        }
+        self.alive = 0..self.throughput.len();
     }
 
     /// Radiance += throughput · spectrum · weight.
     fn gather(&mut self, spectrum: SpectrumId, weight: f64) {
-        let values = sampled(&mut self.values, self.scene, &self.wavelength, spectrum);
-        for ((radiance, throughput), value) in self.radiance.iter_mut().zip(&self.throughput).zip(values) {
-            *radiance += throughput * value * weight;
+        let values = self.spectra.get(spectrum);
+        for k in self.alive.clone() {
+            self.radiance[k] += self.throughput[k] * values[k] * weight;
         }
     }
-
-    /// Throughput *= spectrum; returns the largest.
-    fn attenuate(&mut self, spectrum: SpectrumId) -> f64 {
-        let values = sampled(&mut self.values, self.scene, &self.wavelength, spectrum);
-        let mut largest = 0.0f64;
-        for (throughput, value) in self.throughput.iter_mut().zip(values) {
-            *throughput *= value;
-            largest = largest.max(*throughput);
-        }
-        largest
-    }
-}
-
-fn sampled<'v>(values: &'v mut [Option<Vec<f64>>], scene: &Scene, nm: &[f64], spectrum: SpectrumId) -> &'v [f64] {
-    values[spectrum].get_or_insert_with(|| {
-        let curve = &scene.spectra[spectrum].curve;
-        nm.iter().map(|&nm| curve.eval(nm)).collect()
-    })
 }
 
 impl<'a> Tracer<'a> {
     pub fn new(scene: &'a Scene) -> Self {
         let world = World::new(&scene.objects);
         let lights = Lights::new(scene, &world);
-        Tracer { scene, world, lights }
+        let materials = (0..scene.materials.len()).map(|material| Bsdf::new(scene, material)).collect();
+        Tracer { scene, world, lights, materials }
     }
 
     /// Traces one path through `pixel` and leaves its radiance in `path`.
     ///
     /// Emission is found in two ways, by aiming at lights and by meeting them, which are combined by the balance
-    /// heuristic (Veach 1997, section 9.2.2). The uniform environment is only met: for Lambert's law sampling by
-    /// the cosine is already proportional to the integrand.
+    /// heuristic (Veach 1997, section 9.2.2). The uniform environment is only met.
     pub fn trace(&self, pixel: [u32; 2], rng: &mut Rng, path: &mut Path) {
         let integrator = &self.scene.integrator;
         path.begin(rng.uniform());
         let mut ray = camera::ray(&self.scene.camera, &self.scene.film, pixel, rng);
-        // Density by solid angle with which the ray was chosen; none for camera rays, which lights never compete with.
+        // Density by solid angle with which the ray was chosen; none where lights could not have been aimed at instead:
+        // for camera rays, mirrors and ideal refraction.
         let mut ray_density = None;
 
         for event in 0..=integrator.max_bounces {
@@ -115,28 +95,62 @@ impl<'a> Tracer<'a> {
                 return;
             }
 
-            let Some(reflectance) = self.reflectance(&ray, &hit) else { return };
-            let largest = path.attenuate(reflectance);
-            if largest == 0.0 {
+            let object = &self.scene.objects[self.world.primitives[hit.primitive].object];
+            let bsdf = &self.materials[object.material];
+            let light = self.lights.sample(&self.world, rng);
+            let emission = light.as_ref().and_then(|light| self.emitted(light));
+            path.spectra.fill(bsdf.spectra());
+            path.spectra.fill(emission.as_slice());
+
+            let inside = hit.point.normal.dot(ray.direction) > 0.0;
+            let frame = self.frame(&hit, inside);
+            let o = frame.transpose() * -ray.direction;
+            if o.z <= 0.0 {
+                // Along the surface to the last bit.
                 return;
             }
-            // The normal on the side the ray came from.
-            let normal = -hit.point.normal * hit.point.normal.dot(ray.direction).signum();
-            let surface = SurfacePoint { normal, ..hit.point };
-            self.gather_direct(hit.primitive, &surface, rng, path);
+            let Path { spectra, throughput, alive, radiance, factor } = &mut *path;
+            let Some(scattering) = bsdf.at(Vertex { o, inside, spectra, alive: alive.clone() }) else { return };
+            if let Some((light, emission)) = light.zip(emission)
+                && let Some((direction, per_area)) = self.aim(&hit, &light)
+            {
+                let scattered = scattering.evaluate(frame.transpose() * direction, factor);
+                // The balance heuristic leaves f cosθ over the sum of both densities by solid angle.
+                let weight = 1.0 / (light.density * per_area + scattered);
+                for k in alive.clone() {
+                    radiance[k] += throughput[k] * factor[k] * spectra.value(emission, k) * weight;
+                }
+            }
 
             if integrator.russian_roulette_start > 0 && event + 1 >= integrator.russian_roulette_start {
-                let survival = largest.min(1.0);
+                let survival = scattering.survival();
                 if rng.uniform() >= survival {
                     return;
                 }
-                path.throughput.iter_mut().for_each(|t| *t /= survival);
+                throughput.iter_mut().for_each(|t| *t /= survival);
             }
 
-            let direction = cosine_direction(normal, rng);
-            ray_density = Some(normal.dot(direction).max(0.0) / PI);
-            ray = Ray { origin: self.world.leave(hit.primitive, &surface, direction), direction };
+            let Some(next) = scattering.sample(std::array::from_fn(|_| rng.uniform()), factor) else { return };
+            for k in alive.clone() {
+                throughput[k] *= factor[k];
+            }
+            if let Some(channel) = next.channel {
+                *alive = channel..channel + 1;
+            }
+            if throughput[alive.clone()].iter().all(|t| *t == 0.0) {
+                return;
+            }
+            ray_density = next.density;
+            let direction = (frame * next.direction).normalize();
+            ray = Ray { origin: self.world.leave(hit.primitive, &hit.point, direction), direction };
         }
+    }
+
+    /// Columns: tangent, bitangent and the normal on the side that the ray came from.
+    fn frame(&self, hit: &Hit, inside: bool) -> DMat3 {
+        let normal = if inside { -hit.point.normal } else { hit.point.normal };
+        let tangent = self.world.primitives[hit.primitive].surface.tangent(&hit.point);
+        DMat3::from_cols(tangent, normal.cross(tangent), normal)
     }
 
     /// Emission of the surface that a ray meets.
@@ -154,77 +168,28 @@ impl<'a> Tracer<'a> {
         path.gather(emission.radiance, weight);
     }
 
-    /// Next-event estimation: light from one chosen point, reflected by Lambert's law. The throughput holds the
-    /// reflectance already.
-    fn gather_direct(&self, primitive: usize, surface: &SurfacePoint, rng: &mut Rng, path: &mut Path) {
-        let Some(light) = self.lights.sample(&self.world, rng) else { return };
-        let towards = light.point.position - surface.position;
+    /// The spectrum that a point of a light sends to anywhere.
+    fn emitted(&self, light: &LightPoint) -> Option<SpectrumId> {
+        let object = &self.scene.objects[self.world.primitives[light.primitive].object];
+        object.emission.as_ref().map(|emission| emission.radiance)
+    }
+
+    /// The direction of a point of a light and its area per solid angle, m² sr⁻¹; `None` where it sends nothing there or
+    /// is hidden.
+    fn aim(&self, hit: &Hit, light: &LightPoint) -> Option<(DVec3, f64)> {
+        let towards = light.point.position - hit.point.position;
         let distance = towards.length();
         if distance == 0.0 {
-            return;
+            return None;
         }
         let direction = towards / distance;
-        let (cosine, light_cosine) = (surface.normal.dot(direction), light.point.normal.dot(direction));
+        let light_cosine = light.point.normal.dot(direction);
         let object = &self.scene.objects[self.world.primitives[light.primitive].object];
-        let Some(emission) = object.emission.as_ref().filter(|e| emits(e, light_cosine < 0.0)) else { return };
-        if cosine <= 0.0 || light_cosine == 0.0 {
-            return;
+        if light_cosine == 0.0 || !object.emission.as_ref().is_some_and(|e| emits(e, light_cosine < 0.0)) {
+            return None;
         }
-        let from = self.world.leave(primitive, surface, direction);
+        let from = self.world.leave(hit.primitive, &hit.point, direction);
         let to = self.world.leave(light.primitive, &light.point, -direction);
-        if self.world.occluded(from, to) {
-            return;
-        }
-        // The balance heuristic leaves f cosθ over the sum of both densities by solid angle.
-        let light_density = light.density * distance * distance / light_cosine.abs();
-        let ray_density = cosine / PI;
-        path.gather(emission.radiance, cosine / PI / (light_density + ray_density));
-    }
-
-    /// The reflectance of the side that a ray meets; `None` where everything is absorbed.
-    fn reflectance(&self, ray: &Ray, hit: &Hit) -> Option<SpectrumId> {
-        let object = &self.scene.objects[self.world.primitives[hit.primitive].object];
-        let material = &self.scene.materials[object.material];
-        let front = hit.point.normal.dot(ray.direction) < 0.0;
-        match material.bsdf {
-            Bsdf::Diffuse { reflectance } if front || material.two_sided => Some(reflectance),
-            Bsdf::Diffuse { .. } | Bsdf::Black => None,
-        }
-    }
-}
-
-/// A direction about `normal` with density cosθ/π: Malley's method, a point of the disk lifted to the hemisphere.
-fn cosine_direction(normal: DVec3, rng: &mut Rng) -> DVec3 {
-    let (square, angle) = (rng.uniform(), TAU * rng.uniform());
-    let (tangent, bitangent) = normal.any_orthonormal_pair();
-    let radius = square.sqrt();
-    radius * angle.cos() * tangent + radius * angle.sin() * bitangent + (1.0 - square).sqrt() * normal
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Density cosθ/π: cos²θ is uniform on [0, 1] and azimuths are even; chi-square over 10 x 10 bins of equal
-    /// probability, 99 degrees of freedom, fixed seed, alpha 1e-4 (quantile 158.0).
-    #[test]
-    fn cosine_directions() {
-        const N: u32 = 100_000;
-        let mut rng = Rng::from_keys(&[9]);
-        let normal = DVec3::new(0.3, -0.5, 0.8).normalize();
-        let (tangent, bitangent) = normal.any_orthonormal_pair();
-        let mut bins = [0u32; 100];
-        for _ in 0..N {
-            let d = cosine_direction(normal, &mut rng);
-            assert!((d.length() - 1.0).abs() < 1e-14);
-            let cosine = d.dot(normal);
-            assert!(cosine > 0.0);
-            let azimuth = d.dot(bitangent).atan2(d.dot(tangent)).rem_euclid(TAU) / TAU;
-            let bin = |x: f64| ((10.0 * x) as usize).min(9);
-            bins[10 * bin(cosine * cosine) + bin(azimuth)] += 1;
-        }
-        let expected = f64::from(N) / 100.0;
-        let chi2: f64 = bins.iter().map(|&n| (f64::from(n) - expected).powi(2) / expected).sum();
-        assert!(chi2 < 158.0, "{chi2}");
+        (!self.world.occluded(from, to)).then(|| (direction, distance * distance / light_cosine.abs()))
     }
 }

@@ -131,6 +131,19 @@ impl Surface {
         }
     }
 
+    /// A unit vector along the surface at one of its points, as `scene::Shape` has it: the direction of the first of two
+    /// roughnesses. Any on a sphere.
+    pub fn tangent(&self, point: &SurfacePoint) -> DVec3 {
+        let around = |axis: DVec3, middle: DVec3| axis.cross(point.position - middle).try_normalize();
+        let tangent = match *self {
+            Surface::Triangle { edge1, .. } => edge1.try_normalize(),
+            Surface::Sphere { .. } => None,
+            Surface::Disk { center, normal, .. } => around(normal, center),
+            Surface::Cylinder { from, axis, .. } => around(axis, from),
+        };
+        tangent.unwrap_or_else(|| point.normal.any_orthonormal_vector())
+    }
+
     /// A point chosen uniformly by area.
     pub fn sample(&self, rng: &mut Rng) -> SurfacePoint {
         match *self {
@@ -243,6 +256,26 @@ mod tests {
             let variance = points.iter().map(|p| *p * *p).sum::<DVec3>() / N as f64;
             let bound = 5.0 * (variance / N as f64).map(f64::sqrt);
             assert!(mean.abs().cmple(bound).all(), "{surface:?}: {mean} beyond {bound}");
+        }
+    }
+
+    /// Tangents are unit vectors along the surface: along the first edge, or around the axis.
+    #[test]
+    fn tangents_lie_on_the_surface() {
+        let mut rng = Rng::from_keys(&[5]);
+        for surface in surfaces() {
+            for _ in 0..100 {
+                let point = surface.sample(&mut rng);
+                let tangent = surface.tangent(&point);
+                assert!((tangent.length() - 1.0).abs() < 1e-12 && tangent.dot(point.normal).abs() < 1e-12);
+                let across = match surface {
+                    Surface::Triangle { edge1, .. } => tangent.cross(edge1).length(),
+                    Surface::Disk { center, .. } => tangent.dot(point.position - center).abs(),
+                    Surface::Cylinder { axis, .. } => tangent.dot(axis).abs(),
+                    Surface::Sphere { .. } => 0.0,
+                };
+                assert!(across < 1e-12, "{surface:?}");
+            }
         }
     }
 

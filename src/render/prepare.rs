@@ -50,8 +50,10 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// Flattens `scene`. Errors: more materials, spectra or bounces than ids and counters have bits for.
+    /// Flattens `scene`. Errors: materials that no shader knows; more materials, spectra or bounces than ids and
+    /// counters have bits for.
     pub fn new(scene: &Scene, seed: u64) -> Result<Prepared> {
+        check_materials(scene)?;
         let accel = Accel::build(scene);
         if scene.materials.len() > MAX_MATERIALS {
             return Err(Error::input(&scene.file, format!("more than {MAX_MATERIALS} materials")));
@@ -211,11 +213,30 @@ struct SpectrumIds {
     names: Vec<String>,
 }
 
+/// Scenes may have materials that the devices do not render yet.
+fn check_materials(scene: &Scene) -> Result<()> {
+    for material in &scene.materials {
+        let kind = match material.bsdf {
+            Bsdf::Diffuse { .. } | Bsdf::Black => continue,
+            Bsdf::Conductor { .. } => "conductor",
+            Bsdf::Dielectric { .. } => "dielectric",
+            Bsdf::Plastic { .. } => "plastic",
+            Bsdf::Blend { .. } => "blend",
+        };
+        let message = format!(
+            "material \"{}\" is of kind `{kind}`, which cannot be rendered yet: use `diffuse` or `black`",
+            material.name
+        );
+        return Err(Error::input(&scene.file, message));
+    }
+    Ok(())
+}
+
 /// Tables of the constant 1, of what multiplies throughput, then of what emits.
 fn spectral_tables(scene: &Scene) -> Result<(SpectralTables, SpectrumIds)> {
     let factors = scene.materials.iter().filter_map(|m| match m.bsdf {
         Bsdf::Diffuse { reflectance } => Some(reflectance),
-        Bsdf::Black => None,
+        _ => None,
     });
     let sources = scene.objects.iter().filter_map(|o| o.emission.as_ref().map(|e| e.radiance));
     let sources = sources.chain(scene.environment.as_ref().map(|e| e.radiance));
@@ -242,13 +263,13 @@ fn spectral_tables(scene: &Scene) -> Result<(SpectralTables, SpectrumIds)> {
 
 fn material(scene: &Scene, m: &crate::scene::Material, factor: impl Fn(usize) -> u32) -> Material {
     let (factor, albedo) = match m.bsdf {
-        Bsdf::Black => (NONE, 0.0),
         Bsdf::Diffuse { reflectance } => {
             let curve = &scene.spectra[reflectance].curve;
             let albedo = scene.channels.bounds.iter().map(|b| curve.max(b[0], b[1])).fold(0.0, f64::max);
             // What reflects in no channel is black.
             (if albedo > 0.0 { factor(reflectance) } else { NONE }, albedo)
         }
+        _ => (NONE, 0.0),
     };
     let survival = (albedo * STEPS).ceil() / STEPS;
     Material { factor, two_sided: u32::from(m.two_sided), albedo: survival as f32, unused: 0 }
@@ -313,7 +334,33 @@ fn frame(
 
 #[cfg(test)]
 mod tests {
-    use super::EvaluateShape;
+    use std::path::Path;
+
+    use super::{EvaluateShape, Prepared};
+    use crate::scene;
+
+    /// What the scene file may have and no shader knows is refused in one sentence that names it.
+    #[test]
+    fn materials_that_no_shader_knows_are_refused() {
+        const SCENE: &str = "camera.perspective = { position = [0, 0, 5], look_at = [0, 0, 0], fov = 60 }
+            film = { width = 1, height = 1 }
+            channels.equal = { from = 400, to = 700, count = 1 }
+            materials.grey.diffuse.reflectance = 0.5
+            objects = [{ sphere = { center = [0, 0, 0], radius = 1 }, material = \"m\" }]\n";
+        for (kind, keys) in [
+            ("conductor", "{ eta = 0.2, k = 3.4 }"),
+            ("dielectric", "{ eta = 1.5 }"),
+            ("plastic", "{ reflectance = 0.5, eta = 1.5 }"),
+            ("blend", "{ a = \"grey\", b = \"grey\", weight = 0.5 }"),
+        ] {
+            let text = format!("{SCENE}materials.m.{kind} = {keys}");
+            let scene = scene::parse(&text, Path::new("t.toml"), &[]).unwrap_or_else(|e| panic!("{e}"));
+            let Err(error) = Prepared::new(&scene, 0) else { panic!("{kind} was accepted") };
+            assert_eq!(error.exit_code(), 2);
+            let message = error.to_string();
+            assert!(message.contains("material \"m\"") && message.contains(&format!("`{kind}`")), "{message}");
+        }
+    }
 
     #[test]
     fn evaluation_groups_cover_all_channels_with_few_idle_threads() {

@@ -22,6 +22,31 @@ pub fn digest(scene: &Scene) -> String {
                 hash.count(reflectance);
             }
             Bsdf::Black => hash.tag(1),
+            Bsdf::Conductor { eta, k, roughness, energy_compensation } => {
+                hash.tag(2);
+                hash.count(eta);
+                hash.count(k);
+                hash.numbers(&roughness);
+                hash.tag(u8::from(energy_compensation));
+            }
+            Bsdf::Dielectric { eta, dispersion, roughness } => {
+                hash.tag(3);
+                hash.count(eta);
+                hash.tag(u8::from(dispersion));
+                hash.number(roughness);
+            }
+            Bsdf::Plastic { reflectance, eta, roughness } => {
+                hash.tag(4);
+                hash.count(reflectance);
+                hash.count(eta);
+                hash.number(roughness);
+            }
+            Bsdf::Blend { a, b, weight } => {
+                hash.tag(5);
+                hash.count(a);
+                hash.count(b);
+                hash.number(weight);
+            }
         }
         hash.tag(u8::from(material.two_sided));
     }

@@ -1,23 +1,36 @@
 //! `[materials]`.
 
-use super::decode::{Item, Keys, did_you_mean, list};
+use super::blend::{Parts, check_blends};
+use super::decode::{Fields, Item, Keys, did_you_mean, list};
 use super::overrides::MATERIAL_KINDS;
 use super::spectrum::{Handle, Quantity, Spectra};
-use super::{Bsdf, Material, MaterialId};
+use super::tree::Value;
+use super::{Bsdf, Material, MaterialId, SMOOTH};
 
-const KINDS: Keys = Keys::new(&["diffuse", "black"]).later(&["conductor", "dielectric", "plastic", "blend"]);
+const KINDS: Keys = Keys::new(&MATERIAL_KINDS);
 const DIFFUSE: Keys = Keys::new(&["reflectance", "two_sided"]).later(&["temperature"]);
+const CONDUCTOR: Keys =
+    Keys::new(&["nk", "eta", "k", "roughness", "energy_compensation", "two_sided"]).later(&["temperature"]);
+const DIELECTRIC: Keys = Keys::new(&["eta", "dispersion", "roughness"]).later(&["temperature"]);
+const PLASTIC: Keys = Keys::new(&["reflectance", "eta", "roughness", "two_sided"]).later(&["temperature"]);
+const BLEND: Keys = Keys::new(&["a", "b", "weight"]).later(&["temperature"]);
 const BLACK: Keys = Keys::new(&["two_sided"]).later(&["temperature"]);
 
-#[derive(Clone, Copy)]
-enum Kind {
-    Diffuse(Handle),
+const REFLECTANCE: &str = "reflectance = 0.5, or the name of a spectrum";
+const ETA: &str = "eta = 1.5, or the name of a spectrum";
+
+/// A material as the file defines it.
+pub enum Kind<'a> {
+    Diffuse { reflectance: Handle },
+    Conductor { eta: Handle, k: Handle, roughness: [f64; 2], energy_compensation: bool },
+    Dielectric { eta: Handle, dispersion: bool, roughness: f64 },
+    Plastic { reflectance: Handle, eta: Handle, roughness: f64 },
+    Blend { parts: Parts<'a>, weight: f64 },
     Black,
 }
 
-#[derive(Clone, Copy)]
-struct Declared {
-    kind: Kind,
+pub struct Declared<'a> {
+    pub kind: Kind<'a>,
     two_sided: bool,
     taken: Option<MaterialId>,
 }
@@ -25,8 +38,8 @@ struct Declared {
 /// The materials of the file, and those in use.
 pub struct Materials<'a> {
     /// `None` where the definition is wrong, which has been said.
-    declared: Vec<(&'a str, Option<Declared>)>,
-    /// In the order of their first use.
+    declared: Vec<(&'a str, Option<Declared<'a>>)>,
+    /// In the order of their first use, parts before their blend.
     scene: Vec<Material>,
 }
 
@@ -34,12 +47,19 @@ impl<'a> Materials<'a> {
     pub fn new(item: Option<Item<'a>>, spectra: &mut Spectra<'a>) -> Self {
         let items = item.and_then(|item| item.named_items()).unwrap_or_default();
         let declared = items.iter().map(|(name, item)| (*name, decode(item, spectra))).collect();
-        Materials { declared, scene: Vec::new() }
+        let mut materials = Materials { declared, scene: Vec::new() };
+        materials.look_up_parts();
+        check_blends(&mut materials.declared);
+        materials
     }
 
     /// Whether the file defines `name`, rightly or wrongly.
     pub fn has(&self, name: &str) -> bool {
-        self.declared.iter().any(|(known, _)| *known == name)
+        self.position(name).is_some()
+    }
+
+    fn position(&self, name: &str) -> Option<usize> {
+        self.declared.iter().position(|(known, _)| *known == name)
     }
 
     /// What to do about a name that does not exist.
@@ -53,41 +73,204 @@ impl<'a> Materials<'a> {
 
     /// The index of material `name` in the scene; `None` if it does not exist or is wrong.
     pub fn take(&mut self, name: &str, spectra: &mut Spectra) -> Option<MaterialId> {
-        let (_, declared) = self.declared.iter_mut().find(|(known, _)| *known == name)?;
-        let declared = declared.as_mut()?;
+        let index = self.position(name)?;
+        self.take_declared(index, spectra)
+    }
+
+    /// Recursion ends: blends have no cycles and few parts.
+    fn take_declared(&mut self, index: usize, spectra: &mut Spectra) -> Option<MaterialId> {
+        let (name, declared) = &self.declared[index];
+        let declared = declared.as_ref()?;
         if let Some(id) = declared.taken {
             return Some(id);
         }
+        let (name, two_sided) = ((*name).to_owned(), declared.two_sided);
         let bsdf = match declared.kind {
-            Kind::Diffuse(reflectance) => Bsdf::Diffuse { reflectance: spectra.take(reflectance) },
+            Kind::Diffuse { reflectance } => Bsdf::Diffuse { reflectance: spectra.take(reflectance) },
+            Kind::Conductor { eta, k, roughness, energy_compensation } => {
+                Bsdf::Conductor { eta: spectra.take(eta), k: spectra.take(k), roughness, energy_compensation }
+            }
+            Kind::Dielectric { eta, dispersion, roughness } => {
+                Bsdf::Dielectric { eta: spectra.take(eta), dispersion, roughness }
+            }
+            Kind::Plastic { reflectance, eta, roughness } => {
+                Bsdf::Plastic { reflectance: spectra.take(reflectance), eta: spectra.take(eta), roughness }
+            }
+            Kind::Blend { ref parts, weight } => {
+                let [a, b] = parts.indices?;
+                let (a, b) = (self.take_declared(a, spectra), self.take_declared(b, spectra));
+                Bsdf::Blend { a: a?, b: b?, weight }
+            }
             Kind::Black => Bsdf::Black,
         };
-        self.scene.push(Material { name: name.to_owned(), bsdf, two_sided: declared.two_sided });
-        declared.taken = Some(self.scene.len() - 1);
-        declared.taken
+        self.scene.push(Material { name, bsdf, two_sided });
+        let id = self.scene.len() - 1;
+        if let Some(declared) = &mut self.declared[index].1 {
+            declared.taken = Some(id);
+        }
+        Some(id)
+    }
+
+    /// The name of a material of the scene.
+    pub fn name(&self, id: MaterialId) -> &str {
+        &self.scene[id].name
+    }
+
+    /// Whether the look of a material of the scene depends on how the surface is turned about its normal.
+    pub fn is_anisotropic(&self, id: MaterialId) -> bool {
+        match self.scene[id].bsdf {
+            Bsdf::Conductor { roughness: [x, y], .. } => x != y,
+            Bsdf::Blend { a, b, .. } => self.is_anisotropic(a) || self.is_anisotropic(b),
+            _ => false,
+        }
     }
 
     pub fn finish(self) -> Vec<Material> {
         self.scene
     }
+
+    /// The parts of every blend, by name; a name that does not exist is reported.
+    fn look_up_parts(&mut self) {
+        for i in 0..self.declared.len() {
+            let Some(Declared { kind: Kind::Blend { parts, .. }, .. }) = &self.declared[i].1 else { continue };
+            let found = parts.items.each_ref().map(|item| {
+                let name = item.text()?;
+                let index = self.position(name);
+                if index.is_none() {
+                    item.error_help(format!("no material is named \"{name}\""), self.help(name));
+                }
+                index
+            });
+            let indices = match found {
+                [Some(a), Some(b)] => Some([a, b]),
+                _ => None,
+            };
+            if let Some(Declared { kind: Kind::Blend { parts, .. }, .. }) = &mut self.declared[i].1 {
+                parts.indices = indices;
+            }
+        }
+    }
 }
 
-fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Declared> {
+fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Declared<'a>> {
     let fields = item.table(KINDS)?;
     let kind = fields.exactly_one(&MATERIAL_KINDS, "kind of material")?;
     let (fields, kind) = match kind.path.rsplit('.').next() {
         Some("diffuse") => {
             let fields = kind.table(DIFFUSE)?;
-            let reflectance = fields.require("reflectance", "reflectance = 0.5, or the name of a spectrum");
-            (fields, reflectance.and_then(|item| spectra.resolve(&item, Quantity::Reflectance)).map(Kind::Diffuse))
+            let reflectance = spectrum(&fields, "reflectance", REFLECTANCE, Quantity::Reflectance, spectra);
+            (fields, reflectance.map(|reflectance| Kind::Diffuse { reflectance }))
         }
-        Some("black") => (kind.table(BLACK)?, Some(Kind::Black)),
-        // Refused by the table's key check.
-        _ => return None,
+        Some("conductor") => {
+            let fields = kind.table(CONDUCTOR)?;
+            let kind = conductor(&fields, spectra);
+            (fields, kind)
+        }
+        Some("dielectric") => {
+            let fields = kind.table(DIELECTRIC)?;
+            let eta = spectrum(&fields, "eta", ETA, Quantity::Index, spectra);
+            let (dispersion, roughness) = (boolean(&fields, "dispersion", true), roughness(&fields));
+            return Some(Declared {
+                kind: Kind::Dielectric { eta: eta?, dispersion: dispersion?, roughness: roughness? },
+                two_sided: true,
+                taken: None,
+            });
+        }
+        Some("plastic") => {
+            let fields = kind.table(PLASTIC)?;
+            let reflectance = spectrum(&fields, "reflectance", REFLECTANCE, Quantity::Reflectance, spectra);
+            let eta = spectrum(&fields, "eta", ETA, Quantity::CoatIndex, spectra);
+            let kind = match (reflectance, eta, roughness(&fields)) {
+                (Some(reflectance), Some(eta), Some(roughness)) => Some(Kind::Plastic { reflectance, eta, roughness }),
+                _ => None,
+            };
+            (fields, kind)
+        }
+        Some("blend") => {
+            let fields = kind.table(BLEND)?;
+            return Some(Declared { kind: blend(&fields)?, two_sided: true, taken: None });
+        }
+        _ => (kind.table(BLACK)?, Some(Kind::Black)),
     };
-    let two_sided = match fields.get("two_sided") {
-        Some(item) => item.boolean(),
-        None => Some(true),
-    };
+    let two_sided = boolean(&fields, "two_sided", true);
     Some(Declared { kind: kind?, two_sided: two_sided?, taken: None })
+}
+
+fn conductor<'a>(fields: &Fields<'a>, spectra: &mut Spectra<'a>) -> Option<Kind<'a>> {
+    let index = match (fields.get("nk"), fields.get("eta").or(fields.get("k"))) {
+        (Some(_), Some(other)) => {
+            other.error_help("goes without `nk` only", "keep `nk`, or `eta` and `k`");
+            None
+        }
+        (Some(file), None) => spectra.complex_index(&file),
+        (None, Some(_)) => {
+            let eta = spectrum(fields, "eta", "eta = 0.2, or the name of a spectrum", Quantity::Index, spectra);
+            let k = spectrum(fields, "k", "k = 3.4, or the name of a spectrum", Quantity::Extinction, spectra);
+            eta.zip(k)
+        }
+        (None, None) => {
+            fields.require("nk", "nk = \"gold.csv\", or eta and k");
+            None
+        }
+    };
+    let roughness = match fields.get("roughness") {
+        None => Some([0.0; 2]),
+        Some(item) if matches!(item.node.value, Value::Array(_)) => anisotropic_roughness(&item),
+        Some(item) => alpha(&item).map(|alpha| [alpha; 2]),
+    };
+    let energy_compensation = boolean(fields, "energy_compensation", true);
+    let (eta, k) = index?;
+    Some(Kind::Conductor { eta, k, roughness: roughness?, energy_compensation: energy_compensation? })
+}
+
+fn anisotropic_roughness(item: &Item) -> Option<[f64; 2]> {
+    let items = item.array_of::<2>("a number, or two [alpha_x, alpha_y]")?;
+    let [x, y] = items.each_ref().map(alpha);
+    let (x, y) = (x?, y?);
+    if (x < SMOOTH) != (y < SMOOTH) {
+        item.error_help(
+            format!("both numbers must be at least {SMOOTH}, or both below, which is smooth; but they are {x} and {y}"),
+            format!("use {SMOOTH} for the smoother direction"),
+        );
+        return None;
+    }
+    Some([x, y])
+}
+
+fn alpha(item: &Item) -> Option<f64> {
+    item.number_where(|alpha| (0.0..=1.0).contains(&alpha), "a GGX roughness in [0, 1]")
+}
+
+fn roughness(fields: &Fields) -> Option<f64> {
+    fields.get("roughness").map_or(Some(0.0), |item| alpha(&item))
+}
+
+fn blend<'a>(fields: &Fields<'a>) -> Option<Kind<'a>> {
+    let part = |key: &str| {
+        let item = fields.require(key, &format!("{key} = \"white\", the name of a material"))?;
+        item.text().map(|_| item)
+    };
+    let (a, b) = (part("a"), part("b"));
+    let weight = fields.require("weight", "weight = 0.5, the share of b").and_then(|item| {
+        if matches!(item.node.value, Value::Table(_)) {
+            item.table(Keys::new(&[]).later(&["texture"]));
+            return None;
+        }
+        item.number_where(|weight| (0.0..=1.0).contains(&weight), "the share of b, in [0, 1]")
+    });
+    Some(Kind::Blend { parts: Parts { items: [a?, b?], indices: None }, weight: weight? })
+}
+
+fn spectrum<'a>(
+    fields: &Fields<'a>,
+    key: &str,
+    example: &str,
+    quantity: Quantity,
+    spectra: &mut Spectra<'a>,
+) -> Option<Handle> {
+    fields.require(key, example).and_then(|item| spectra.resolve(&item, quantity))
+}
+
+fn boolean(fields: &Fields, key: &str, default: bool) -> Option<bool> {
+    fields.get(key).map_or(Some(default), |item| item.boolean())
 }

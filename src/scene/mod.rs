@@ -1,6 +1,7 @@
 //! A resolved, validated scene: what `scene.toml`, its meshes and its spectra say, in metres and nanometres,
 //! f64, world space. Knows no GPU and no paths.
 
+mod blend;
 mod camera;
 mod channels;
 mod context;
@@ -40,7 +41,7 @@ pub struct Scene {
     pub integrator: Integrator,
     /// Every distinct spectrum in use, named ones and those written in place.
     pub spectra: Vec<Spectrum>,
-    /// Only materials that some object uses.
+    /// Only materials that some object uses, itself or as a part of a blend.
     pub materials: Vec<Material>,
     pub objects: Vec<Object>,
     pub environment: Option<Environment>,
@@ -144,15 +145,49 @@ pub enum Wavelengths {
 pub struct Material {
     pub name: String,
     pub bsdf: Bsdf,
-    /// Whether the back side (against the geometric normal) scatters like the front; otherwise it absorbs.
+    /// Whether the back side (against the geometric normal) scatters like the front; otherwise it absorbs. True, and
+    /// without meaning, for dielectrics, whose back is their inside, and for blends, whose parts have their own.
     pub two_sided: bool,
 }
 
+/// How a surface scatters. Roughness is the α of the GGX distribution in [0, 1]; what is below [`SMOOTH`] is smooth.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Bsdf {
-    Diffuse { reflectance: SpectrumId },
+    Diffuse {
+        reflectance: SpectrumId,
+    },
+    /// Complex index of refraction η + i k, k > 0 absorbs.
+    Conductor {
+        eta: SpectrumId,
+        k: SpectrumId,
+        /// Along the tangent ([`Shape`]) and across it; both smooth or neither.
+        roughness: [f64; 2],
+        energy_compensation: bool,
+    },
+    Dielectric {
+        /// The index behind the geometric normal over that before it.
+        eta: SpectrumId,
+        /// Whether directions differ by wavelength where `eta` does.
+        dispersion: bool,
+        roughness: f64,
+    },
+    /// A diffuse base under a dielectric coat.
+    Plastic {
+        reflectance: SpectrumId,
+        eta: SpectrumId,
+        roughness: f64,
+    },
+    /// (1 - weight) a + weight b. Parts come before the blend in [`Scene::materials`].
+    Blend {
+        a: MaterialId,
+        b: MaterialId,
+        weight: f64,
+    },
     Black,
 }
+
+/// Roughness below this is none: a mirror, or ideal refraction.
+pub const SMOOTH: f64 = 1e-3;
 
 /// One shape of one material. An OBJ with several materials becomes several objects.
 #[derive(Debug, Clone)]
@@ -165,6 +200,10 @@ pub struct Object {
 }
 
 /// World-space geometry, transforms applied.
+///
+/// Anisotropic materials are turned by a tangent, of either sign: along the first edge (corner 0 to 1) of a triangle,
+/// which is along `edge_u` on a quad; around the axis of a disk or cylinder. Spheres and OBJ meshes have no tangent to
+/// speak of and no anisotropic material.
 #[derive(Debug, Clone)]
 pub enum Shape {
     /// Also quads and cubes. Front = counter-clockwise.

@@ -83,6 +83,9 @@ impl<'s, 'a> Objects<'s, 'a> {
             return;
         };
         let kind = shape.path.rsplit('.').next().unwrap_or_default();
+        if let (Some(material), "sphere") = (material, kind) {
+            self.refuse_anisotropic(&fields, "a sphere", material);
+        }
         let name = format!("{} ({kind})", item.path);
         self.push(&fields, name, local, material, &common);
     }
@@ -185,9 +188,23 @@ impl<'s, 'a> Objects<'s, 'a> {
         material: Option<MaterialId>,
         common: &Common,
     ) {
+        if let Some(material) = material {
+            self.refuse_anisotropic(fields, "an OBJ mesh", material);
+        }
         let label = usemtl.map_or_else(String::new, |name| format!(", material \"{name}\""));
         let name = format!("{} ({}{label})", fields.path, file_name(shape));
         self.push(fields, name, Shape::Mesh(shape::join(parts)), material, common);
+    }
+
+    /// Roughness that differs along and across needs directions on the surface, which not all shapes have yet.
+    fn refuse_anisotropic(&self, fields: &Fields<'a>, shape: &str, material: MaterialId) {
+        if self.materials.is_anisotropic(material) {
+            let name = self.materials.name(material);
+            fields.error_help(
+                format!("material \"{name}\" has two roughnesses, which is not supported yet on {shape}"),
+                "use one roughness, or a quad, cube, disk or cylinder",
+            );
+        }
     }
 
     /// Moves `local` into the world and adds it to the scene.

@@ -148,6 +148,11 @@ fn rivals(parents: &[&str], key: &str) -> Vec<&'static str> {
         ["camera"] => others(&CAMERAS),
         ["channels"] => others(&CHANNEL_KINDS),
         ["materials", _] => others(&MATERIAL_KINDS),
+        ["materials", _, "conductor"] => match key {
+            "nk" => vec!["eta", "k"],
+            "eta" | "k" => vec!["nk"],
+            _ => Vec::new(),
+        },
         ["lights", _] => others(&LIGHT_KINDS),
         ["environment"] => others(&ENVIRONMENTS),
         ["objects", _] => {
@@ -226,6 +231,12 @@ mod tests {
             &["channels.intervals.0.0=4", "channels.intervals.0.1=5"],
         );
         check("materials.w.diffuse.reflectance = 1", &[("materials.w.black", "{}")], &["materials.w.black={}"]);
+        check(
+            "materials.g.conductor.nk = \"au.csv\"",
+            &[("materials.g.conductor.eta", "0.2"), ("materials.g.conductor.k", "{ constant = 3 }")],
+            &["materials.g.conductor.eta=0.2", "materials.g.conductor.k.constant=3"],
+        );
+        check("materials.g.conductor.eta = 1", &[("materials.g.conductor.nk", "a")], &["materials.g.conductor.nk=a"]);
         check(
             "[[objects]]\nmesh = \"a\"\ngroup = \"g\"\nmaterial = \"w\"",
             &[("objects.0.sphere", "{ radius = 1.5 }")],

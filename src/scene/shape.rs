@@ -49,7 +49,7 @@ fn cylinder(item: &Item) -> Option<Shape> {
     Some(Shape::Cylinder { from, to, radius: radius? })
 }
 
-/// Two triangles whose normal is edge_u x edge_v.
+/// Two triangles whose normal is edge_u x edge_v, and whose first edges run along edge_u.
 fn quad(item: &Item) -> Option<Shape> {
     let fields = item.table(Keys::new(&["corner", "edge_u", "edge_v"]))?;
     let (corner, u, v) = (vector(&fields, "corner"), vector(&fields, "edge_u"), vector(&fields, "edge_v"));
@@ -59,10 +59,10 @@ fn quad(item: &Item) -> Option<Shape> {
         return None;
     }
     let positions = vec![corner, corner + u, corner + u + v, corner + v];
-    Some(Shape::Mesh(Mesh { positions, triangles: vec![[0, 1, 2], [0, 2, 3]] }))
+    Some(Shape::Mesh(Mesh { positions, triangles: vec![[0, 1, 2], [2, 3, 0]] }))
 }
 
-/// Twelve triangles facing outward.
+/// Twelve triangles facing outward. The first edges of a face's two triangles are parallel.
 fn cube(item: &Item) -> Option<Shape> {
     let fields = item.table(Keys::new(&["min", "max"]))?;
     let (min, max) = (vector(&fields, "min"), vector(&fields, "max"));
@@ -79,7 +79,7 @@ fn cube(item: &Item) -> Option<Shape> {
     };
     // Counter-clockwise from outside: -x, +x, -y, +y, -z, +z.
     const FACES: [[u32; 4]; 6] = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
-    let triangles = FACES.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    let triangles = FACES.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [c, d, a]]).collect();
     Some(Shape::Mesh(Mesh { positions: (0..8).map(corner).collect(), triangles }))
 }
 

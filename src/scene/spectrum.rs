@@ -9,7 +9,8 @@ use super::overrides::SPECTRUM_SOURCES;
 use super::tree::{Origin, Value};
 use super::{Spectrum, SpectrumId};
 use crate::error::Problem;
-use crate::format::text;
+use crate::format::refractive::{self, Index};
+use crate::format::text::{self, SpectrumTable};
 use crate::spectral::{Channels, Curve, Outside, upsample};
 
 /// Wavelengths, in nm, far beyond any channel, between which a curve's peak is looked for.
@@ -17,6 +18,8 @@ const SHORTEST: f64 = 1e-3;
 const LONGEST: f64 = 1e15;
 /// Sums and products of a few radiances beyond this leave f32.
 const BRIGHTEST: f64 = 1e35;
+/// Far above any index of refraction (200 or so in metals at 20 um) and its squares far inside f32.
+const DENSEST: f64 = 1e3;
 
 /// What a spectrum describes: decides the allowed values, what a table means beyond its ends, and what `rgb` is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -25,21 +28,48 @@ pub enum Quantity {
     Reflectance,
     /// W m⁻² sr⁻¹ nm⁻¹, not negative; zero beyond its table.
     Radiance,
+    /// Of refraction: dimensionless, above 0; held beyond its table, with a warning.
+    Index,
+    /// Of a coat: at least 1; otherwise as [`Quantity::Index`].
+    CoatIndex,
+    /// Imaginary part of a complex index, not negative; held beyond its table, with a warning.
+    Extinction,
 }
 
 impl Quantity {
+    fn default_outside(self) -> Outside {
+        if self == Quantity::Radiance { Outside::Zero } else { Outside::Hold }
+    }
+
+    fn noun(self) -> &'static str {
+        match self {
+            Quantity::Reflectance => "a reflectance",
+            Quantity::Radiance => "a radiance",
+            Quantity::Index => "an index of refraction",
+            Quantity::CoatIndex => "the index of refraction of a coat",
+            Quantity::Extinction => "an extinction coefficient k",
+        }
+    }
+
     fn allows(self, value: f64) -> bool {
         match self {
             Quantity::Reflectance => (0.0..=1.0).contains(&value),
             Quantity::Radiance => (0.0..=BRIGHTEST).contains(&value),
+            Quantity::Index => value > 0.0 && value <= DENSEST,
+            Quantity::CoatIndex => (1.0..=DENSEST).contains(&value),
+            Quantity::Extinction => (0.0..=DENSEST).contains(&value),
         }
     }
 
-    fn range(self) -> &'static str {
-        match self {
-            Quantity::Reflectance => "a reflectance must lie in [0, 1]",
-            Quantity::Radiance => "a radiance must lie in [0, 1e35]",
-        }
+    fn range(self) -> String {
+        let range = match self {
+            Quantity::Reflectance => "[0, 1]",
+            Quantity::Radiance => "[0, 1e35]",
+            Quantity::Index => "(0, 1000]",
+            Quantity::CoatIndex => "[1, 1000]",
+            Quantity::Extinction => "[0, 1000]",
+        };
+        format!("{} must lie in {range}", self.noun())
     }
 }
 
@@ -141,6 +171,31 @@ impl<'a> Spectra<'a> {
         handle
     }
 
+    /// The complex index of refraction, n and k, in the file that `item` names.
+    pub fn complex_index(&mut self, item: &Item<'a>) -> Option<(Handle, Handle)> {
+        let path = item.cx.path(item.text()?);
+        let index = refractive::read(&path).map_err(|problem| report_in_file(item, *problem)).ok()?;
+        let missing = |name: &str| {
+            let help = "give both, or write `eta` and `k` instead of `nk`";
+            item.error_help(format!("{} does not give {name}", path.display()), help);
+        };
+        let Index { n, k } = index;
+        if n.is_none() {
+            missing("n");
+        }
+        if k.is_none() {
+            missing("k");
+        }
+        let mut part = |name: &str, table: SpectrumTable, quantity: Quantity| {
+            let data = table_data(table, path.clone());
+            let source = Source { data, scale: 1.0, outside: None, path: item.path.clone(), at: item.at };
+            self.check(&source, &format!("{} ({name})", item.text()?), item, quantity)
+        };
+        let (n, k) = (n?, k?);
+        let (n, k) = (part("n", n, Quantity::Index), part("k", k, Quantity::Extinction));
+        n.zip(k)
+    }
+
     /// The index of a checked spectrum in the scene. Equal curves share one.
     pub fn take(&mut self, handle: Handle) -> SpectrumId {
         let spectrum = &mut self.checked[handle];
@@ -189,10 +244,13 @@ impl<'a> Spectra<'a> {
             self.cx.error(source.at, &source.path, message, None);
         };
         let mut warnings = Vec::new();
-        let default_outside = match quantity {
-            Quantity::Reflectance => Outside::Hold,
-            Quantity::Radiance => Outside::Zero,
-        };
+        let is_index = !matches!(quantity, Quantity::Reflectance | Quantity::Radiance);
+        if is_index && !quantity.allows(0.0) && source.outside == Some(Outside::Zero) {
+            let help = "remove `outside`, or write outside = \"hold\"";
+            let message = format!("an index of refraction cannot be 0 outside its table{used_by}");
+            self.cx.error(source.at, &source.path, message, Some(help.to_owned()));
+            return None;
+        }
         let scaled = |value: f64| {
             let text =
                 if source.scale == 1.0 { value.to_string() } else { format!("{value} x scale {}", source.scale) };
@@ -206,6 +264,14 @@ impl<'a> Spectra<'a> {
                     return None;
                 }
                 Curve::Constant(value)
+            }
+            Data::Blackbody(_) if is_index => {
+                refuse("a black body".to_owned());
+                return None;
+            }
+            Data::Rgb(_) if is_index => {
+                refuse("a colour".to_owned());
+                return None;
             }
             Data::Blackbody(kelvin) => {
                 let curve = Curve::Blackbody { kelvin: *kelvin, scale: source.scale };
@@ -231,12 +297,13 @@ impl<'a> Spectra<'a> {
                     }
                     return None;
                 }
-                if quantity == Quantity::Reflectance && source.outside.is_none() {
+                let outside = source.outside.unwrap_or(quantity.default_outside());
+                if outside == Outside::Hold && source.outside.is_none() {
                     warnings.extend(self.uncovered(nm[0], nm[nm.len() - 1]).map(|gap| {
-                        format!("spectrum `{name}` (a reflectance) does not cover {gap}: its end values are held there")
+                        let noun = quantity.noun();
+                        format!("spectrum `{name}` ({noun}) does not cover {gap}: its end values are held there")
                     }));
                 }
-                let outside = source.outside.unwrap_or(default_outside);
                 let value = value.iter().map(|v| v * source.scale).collect();
                 Curve::Linear { nm: nm.clone(), value, outside }
             }
@@ -250,8 +317,8 @@ impl<'a> Spectra<'a> {
                     return None;
                 }
                 let curve = match quantity {
-                    Quantity::Reflectance => upsample::reflectance(colour),
                     Quantity::Radiance => upsample::emission(colour),
+                    _ => upsample::reflectance(colour),
                 };
                 self.rgb_outside(curve, source.outside, name, &mut warnings)
             }
@@ -342,18 +409,37 @@ fn file(item: &Item, column: Option<Item>) -> Option<Data> {
         Some(column) => Some(column.text()?),
         None => None,
     };
-    let is_yaml = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("yml") || e.eq_ignore_ascii_case("yaml"));
-    if is_yaml {
-        item.error_help("refractiveindex.info YAML is not supported yet", "use a CSV file of `nm,value` lines");
-        return None;
+    if refractive::is_yaml(&path) {
+        return index_file(item, path, column);
     }
     match text::read_spectrum(&path, column) {
-        Ok(table) => Some(Data::Table { nm: table.nm, value: table.value, lines: Some((path, table.line)) }),
+        Ok(table) => Some(table_data(table, path)),
         Err(problem) => {
             report_in_file(item, *problem);
             None
         }
     }
+}
+
+/// `n` (the default) or `k` of a refractiveindex.info file.
+fn index_file(item: &Item, path: PathBuf, column: Option<&str>) -> Option<Data> {
+    let Index { n, k } = refractive::read(&path).map_err(|problem| report_in_file(item, *problem)).ok()?;
+    let (name, table) = match column {
+        None | Some("n") => ("n", n),
+        Some("k") => ("k", k),
+        Some(other) => {
+            item.error_help(format!("{} has no column \"{other}\"", path.display()), "its columns are n and k");
+            return None;
+        }
+    };
+    if table.is_none() {
+        item.error(format!("{} does not give {name}", path.display()));
+    }
+    Some(table_data(table?, path))
+}
+
+fn table_data(table: SpectrumTable, file: PathBuf) -> Data {
+    Data::Table { nm: table.nm, value: table.value, lines: Some((file, table.line)) }
 }
 
 /// A mistake in a file that `item` names: at its line there, or, if the file as a whole is wrong, at the item.

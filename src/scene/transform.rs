@@ -77,7 +77,8 @@ fn similarity(m: DMat3) -> Option<f64> {
     (difference <= SIMILAR).then_some(factor)
 }
 
-/// Moves `shape` into the world. The front stays the front: mirroring reverses the order of a mesh's corners.
+/// Moves `shape` into the world. The front stays the front: mirroring reverses the order of a mesh's corners, whose
+/// first edge stays the first.
 /// `Err` says what is wrong.
 pub fn apply(affine: &DAffine3, shape: Shape) -> Result<Shape, String> {
     let factor = || {
@@ -91,7 +92,7 @@ pub fn apply(affine: &DAffine3, shape: Shape) -> Result<Shape, String> {
         Shape::Mesh(mut mesh) => {
             mesh.positions.iter_mut().for_each(|p| *p = affine.transform_point3(*p));
             if affine.matrix3.determinant() < 0.0 {
-                mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+                mesh.triangles.iter_mut().for_each(|t| t.swap(0, 1));
             }
             Shape::Mesh(mesh)
         }

@@ -42,6 +42,48 @@ proptest! {
     }
 
     #[test]
+    fn random_materials_never_panic(
+        kinds in proptest::collection::vec((0..6usize, 0..6usize, 0..6usize, "-?[0-9]\\.?[0-9]?|nan|\"a.csv\"|\\[[01](, 0\\.[0-9])?\\]|\\{ texture = 1 \\}"), 1..6),
+    ) {
+        let mut text = BASE.to_owned();
+        for (i, (kind, a, b, value)) in kinds.iter().enumerate() {
+            let (name, keys) = match kind {
+                0 => ("diffuse", format!("reflectance = {value}")),
+                1 => ("conductor", format!("nk = {value}\nroughness = {value}")),
+                2 => ("conductor", format!("eta = {value}\nk = {value}\nroughness = {value}")),
+                3 => ("dielectric", format!("eta = {value}")),
+                4 => ("plastic", format!("reflectance = 0.5\neta = {value}\nroughness = {value}")),
+                _ => ("blend", format!("a = \"m{a}\"\nb = \"m{b}\"\nweight = {value}")),
+            };
+            text += &format!("[materials.m{i}.{name}]\n{keys}\n");
+        }
+        text += "[[objects]]\nsphere = { center = [0, 0, 0], radius = 1 }\nmaterial = \"m0\"\n";
+        survives(&text, &[("a.csv", "nm,n,k\n400,1,2\n500,0.5,1\n")]);
+    }
+
+    #[test]
+    fn random_index_files_never_panic(
+        bytes in proptest::collection::vec(any::<u8>(), 0..200),
+        rows in "([0-9a-z.,;#\t \"-]{0,12}\n){0,8}",
+        kind in "tabulated (n|k|nk|n2)|formula (-?[0-9]{1,2})",
+        numbers in "( {0,2}-?[0-9]{0,2}\\.?[0-9]{0,2}(e-?[0-9]{1,3})?){0,8}",
+        range in "-?[0-9]\\.[0-9] [0-9]\\.[0-9]",
+    ) {
+        let formula = format!("DATA:\n  - type: {kind}\n    wavelength_range: {range}\n    coefficients: {numbers}\n    data: |\n      {numbers}\n");
+        let table = format!("DATA:\n  - type: {kind}\n    data: |\n{}", rows.replace('\n', "\n      "));
+        for content in [bytes.as_slice(), rows.as_bytes(), formula.as_bytes(), table.as_bytes()] {
+            for name in ["t.csv", "t.yml"] {
+                if let Ok(index) = spectile::format::refractive::parse(content, Path::new(name)) {
+                    for table in [index.n, index.k].into_iter().flatten() {
+                        prop_assert!(table.nm.is_sorted() && table.nm.len() == table.value.len() && table.nm.len() >= 2);
+                        prop_assert!(table.value.iter().all(|v| v.is_finite()) && table.line.len() == table.nm.len());
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
     fn random_overrides_never_panic(key in "[a-z0-9._\"= \\[]{0,20}", value in "[a-z0-9.,{}\\[\\]\"= -]{0,20}") {
         for key in [key.as_str(), "objects.0.quad", "spectra.grey.constant", "channels.intervals", "camera.perspective.position"] {
             let _ = scene::parse(BASE, Path::new("/nonexistent/scene.toml"), &overrides(&[(key, &value)]));

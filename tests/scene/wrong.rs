@@ -13,7 +13,7 @@ use super::{BASE, changed, good, parse_with};
 type Wrong = (&'static str, &'static str, &'static str, &'static str, &'static [&'static str]);
 
 #[track_caller]
-fn check_wrong(text: &str, files: &[(&str, &str)], name: &str, key: &str, words: &[&str]) {
+pub fn check_wrong(text: &str, files: &[(&str, &str)], name: &str, key: &str, words: &[&str]) {
     let line = text.lines().position(|line| line.contains("#!")).map(|i| i + 1);
     let error = match parse_with(text, files, &[]) {
         Ok(_) => panic!("{name}: accepted"),
@@ -212,7 +212,7 @@ fn spectra_and_materials() {
         ("unknown source", GREY, "constant = 0.5\nconstnat = 3 #!", "spectra.grey.constnat", &["did you mean `constant`?"]),
         ("missing file", GREY, "file = \"nowhere.csv\" #!", "spectra.grey.file", &["nowhere.csv", "cannot be read"]),
         ("file is a folder", GREY, "file = \"\" #!", "spectra.grey.file", &["cannot be read"]),
-        ("yaml", GREY, "file = \"gold.yml\" #!", "spectra.grey.file", &["not supported yet"]),
+        ("yaml", GREY, "file = \"gold.yml\" #!", "spectra.grey.file", &["gold.yml", "cannot be read"]),
         ("column without file", GREY, "constant = 0.5\ncolumn = \"a\" #!", "spectra.grey.column", &["goes with `file` only"]),
         ("outside", GREY, "constant = 0.5\noutside = \"nothing\" #!", "spectra.grey.outside", &["\"zero\", \"hold\""]),
         ("one sample", GREY, "samples = [[400, 0.1]] #!", "spectra.grey.samples", &["at least two"]),
@@ -232,7 +232,6 @@ fn spectra_and_materials() {
         ("texture", USE, "reflectance = { texture = \"a.png\" } #!", "materials.white.diffuse.reflectance.texture", &["not supported yet"]),
         ("temperature", USE, "reflectance = 0.5\ntemperature = 300 #!", "materials.white.diffuse.temperature", &["not supported yet"]),
         ("two_sided", USE, "reflectance = 0.5\ntwo_sided = \"yes\" #!", "materials.white.diffuse.two_sided", &["true or false"]),
-        ("conductor", "[materials.soot.black]", "[materials.soot.black]\n[materials.gold.conductor] #!\nnk = \"gold.csv\"", "materials.gold.conductor", &["not supported yet"]),
         ("two kinds", "[materials.soot.black]", "[materials.soot.black]\n[materials.soot.diffuse] #!\nreflectance = 1", "materials.soot.diffuse", &["only one kind of material"]),
         ("no kind", "[materials.soot.black]", "[materials.soot.black]\n[materials.bare] #!", "materials.bare", &["no kind of material"]),
     ]);

@@ -3,6 +3,7 @@
 #![allow(dead_code)]
 
 pub mod closed_forms;
+pub mod surfaces;
 
 use glam::{DVec2, DVec3};
 use spectile::scene::{
@@ -104,6 +105,30 @@ impl Builder {
         self.object(shape, Bsdf::Black, true, None)
     }
 
+    /// A metal, with energy compensation.
+    pub fn conductor(mut self, shape: Shape, eta: impl IntoCurve, k: impl IntoCurve, roughness: [f64; 2]) -> Self {
+        let (eta, k) = (self.spectrum(eta), self.spectrum(k));
+        self.object(shape, Bsdf::Conductor { eta, k, roughness, energy_compensation: true }, true, None)
+    }
+
+    /// A dispersive dielectric; the front is outside.
+    pub fn dielectric(mut self, shape: Shape, eta: impl IntoCurve, roughness: f64) -> Self {
+        let eta = self.spectrum(eta);
+        self.object(shape, Bsdf::Dielectric { eta, dispersion: true, roughness }, true, None)
+    }
+
+    pub fn plastic(mut self, shape: Shape, reflectance: impl IntoCurve, eta: impl IntoCurve, roughness: f64) -> Self {
+        let (reflectance, eta) = (self.spectrum(reflectance), self.spectrum(eta));
+        self.object(shape, Bsdf::Plastic { reflectance, eta, roughness }, true, None)
+    }
+
+    /// A blend of the materials of the last two objects, which only lend theirs.
+    pub fn blend_of_last_two(mut self, shape: Shape, weight: f64) -> Self {
+        let last = self.0.materials.len() - 1;
+        self.0.objects.truncate(self.0.objects.len() - 2);
+        self.object(shape, Bsdf::Blend { a: last - 1, b: last, weight }, true, None)
+    }
+
     pub fn build(self) -> Scene {
         self.0
     }
@@ -152,10 +177,10 @@ pub fn look(position: DVec3, target: DVec3, up: DVec3, projection: Projection) -
     Camera { position, forward, right, up: right.cross(forward), projection }
 }
 
-/// A parallelogram with normal edge_u x edge_v.
+/// A parallelogram with normal edge_u x edge_v, its tangent along edge_u.
 pub fn quad(corner: DVec3, edge_u: DVec3, edge_v: DVec3) -> Shape {
     let positions = vec![corner, corner + edge_u, corner + edge_u + edge_v, corner + edge_v];
-    Shape::Mesh(Mesh { positions, triangles: vec![[0, 1, 2], [0, 2, 3]] })
+    Shape::Mesh(Mesh { positions, triangles: vec![[0, 1, 2], [2, 3, 0]] })
 }
 
 /// The six faces of a box whose normals point inwards.

@@ -1,0 +1,399 @@
+//! Complex refractive indices: `nm,n,k` text and the YAML of the refractiveindex.info database.
+
+use std::path::Path;
+
+use serde::Deserialize;
+use serde_saphyr::Spanned;
+
+use super::text::{self, SpectrumTable};
+use crate::error::Problem;
+
+/// n and k over wavelength in nm, as far as a file gives them. k > 0 absorbs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Index {
+    pub n: Option<SpectrumTable>,
+    pub k: Option<SpectrumTable>,
+}
+
+/// Largest relative error of a dispersion formula's table between its nodes: well below the f32 of a device.
+const TABLE_ERROR: f64 = 1e-8;
+/// Halvings of a formula's range at most. A pole inside the range would need any number.
+const MAX_HALVINGS: u32 = 14;
+
+/// Whether the file's name says YAML.
+pub fn is_yaml(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("yml") || e.eq_ignore_ascii_case("yaml"))
+}
+
+/// Reads the file at `path`: YAML by its name, otherwise text with the columns n and k.
+///
+/// Errors name the line; without one, the file as a whole could not be read.
+pub fn read(path: &Path) -> Result<Index, Box<Problem>> {
+    parse(&text::read(path)?, path)
+}
+
+/// [`read`] on the content of the file.
+pub fn parse(bytes: &[u8], path: &Path) -> Result<Index, Box<Problem>> {
+    if is_yaml(path) {
+        return Yaml { path }.parse(&String::from_utf8_lossy(bytes));
+    }
+    let [n, k] = text::parse_index(bytes, path)?;
+    Ok(Index { n: Some(n), k: Some(k) })
+}
+
+/// What is read of a file; the rest (references, comments, properties) is left aside.
+#[derive(Deserialize)]
+struct Document {
+    #[serde(rename = "DATA")]
+    data: Vec<Block>,
+}
+
+/// One entry of `DATA`. Numbers are kept as text: rows and lists are separated by blanks.
+#[derive(Deserialize)]
+struct Block {
+    #[serde(rename = "type")]
+    kind: Spanned<String>,
+    data: Option<Spanned<String>>,
+    #[serde(alias = "range")]
+    wavelength_range: Option<Spanned<String>>,
+    coefficients: Option<Spanned<String>>,
+}
+
+struct Yaml<'a> {
+    path: &'a Path,
+}
+
+impl Yaml<'_> {
+    fn at(&self, line: Option<usize>, message: impl Into<String>, help: &str) -> Box<Problem> {
+        let help = (!help.is_empty()).then(|| help.to_owned());
+        Box::new(Problem { file: self.path.to_owned(), line, message: message.into(), help, ..Problem::default() })
+    }
+
+    fn parse(&self, text: &str) -> Result<Index, Box<Problem>> {
+        let document: Document = serde_saphyr::from_str(text).map_err(|e| {
+            let line = e.location().map(|at| at.line() as usize).filter(|line| *line > 0);
+            let message = e.without_snippet().to_string();
+            // The place is named once.
+            let message = message.split(" at line ").next().unwrap_or_default();
+            let help = "a refractiveindex.info file has a list `DATA:` of blocks with `type:`";
+            self.at(line, format!("is not what is expected of it: {}", message.replace('\n', " ")), help)
+        })?;
+        let mut index = Index { n: None, k: None };
+        for block in &document.data {
+            let kind = block.kind.value.trim();
+            let line = line_of(&block.kind);
+            let (n, k) = match kind.split_once(' ') {
+                Some(("tabulated", "nk")) => {
+                    let [n, k] = self.columns(block, line)?;
+                    (Some(n), Some(k))
+                }
+                Some(("tabulated", "n")) => {
+                    let [n] = self.columns(block, line)?;
+                    (Some(n), None)
+                }
+                Some(("tabulated", "k")) => {
+                    let [k] = self.columns(block, line)?;
+                    (None, Some(k))
+                }
+                Some(("formula", number)) => (Some(self.formula(block, line, number)?), None),
+                _ => {
+                    let help = "known types: tabulated nk, tabulated n, tabulated k, formula 1 to 9";
+                    return Err(self.at(line, format!("has a block of type `{}`", kind.escape_debug()), help));
+                }
+            };
+            for (name, new, old) in [("n", n, &mut index.n), ("k", k, &mut index.k)] {
+                if new.is_some() && old.is_some() {
+                    return Err(self.at(line, format!("gives {name} a second time"), "keep one of the blocks"));
+                }
+                *old = new.or(old.take());
+            }
+        }
+        if index.n.is_none() && index.k.is_none() {
+            return Err(self.at(None, "has no data", "give at least one block under `DATA:`"));
+        }
+        Ok(index)
+    }
+
+    /// The columns of a tabulated block beside the wavelength, which is in um.
+    fn columns<const N: usize>(&self, block: &Block, line: Option<usize>) -> Result<[SpectrumTable; N], Box<Problem>> {
+        let Some(data) = &block.data else { return Err(self.at(line, "a tabulated block has no `data`", "")) };
+        let first = line_of(data);
+        let mut rows: Vec<(Option<usize>, Vec<f64>)> = Vec::new();
+        for (i, row) in data.value.lines().enumerate().filter(|(_, row)| !row.trim().is_empty()) {
+            let line = first.map(|first| first + i);
+            let numbers = self.numbers(row, line)?;
+            if numbers.len() != N + 1 {
+                let message = format!("has {} numbers where {} are expected", numbers.len(), N + 1);
+                return Err(self.at(line, message, "a row is a wavelength in um and the values of the block's type"));
+            }
+            if numbers[0] <= 0.0 || !(numbers[0] * 1e3).is_finite() {
+                return Err(self.at(line, format!("{} is no wavelength in um", numbers[0]), ""));
+            }
+            rows.push((line, numbers));
+        }
+        if rows.len() < 2 {
+            return Err(self.at(line, format!("has {} rows", rows.len()), "give at least two wavelengths"));
+        }
+        if rows[0].1[0] > rows[rows.len() - 1].1[0] {
+            rows.reverse();
+        }
+        if let Some(pair) = rows.windows(2).find(|pair| pair[1].1[0] <= pair[0].1[0]) {
+            let message = format!("{} um and {} um are out of order", pair[0].1[0], pair[1].1[0]);
+            return Err(self.at(pair[1].0, message, "sort the rows by wavelength, each once"));
+        }
+        Ok(std::array::from_fn(|column| SpectrumTable {
+            nm: rows.iter().map(|row| row.1[0] * 1e3).collect(),
+            value: rows.iter().map(|row| row.1[column + 1]).collect(),
+            line: rows.iter().map(|row| row.0.or(line).unwrap_or(1)).collect(),
+        }))
+    }
+
+    /// A dispersion formula, tabulated over its range so finely that linear interpolation is as good.
+    fn formula(&self, block: &Block, line: Option<usize>, number: &str) -> Result<SpectrumTable, Box<Problem>> {
+        let list = |list: &Option<Spanned<String>>, name: &str| match list {
+            Some(list) => self.numbers(&list.value, line_of(list)),
+            None => Err(self.at(line, format!("a formula has no `{name}`"), "")),
+        };
+        let Some(formula) = number.parse().ok().and_then(Formula::new) else {
+            return Err(self.at(line, format!("has a formula `{}`", number.escape_debug()), "formulas are 1 to 9"));
+        };
+        let coefficients = list(&block.coefficients, "coefficients")?;
+        if !formula.takes(coefficients.len()) {
+            let message = format!("formula {number} cannot have {} coefficients", coefficients.len());
+            return Err(self.at(block.coefficients.as_ref().and_then(line_of).or(line), message, ""));
+        }
+        let range = list(&block.wavelength_range, "wavelength_range")?;
+        let at = block.wavelength_range.as_ref().and_then(line_of).or(line);
+        let &[from, to] = &range[..] else {
+            return Err(self.at(at, format!("a range has two numbers, not {}", range.len()), ""));
+        };
+        if !(0.0 < from && from < to && (to * 1e3).is_finite()) {
+            return Err(self.at(at, format!("{from} to {to} um is no range of wavelengths"), ""));
+        }
+
+        let n = |um: f64| formula.eval(&coefficients, um);
+        let mut nodes = vec![(from, n(from))];
+        subdivide(&n, (from, n(from)), (to, n(to)), MAX_HALVINGS, &mut nodes);
+        if let Some((um, _)) = nodes.iter().find(|(_, n)| !n.is_finite()) {
+            return Err(self.at(line, format!("the formula has no real value at {um} um"), "narrow its range"));
+        }
+        let (nm, value): (Vec<f64>, Vec<f64>) = nodes.into_iter().map(|(um, n)| (um * 1e3, n)).unzip();
+        Ok(SpectrumTable { line: vec![line.unwrap_or(1); nm.len()], nm, value })
+    }
+
+    fn numbers(&self, text: &str, line: Option<usize>) -> Result<Vec<f64>, Box<Problem>> {
+        let number = |word: &str| {
+            let number = word.parse::<f64>().ok().filter(|x| x.is_finite());
+            number.ok_or_else(|| self.at(line, format!("`{}` is not a finite number", word.escape_debug()), ""))
+        };
+        text.split_whitespace().map(number).collect()
+    }
+}
+
+/// The line a value stands on: the first of the lines of a block of text.
+fn line_of(value: &Spanned<String>) -> Option<usize> {
+    Some(value.referenced.line() as usize).filter(|line| *line > 0)
+}
+
+/// Adds nodes after `a` up to `b` until the middle of each piece is where a line would have it.
+fn subdivide(f: &dyn Fn(f64) -> f64, a: (f64, f64), b: (f64, f64), halvings: u32, nodes: &mut Vec<(f64, f64)>) {
+    // Equal ratios: resonances are narrow at short wavelengths.
+    let x = (a.0 * b.0).sqrt();
+    let middle = (x, f(x));
+    let line = a.1 + (x - a.0) / (b.0 - a.0) * (b.1 - a.1);
+    // A straight middle alone can be a coincidence; the first levels are always there.
+    let straight = (middle.1 - line).abs() <= TABLE_ERROR * middle.1.abs() && halvings + 4 <= MAX_HALVINGS;
+    if halvings > 0 && !straight && middle.1.is_finite() {
+        subdivide(f, a, middle, halvings - 1, nodes);
+        subdivide(f, middle, b, halvings - 1, nodes);
+        return;
+    }
+    if !middle.1.is_finite() {
+        nodes.push(middle);
+    }
+    nodes.push(b);
+}
+
+/// The dispersion formulas of refractiveindex.info (its document "Dispersion formulas", C1 = c\[0\], λ in um).
+#[derive(Clone, Copy)]
+struct Formula(u8);
+
+impl Formula {
+    fn new(number: u8) -> Option<Self> {
+        (1..=9).contains(&number).then_some(Formula(number))
+    }
+
+    /// Whether there may be `count` coefficients: those not given at the end are 0, but pairs are whole.
+    fn takes(self, count: usize) -> bool {
+        match self.0 {
+            1 | 2 | 3 | 5 | 6 => count % 2 == 1,
+            4 => count == 1 || count == 5 || (count >= 9 && count % 2 == 1),
+            8 => (1..=4).contains(&count),
+            _ => (1..=6).contains(&count),
+        }
+    }
+
+    /// n at `um`; not finite where the formula has no real value.
+    fn eval(self, c: &[f64], um: f64) -> f64 {
+        let at = |i: usize| c.get(i).copied().unwrap_or(0.0);
+        let square = um * um;
+        let pairs = |first: usize| (first..c.len()).step_by(2).map(|i| (c[i], at(i + 1)));
+        let powers = |first: usize| pairs(first).map(|(c, power)| c * um.powf(power)).sum::<f64>();
+        match self.0 {
+            1 => (1.0 + at(0) + pairs(1).map(|(b, c)| b * square / (square - c * c)).sum::<f64>()).sqrt(),
+            2 => (1.0 + at(0) + pairs(1).map(|(b, c)| b * square / (square - c)).sum::<f64>()).sqrt(),
+            3 => (at(0) + powers(1)).sqrt(),
+            4 => {
+                let term = |i: usize| {
+                    if at(i) == 0.0 { 0.0 } else { at(i) * um.powf(at(i + 1)) / (square - at(i + 2).powf(at(i + 3))) }
+                };
+                (at(0) + term(1) + term(5) + powers(9)).sqrt()
+            }
+            5 => at(0) + powers(1),
+            6 => 1.0 + at(0) + pairs(1).map(|(b, c)| b / (c - square.recip())).sum::<f64>(),
+            7 => {
+                let pole = (square - 0.028).recip();
+                at(0) + at(1) * pole + at(2) * pole * pole + square * (at(3) + square * (at(4) + square * at(5)))
+            }
+            8 => {
+                let q = at(0) + at(1) * square / (square - at(2)) + at(3) * square;
+                ((1.0 + 2.0 * q) / (1.0 - q)).sqrt()
+            }
+            _ => {
+                let shifted = um - at(4);
+                (at(0) + at(1) / (square - at(2)) + at(3) * shifted / (shifted * shifted + at(5))).sqrt()
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn yaml(text: &str) -> Result<Index, Box<Problem>> {
+        parse(text.as_bytes(), Path::new("t.yml"))
+    }
+
+    fn interpolated(table: &SpectrumTable, nm: f64) -> f64 {
+        let i = table.nm.partition_point(|x| *x <= nm).clamp(1, table.nm.len() - 1);
+        let t = (nm - table.nm[i - 1]) / (table.nm[i] - table.nm[i - 1]);
+        table.value[i - 1] + t * (table.value[i] - table.value[i - 1])
+    }
+
+    #[test]
+    fn tables_and_their_lines() {
+        let text = "# about\nREFERENCES: |\n    A. Name, <i>J.</i> (2012): 5\nCOMMENTS: \"none\"\nDATA:\n  - type: tabulated nk\n    data: |\n        3.000E-01 1.596E+00 1.888\n        0.4 1.5 0\nPROPERTIES:\n  - type: formula A\n";
+        let Index { n: Some(n), k: Some(k) } = yaml(text).unwrap() else { panic!("both are given") };
+        assert_eq!((n.nm, n.value, n.line), (vec![300.0, 400.0], vec![1.596, 1.5], vec![8, 9]));
+        assert_eq!(k.value, [1.888, 0.0]);
+        let apart = "DATA:\n- type: tabulated k\n  data: |\n    0.5 2\n    0.4 1\n- type: tabulated n\n  data: |\n    0.3 1.5\n    0.5 1.6\n";
+        let Index { n: Some(n), k: Some(k) } = yaml(apart).unwrap() else { panic!("both are given") };
+        assert_eq!((n.nm, k.nm, k.value), (vec![300.0, 500.0], vec![400.0, 500.0], vec![1.0, 2.0]));
+        assert_eq!(k.line, [5, 4]);
+    }
+
+    /// Sellmeier's formula with Schott's coefficients of N-BK7 (data sheet, 2017) and its published indices; Malitson's
+    /// of fused silica (J. Opt. Soc. Am. 55, 1205, 1965), which squares the poles.
+    #[test]
+    fn sellmeier_formulas_have_their_published_values() {
+        let bk7 = "DATA:\n  - type: formula 2\n    wavelength_range: 0.3 2.5\n    coefficients: 0 1.03961212 0.00600069867 0.231792344 0.0200179144 1.01046945 103.560653\n  - type: tabulated k\n    data: |\n      0.3 2.8607E-06\n      2.5 1E-4\n";
+        let Index { n: Some(n), k: Some(k) } = yaml(bk7).unwrap() else { panic!("both are given") };
+        for (nm, index) in [
+            (404.66, 1.530239),
+            (486.13, 1.522376),
+            (546.07, 1.518722),
+            (587.56, 1.516800),
+            (1014.0, 1.507308),
+            (2000.0, 1.494502),
+        ] {
+            assert!((interpolated(&n, nm) - index).abs() < 1e-6, "{nm} nm: {}", interpolated(&n, nm));
+        }
+        assert_eq!(k.nm, [300.0, 2500.0]);
+        assert!(n.nm.len() < 5000, "{} nodes", n.nm.len());
+        let silica = "DATA:\n  - type: formula 1\n    range: 0.21 6.7\n    coefficients: 0 0.6961663 0.0684043 0.4079426 0.1162414 0.8974794 9.896161\n";
+        let n = yaml(silica).unwrap().n.unwrap();
+        // Malitson's table I.
+        for (nm, index) in [(587.5618, 1.45846), (1529.582, 1.44427)] {
+            assert!((interpolated(&n, nm) - index).abs() < 1e-5, "{nm} nm: {}", interpolated(&n, nm));
+        }
+    }
+
+    /// Each formula at 0.5 um, where λ² = ¼, with round coefficients worked out by hand.
+    #[test]
+    fn every_formula_by_hand() {
+        for (number, coefficients, expected) in [
+            (1u8, "0.25 1 0 0.75 1e-200", 3f64.sqrt()),
+            (2, "0.25 0.5 -0.25", 1.5f64.sqrt()),
+            (3, "2 1 2 0.5 -2", 4.25f64.sqrt()),
+            (4, "1 1 2 0.5 2 0 0 0 0 1 1", f64::NAN),
+            (4, "1 0.5 2 0.5 1 0.5 0 0.5 2 1 -1", f64::NAN),
+            (4, "1 0.5 2 0.1 1 0.75 1 0.5 3 1 -1", (1.0 + 0.125 / 0.15 + 0.375 / 0.125 + 2.0f64).sqrt()),
+            (5, "1.25 0.5 1", 1.5),
+            (6, "0.25 1 6", 1.75),
+            (7, "1 0.222 0 1 4 16", 1.0 + 1.0 + 0.25 + 0.25 + 0.25),
+            (8, "0.125 0.125 -0.25 0.25", 2f64.sqrt()),
+            (9, "1 0.5 -0.25 1 0.25 0.0625", (1.0 + 1.0 + 2.0f64).sqrt()),
+        ] {
+            let c: Vec<f64> = coefficients.split(' ').map(|c| c.parse().unwrap()).collect();
+            let formula = Formula::new(number).unwrap();
+            let got = formula.eval(&c, 0.5);
+            if expected.is_nan() {
+                assert!(!got.is_finite(), "{number}: {got}, where the pole is at 0.5 um");
+            } else {
+                assert!(formula.takes(c.len()), "{number}");
+                assert!((got - expected).abs() < 1e-14, "{number}: {got}, expected {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn mistakes_name_their_line() {
+        for (text, line, words) in [
+            ("", Some(1), "not what is expected"),
+            ("DATA: []\n", None, "no data"),
+            ("DATA: 3\n", Some(1), "not what is expected"),
+            ("REFERENCES: x\n", Some(1), "DATA"),
+            ("DATA:\n  - data: |\n      1 1\n", Some(2), "type"),
+            ("DATA:\n  - type: tabulated n2\n    data: |\n      1 1\n", Some(2), "`tabulated n2`"),
+            ("DATA:\n  - type: formula 10\n    wavelength_range: 1 2\n    coefficients: 1\n", Some(2), "formula `10`"),
+            ("DATA:\n  - type: formula 5\n    wavelength_range: 1 2\n", Some(2), "no `coefficients`"),
+            ("DATA:\n  - type: formula 5\n    coefficients: 1.5\n", Some(2), "no `wavelength_range`"),
+            ("DATA:\n  - type: formula 5\n    wavelength_range: 2 1\n    coefficients: 1.5\n", Some(3), "no range"),
+            (
+                "DATA:\n  - type: formula 5\n    wavelength_range: 1 2\n    coefficients: 1.5 2\n",
+                Some(4),
+                "2 coefficients",
+            ),
+            (
+                "DATA:\n  - type: formula 3\n    wavelength_range: 1 2\n    coefficients: -4\n",
+                Some(2),
+                "no real value at 1 um",
+            ),
+            ("DATA:\n  - type: tabulated nk\n    data: |\n      1 1 1\n      2 1\n", Some(5), "2 numbers where 3"),
+            ("DATA:\n  - type: tabulated n\n    data: |\n      1 1\n      2 x\n", Some(5), "`x` is not a finite"),
+            ("DATA:\n  - type: tabulated n\n    data: |\n      1 1\n", Some(2), "1 rows"),
+            (
+                "DATA:\n  - type: tabulated n\n    data: |\n      1 1\n      3 1\n      2 1\n      4 1\n",
+                Some(6),
+                "out of order",
+            ),
+            (
+                "DATA:\n  - type: tabulated n\n    data: |\n      1 1\n      2 1\n  - type: formula 5\n    wavelength_range: 1 2\n    coefficients: 1.5\n",
+                Some(6),
+                "n a second time",
+            ),
+        ] {
+            let problem = yaml(text).unwrap_err();
+            assert!(problem.to_string().contains(words), "{text:?}: {problem}");
+            assert_eq!(problem.line, line, "{text:?}: {problem}");
+            assert!(!problem.message.contains('\n'), "{problem}");
+        }
+    }
+
+    #[test]
+    fn a_single_coefficient_is_a_list_too() {
+        let n = yaml("DATA:\n  - type: formula 5\n    range: 1 2\n    coefficients: 1.5\n").unwrap().n.unwrap();
+        assert!(n.value.iter().all(|n| *n == 1.5) && n.nm.first() == Some(&1000.0) && n.nm.last() == Some(&2000.0));
+    }
+}
