@@ -16,7 +16,7 @@ use crate::{Error, Result};
 ///
 /// Works on finished cubes and on those being rendered. The error estimate of a channel is the standard error of its
 /// pixels, root mean square over the picture, relative to their root mean square radiance. It comes from the spread of
-/// the epochs (64 samples each), so it needs two of them and is rough below eight.
+/// the epochs (of integrator.epoch samples each, 64 by default), so it needs two of them and is rough below eight.
 ///
 /// With --verify every file is read and compared with its checksum; the exit code is 1 if one is damaged. Rendering the same
 /// scene into the cube with --resume puts it in order.
@@ -44,24 +44,31 @@ const ROUGH_BELOW: u32 = 8;
 
 pub fn run(args: &Args, output: &Output) -> Result<()> {
     let cube = Cube::open(&args.cube)?;
-    let found = Found {
-        progress: cube.progress()?,
-        estimate: cube.error_estimate()?,
-        in_use: cube.in_use(),
-        verified: if args.verify { Some(cube.verify()?) } else { None },
-        cube,
+    let verified = if args.verify { Some(cube.verify()?) } else { None };
+    let damaged = |damage: &[String]| {
+        let files = if damage.len() == 1 { "file is" } else { "files are" };
+        Error::Check(format!(
+            "{}: {} {files} damaged; rendering the same scene into it with --resume puts the tiles in order",
+            args.cube.display(),
+            damage.len()
+        ))
     };
+    let (progress, estimate) = match (cube.progress(), cube.error_estimate(), &verified) {
+        (Ok(progress), Ok(estimate), _) => (progress, estimate),
+        // So damaged that nothing else can be told of it.
+        (.., Some(Verification { damage, .. })) if !damage.is_empty() => {
+            damage.iter().try_for_each(|what| output.text(&format!("damage           {what}\n")))?;
+            return Err(damaged(damage));
+        }
+        (Err(error), ..) | (_, Err(error), _) => return Err(error),
+    };
+    let found = Found { progress, estimate, in_use: cube.in_use(), verified, cube };
     output.event("done", found.facts())?;
     output.text(&found.describe())?;
-    let damage = found.verified.as_ref().map_or(0, |verified| verified.damage.len());
-    if damage == 0 {
-        return Ok(());
+    match &found.verified {
+        Some(Verification { damage, .. }) if !damage.is_empty() => Err(damaged(damage)),
+        _ => Ok(()),
     }
-    let files = if damage == 1 { "file is" } else { "files are" };
-    Err(Error::Check(format!(
-        "{}: {damage} {files} damaged; rendering the same scene into it with --resume puts the tiles in order",
-        args.cube.display()
-    )))
 }
 
 /// All that is told of a cube.

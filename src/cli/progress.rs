@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use super::Output;
 use super::output::say;
 use super::render::Args;
-use crate::cube::{Cube, Progress, reduction};
+use crate::cube::{Cube, Existing, Progress, reduction};
 use crate::files::format_bytes;
 use crate::render::plan;
 use crate::render::schedule::{Event, Job, PREVIEW_PIXELS, Status, Summary};
@@ -25,6 +25,7 @@ pub struct Reporter<'a> {
     output: &'a Output,
     quiet: bool,
     epoch: u32,
+    started: Instant,
     last_line: Option<Instant>,
     merged: bool,
     /// Only on a terminal.
@@ -38,7 +39,7 @@ impl<'a> Reporter<'a> {
             let style = ProgressStyle::with_template("{bar:30} {pos}/{len} units  {msg}").expect("a valid template");
             bar.with_style(style)
         });
-        Reporter { output, quiet: args.quiet, epoch: 64, last_line: None, merged: false, bar }
+        Reporter { output, quiet: args.quiet, epoch: 64, started: Instant::now(), last_line: None, merged: false, bar }
     }
 
     /// A line on stderr that neither breaks the bar nor appears under --quiet.
@@ -115,7 +116,7 @@ impl<'a> Reporter<'a> {
                     bar.set_message(self.describe(status, status.samples_next));
                     bar.set_length(u64::from(status.units.1));
                     bar.set_position(u64::from(status.units.0));
-                } else if self.last_line.is_some_and(|last| last.elapsed() >= LINE_AT_LEAST_EVERY) {
+                } else if self.last_line.unwrap_or(self.started).elapsed() >= LINE_AT_LEAST_EVERY {
                     let (done, all) = status.units;
                     self.last_line = Some(Instant::now());
                     self.line(&format!("{done}/{all} units of {}", self.describe(status, status.samples_next)));
@@ -163,7 +164,7 @@ impl<'a> Reporter<'a> {
         let summary = match summary {
             Ok(summary) => summary,
             Err(error @ Error::Interrupted { .. }) => {
-                say(&self.interrupted(job)?);
+                say(&self.interrupted(job));
                 return Err(error);
             }
             Err(error) => {
@@ -201,17 +202,19 @@ impl<'a> Reporter<'a> {
     }
 
     /// What an interrupted render leaves behind.
-    fn interrupted(&self, job: &Job) -> Result<String> {
-        if !self.merged {
-            return Ok("interrupted before anything was rendered".into());
-        }
+    fn interrupted(&self, job: &Job) -> String {
+        let goes_on = matches!(job.existing, Existing::Resume | Existing::Join);
+        let found = Cube::open(&job.output).and_then(|cube| cube.progress()).ok();
+        let Some(progress) = found.filter(|found| self.merged || (goes_on && found.tiles_started > 0)) else {
+            return "interrupted before anything was rendered".into();
+        };
         let output = job.output.display();
-        let Progress { tiles, tiles_started, samples: [least, most], .. } = Cube::open(&job.output)?.progress()?;
+        let Progress { tiles, tiles_started, samples: [least, most], .. } = progress;
         let samples = if least == most { most.to_string() } else { format!("{least} to {most}") };
-        Ok(format!(
+        format!(
             "interrupted: {output} keeps every unit merged so far, {samples} samples/pixel in {tiles_started} of {tiles} tiles \
              (--resume goes on from there, `spectile info {output}` says more)"
-        ))
+        )
     }
 }
 

@@ -15,7 +15,8 @@ use crate::render::schedule::{self, Job, Preview, StopRule};
 ///
 /// Renders SCENE into a new cube, a Zarr v3 store that other programs can open while it grows. Every tile first gets 1
 /// sample per pixel, then 1, 2, 4, … 32 more, then 64 at a time: there is a picture at once, and after every epoch the
-/// cube is complete.
+/// cube is complete. (Under --tiles, and where the cube is larger than half of the memory and only --spp ends the render, a
+/// tile gets its first 64 samples in one go: the same bytes.)
 ///
 /// Rendering stops at the first limit reached, --spp or --time, always at the end of an epoch of the whole picture;
 /// without a limit, after 64 samples per pixel. Noise falls with the square root of the samples: four times the samples

@@ -10,7 +10,7 @@ use serde_json::Value;
 use super::checksums;
 use super::lock::TileLock;
 use super::metadata::Header;
-use super::store::{Cube, PRIVATE, read_group};
+use super::store::{Cube, PRIVATE, Part, read_group};
 use super::writer::BATCH_BYTES;
 use crate::{Error, Result, files};
 
@@ -119,14 +119,16 @@ fn find_way(path: &Path, header: &Header, existing: Existing, tiles: &Range<u32>
             // A link to a cube on another disk stays a link.
             let target = fs::canonicalize(path).unwrap_or(path.to_owned());
             check_removable(&target)?;
-            check_space(&target, header, count, folder_bytes(&target))?;
+            check_space(path, files::parent(&target), header, count, folder_bytes(&target))?;
             Ok(Way::Replace(target))
         }
         Existing::Join | Existing::Resume if there => {
             let cube = open_same(path, header)?;
-            let begun =
-                tiles.clone().filter(|&tile| cube.part_path(super::store::Part::Radiance, tile).exists()).count();
-            check_space(cube.path(), header, count - begun as u64, 0)?;
+            let missing = tiles.clone().filter(|&tile| !cube.part_path(Part::Radiance, tile).exists()).count();
+            if missing > 0 {
+                // What a killed process left aside goes first.
+                check_space(path, cube.path(), header, missing as u64, folder_bytes(&cube.aside_folder()))?;
+            }
             Ok(Way::GoOn(cube))
         }
         Existing::Resume => {
@@ -139,14 +141,14 @@ fn find_way(path: &Path, header: &Header, existing: Existing, tiles: &Range<u32>
                 let what = format!("cannot be created: there is no folder {}", folder.display());
                 return Err(Error::storage(path, what));
             }
-            check_space(path, header, count, 0)?;
+            check_space(path, folder, header, count, 0)?;
             Ok(Way::Create(path.to_owned()))
         }
     }
 }
 
 /// The cube at `path`, if it is what rendering into `header` would have made; else the difference is named.
-fn open_same(path: &Path, header: &Header) -> Result<Cube> {
+pub(super) fn open_same(path: &Path, header: &Header) -> Result<Cube> {
     let cube = Cube::open(path)?;
     let made_by = read_group(path)?["attributes"]["spectile_version"].as_str().unwrap_or("another version").to_owned();
     let version = env!("CARGO_PKG_VERSION");
@@ -246,11 +248,11 @@ fn check_removable(path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Refuses what would not fit: a cube with `tiles` more tiles than there are, `freed` bytes of the one it replaces
+/// Refuses what would not fit into `folder`: a cube with `tiles` more tiles than there are, `freed` bytes of the one it replaces
 /// counted in, and a batch of files aside beside those that they replace.
-fn check_space(path: &Path, header: &Header, tiles: u64, freed: u64) -> Result<()> {
+fn check_space(path: &Path, folder: &Path, header: &Header, tiles: u64, freed: u64) -> Result<()> {
     let needed = header.bytes_with_tiles(tiles).saturating_add(header.store_bytes().min(2 * BATCH_BYTES));
-    match files::free_bytes(files::parent(path)) {
+    match files::free_bytes(folder) {
         Some(free) if free.saturating_add(freed) < needed => Err(Error::Usage(format!(
             "{}: the cube needs {}, and {} are free there; use fewer channels or pixels, or another disk",
             path.display(),

@@ -207,6 +207,15 @@ impl Journal {
         cut().map_err(|error| self.failed(error))
     }
 
+    /// Waits until what the journal says is on disk.
+    pub fn sync(&self) -> Result<()> {
+        let sync = || {
+            File::open(&self.path)?.sync_all()?;
+            files::sync_folder(files::parent(&self.path))
+        };
+        sync().map_err(|error| self.failed(error))
+    }
+
     fn replace(&self, bytes: &[u8]) -> Result<()> {
         let aside = files::sibling(&self.path, "part");
         let replace = || -> io::Result<()> {

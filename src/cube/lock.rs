@@ -12,7 +12,7 @@ pub(super) const LOCK: &str = "lock";
 
 /// Tiles of a cube that nobody else may change while this lives. A process that ends, however it does, holds none.
 pub(super) struct TileLock {
-    _file: File,
+    file: File,
 }
 
 impl TileLock {
@@ -23,7 +23,7 @@ impl TileLock {
         let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&lock);
         let file = file.map_err(|error| Error::storage(&lock, format!("cannot be opened: {error}")))?;
         match try_lock(&file, &tiles) {
-            Ok(None) => Ok(TileLock { _file: file }),
+            Ok(None) => Ok(TileLock { file }),
             Ok(Some(held)) => Err(in_use(path, &held)),
             Err(error) => {
                 let what = format!(
@@ -32,6 +32,23 @@ impl TileLock {
                 );
                 Err(Error::storage(&lock, what))
             }
+        }
+    }
+
+    /// Whether the file locked is still the one of that name: the cube may have been replaced meanwhile.
+    pub fn is_current(&self, private: &Path) -> bool {
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::MetadataExt;
+            let identity = |metadata: std::fs::Metadata| (metadata.dev(), metadata.ino());
+            let ours = self.file.metadata().map(identity).ok();
+            ours.is_some() && ours == std::fs::metadata(private.join(LOCK)).map(identity).ok()
+        }
+        #[cfg(not(unix))]
+        {
+            // An open file cannot be replaced.
+            let _ = &self.file;
+            private.join(LOCK).exists()
         }
     }
 

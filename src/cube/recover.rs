@@ -119,10 +119,14 @@ fn put_in_place(cube: &Cube, record: &Record) -> Result<bool> {
         let checksum = record.checksums[part as usize];
         let target = cube.part_path(part, record.tile);
         let aside = cube.aside_path(part, record.tile, record.suffix);
-        if checksum_of(&target)? == Some(checksum) {
+        if checksum_of(&target) == Some(checksum) {
             continue;
         }
-        if checksum_of(&aside)? == Some(checksum) {
+        if checksum_of(&aside) == Some(checksum) {
+            if folders.is_empty() {
+                // Its writer may have been killed before it had synced the record.
+                Journal::of(cube, record.tile).sync()?;
+            }
             take_place(&aside, &target, &mut folders)?;
         } else if part == Part::Radiance {
             return Ok(false);
@@ -137,16 +141,12 @@ fn put_in_place(cube: &Cube, record: &Record) -> Result<bool> {
     Ok(true)
 }
 
-/// The checksum of a file; `None` where there is none.
-pub(super) fn checksum_of(path: &Path) -> Result<Option<u128>> {
-    let file = match File::open(path) {
-        Ok(file) => file,
-        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
-        Err(error) => return Err(Error::storage(path, error)),
-    };
+/// The checksum of a file; `None` where there is none, or none that can be read: what a bad sector holds is lost.
+pub(super) fn checksum_of(path: &Path) -> Option<u128> {
+    let file = File::open(path).ok()?;
     let mut sum = checksums::Summing::new(std::io::sink());
-    std::io::copy(&mut &file, &mut sum).map_err(|error| Error::storage(path, error))?;
-    Ok(Some(sum.checksum()))
+    std::io::copy(&mut &file, &mut sum).ok()?;
+    Some(sum.checksum())
 }
 
 /// Makes derived files of a tile from its radiance.

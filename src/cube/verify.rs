@@ -4,7 +4,8 @@ use std::thread;
 use std::time::Duration;
 
 use super::checksums;
-use super::journal::Journal;
+use super::journal::{Journal, Record};
+use super::lock::TileLock;
 use super::recover::checksum_of;
 use super::store::{Cube, Part};
 use crate::{Error, Result};
@@ -18,8 +19,8 @@ pub struct Verification {
     pub damage: Vec<String>,
 }
 
-/// A tile that is being committed is looked at again; a commit takes no longer than this many of these pauses.
-const ATTEMPTS: u32 = 100;
+/// A tile that somebody works on is looked at again, so often at most.
+const ATTEMPTS: u32 = 20;
 const PAUSE: Duration = Duration::from_millis(100);
 
 impl Cube {
@@ -39,30 +40,18 @@ impl Cube {
 
     fn verify_tile(&self, tile: u32, found: &mut Verification) -> Result<()> {
         let journal = Journal::of(self, tile);
+        let is_in_use = || TileLock::held(&self.private(), tile..tile + 1).is_some();
         for attempt in 1.. {
+            // Whoever works on the tile may have been between two renames, then or now.
+            let was_in_use = is_in_use();
             let (records, sound) = journal.records()?;
             let damaged_records = !sound || records.contains(&None);
             let last = records.into_iter().flatten().next_back();
-            let mut wrong = Vec::new();
-            for part in Part::ALL {
-                let path = self.part_path(part, tile);
-                let expected = last.as_ref().map(|record| record.checksums[part as usize]);
-                let there = checksum_of(&path)?;
-                if there != expected {
-                    let name = path.strip_prefix(self.path()).unwrap_or(&path).display().to_string();
-                    wrong.push(match (expected, there) {
-                        (None, _) => format!("{name} is there, but no journal speaks of it"),
-                        (_, None) => format!("{name} is missing"),
-                        _ => format!("{name} is not what was written"),
-                    });
-                }
-            }
+            let mut wrong: Vec<String> = Part::ALL.iter().filter_map(|&part| self.wrong(part, tile, &last)).collect();
             if damaged_records {
                 wrong.push(format!("the journal of tile {tile} has a damaged record"));
             }
-            // Whoever works on the tile may have been between journal and renames.
-            let in_use = self.in_use().is_some();
-            if wrong.is_empty() || !in_use || attempt == ATTEMPTS {
+            if wrong.is_empty() || !(was_in_use || is_in_use()) || attempt == ATTEMPTS {
                 found.files += u64::from(last.is_some()) * (Part::ALL.len() as u64 + 1);
                 found.damage.extend(wrong);
                 return Ok(());
@@ -70,5 +59,22 @@ impl Cube {
             thread::sleep(PAUSE);
         }
         unreachable!("the last attempt returns")
+    }
+
+    /// What is wrong with a file of a tile, if `last` is its journal's last record.
+    fn wrong(&self, part: Part, tile: u32, last: &Option<Record>) -> Option<String> {
+        let path = self.part_path(part, tile);
+        let name = || path.strip_prefix(self.path()).unwrap_or(&path).display().to_string();
+        let Some(record) = last else {
+            return path.exists().then(|| format!("{} is there, but no journal speaks of it", name()));
+        };
+        let expected = Some(record.checksums[part as usize]);
+        // A commit that has not come, or never came, to its renames: whoever works on the tile next does them.
+        let is_sound = checksum_of(&path) == expected
+            || checksum_of(&self.aside_path(part, tile, record.suffix)) == expected
+            // It may have taken its place between these two looks.
+            || checksum_of(&path) == expected;
+        let what = if path.exists() { "is not what was written" } else { "is missing" };
+        (!is_sound).then(|| format!("{} {what}", name()))
     }
 }

@@ -9,7 +9,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::checksums::{self, Summing};
-use super::create::{Existing, open_or_create};
+use super::create::{Existing, open_or_create, open_same};
 use super::epochs::epochs_in;
 use super::estimate::Totals;
 use super::faults::step;
@@ -78,6 +78,12 @@ impl Writer {
     ) -> Result<Writer> {
         let cube = open_or_create(path, header, existing, &tiles)?;
         let lock = TileLock::take(cube.path(), &cube.private(), tiles.clone())?;
+        // Between the look at the cube and the lock another process may have replaced it.
+        if !lock.is_current(&cube.private()) {
+            let what = "was replaced by another process at this moment; look at it and try again";
+            return Err(Error::storage(cube.path(), what));
+        }
+        let cube = open_same(cube.path(), header)?;
         let mut totals = Totals::new(cube.channels().len(), cube.header().epoch);
         let mut found = Vec::with_capacity(tiles.len());
         for record in recover::recover(&cube, tiles.clone(), warn)? {

@@ -191,7 +191,11 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
     });
     // At the end nobody has a unit any more; after an error those under way are dropped.
     pool.queue.close();
-    reports.for_each(|(_, report)| render.note_profile(report));
+    if pool.cube.get().is_none() && matches!(result, Err(Error::Interrupted { .. })) {
+        // Nothing is under way but set-up, which nobody waits for.
+        return Err(result.err().unwrap_or_else(no_cube));
+    }
+    reports.for_each(|(_, report)| render.note_last(report));
     // What ended the epochs is the error to report, whatever else fails for the same reason.
     let Some(cube) = pool.cube.get() else { return Err(result.err().unwrap_or_else(no_cube)) };
     cube.close();
@@ -317,7 +321,14 @@ impl<'a> Render<'a> {
     fn wait_for_devices(&mut self, reports: &mut Reports, observe: &mut dyn FnMut(Event) -> Result<()>) -> Result<()> {
         let (mut ready, mut refused) = (0, BTreeMap::new());
         while ready < self.active {
-            let (device, report) = reports.next().ok_or_else(no_cube)?;
+            let (device, report) = match reports.poll() {
+                Polled::Said(device, report) => (device, report),
+                Polled::Silence => {
+                    check_interrupt(self.interrupt)?;
+                    continue;
+                }
+                Polled::End => return Err(no_cube()),
+            };
             match report {
                 Report::Ready { bytes } => {
                     if ready == 0 {
@@ -403,7 +414,7 @@ impl<'a> Render<'a> {
             if self.samples_limit.is_some_and(|limit| self.status.samples >= limit) || self.too_late(n) {
                 return Ok(());
             }
-            let began = Instant::now();
+            let (began, there) = (Instant::now(), self.merged.front().copied().unwrap_or(0));
             queue.allow(self.decided(epoch));
             self.status.samples_next =
                 self.status.samples.checked_add(n).ok_or_else(|| {
@@ -418,7 +429,9 @@ impl<'a> Render<'a> {
             }
             self.merged.pop_front();
             self.status.samples += n;
-            self.last_epoch = Some((n, began.elapsed().as_secs_f64()));
+            // Of an epoch that was partly there before, as if all of it had been rendered now.
+            let whole = f64::from(self.status.units.1) / f64::from((self.status.units.1 - there).max(1));
+            self.last_epoch = Some((n, began.elapsed().as_secs_f64() * whole));
             self.update_estimate(cube);
             observe(Event::Epoch(&self.status))?;
         }
@@ -439,8 +452,10 @@ impl<'a> Render<'a> {
     /// Whether an epoch of `n` samples would not fit into the time that is left, at the pace of the last one: the first ones
     /// of a render also wait for shaders to be compiled.
     fn too_late(&self, n: u32) -> bool {
-        let (Some(limit), Some((samples, seconds))) = (self.job.stop.time, self.last_epoch) else { return false };
-        self.started.elapsed().as_secs_f64() + seconds / f64::from(samples) * f64::from(n) > limit.as_secs_f64()
+        let Some(limit) = self.job.stop.time else { return false };
+        let predicted = self.last_epoch.map_or(0.0, |(samples, seconds)| seconds / f64::from(samples) * f64::from(n));
+        // A render always begins; one that is gone on with need not.
+        self.status.samples > 0 && self.started.elapsed().as_secs_f64() + predicted > limit.as_secs_f64()
     }
 
     /// A device has left. The others go on without it, if it was lost and there are others.
@@ -494,12 +509,20 @@ impl<'a> Render<'a> {
         observe(Event::Progress(&self.status))
     }
 
-    /// What a device measured, when it has ended.
-    fn note_profile(&mut self, report: Report) {
-        if let Report::Left { result: Ok(Some(of_device)) } = report {
-            let sum = self.profile.get_or_insert_default();
-            sum.generate_s += of_device.generate_s;
-            sum.evaluate_s += of_device.evaluate_s;
+    /// What a device says after the end: what it measured, and units that it merged meanwhile.
+    fn note_last(&mut self, report: Report) {
+        match report {
+            Report::Left { result: Ok(Some(of_device)) } => {
+                let sum = self.profile.get_or_insert_default();
+                sum.generate_s += of_device.generate_s;
+                sum.evaluate_s += of_device.evaluate_s;
+            }
+            Report::Merged(merged) => {
+                self.tally += merged.tally;
+                self.first_bad = self.first_bad.or(merged.bad);
+                self.status.paths += merged.paths;
+            }
+            _ => {}
         }
     }
 
