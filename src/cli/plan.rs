@@ -56,10 +56,7 @@ pub struct Args {
 pub fn run(args: &Args, output: &Output) -> Result<()> {
     let scene = args.scene.load()?;
     plan::check(&scene)?;
-    for warning in &scene.warnings {
-        say(&format!("warning: {warning}"));
-        output.event("warning", json!({ "message": warning }))?;
-    }
+    scene.warnings.iter().try_for_each(|warning| warn(output, warning))?;
     let prepared = Arc::new(Prepared::new(&scene, 0)?);
     let stop = StopRule { samples: Some(args.spp), time: None };
     let samples = stop.samples_limit(scene.integrator.epoch)?.unwrap_or(args.spp);
@@ -82,6 +79,11 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     let plan = Plan { args, samples, prepared: &prepared, header, waves, measured };
     output.event("done", plan.facts())?;
     output.text(&plan.describe())
+}
+
+fn warn(output: &Output, what: &str) -> Result<()> {
+    say(&format!("warning: {what}"));
+    output.event("warning", json!({ "message": what }))
 }
 
 /// What a short trial on a device told.
@@ -119,9 +121,7 @@ fn measure_all(
         return Err(refused.swap_remove(0).1);
     }
     for (device, error) in refused {
-        let what = format!("device {device} is left out: {error}");
-        say(&format!("warning: {what}"));
-        output.event("warning", json!({ "message": what }))?;
+        warn(output, &format!("device {device} is left out: {error}"))?;
     }
     Ok(measured)
 }

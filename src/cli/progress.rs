@@ -51,6 +51,14 @@ impl<'a> Reporter<'a> {
         }
     }
 
+    /// A line on stderr that does not break the bar, under --quiet too.
+    fn say_always(&self, text: &str) {
+        match &self.bar {
+            Some(bar) => bar.println(text),
+            None => say(text),
+        }
+    }
+
     /// An event for programs. One that has gone away does not end the render.
     fn emit(&self, event: &str, fields: Value) -> Result<()> {
         match self.output.event(event, fields) {
@@ -61,10 +69,7 @@ impl<'a> Reporter<'a> {
 
     /// Warnings are always said, and are events of their own.
     pub fn warn(&self, text: &str) -> Result<()> {
-        match &self.bar {
-            Some(bar) => bar.println(format!("warning: {text}")),
-            None => say(&format!("warning: {text}")),
-        }
+        self.say_always(&format!("warning: {text}"));
         self.emit("warning", json!({ "message": text }))
     }
 
@@ -117,20 +122,13 @@ impl<'a> Reporter<'a> {
                     bar.set_length(u64::from(status.units.1));
                     bar.set_position(u64::from(status.units.0));
                 } else if self.last_line.unwrap_or(self.started).elapsed() >= LINE_AT_LEAST_EVERY {
-                    let (done, all) = status.units;
                     self.last_line = Some(Instant::now());
-                    self.line(&format!("{done}/{all} units of {}", self.describe(status, status.samples_next)));
+                    self.line(&self.describe_epoch(status));
                 }
                 self.emit("progress", fields(status))
             }
             Event::Asked(status) => {
-                let (done, all) = status.units;
-                let line = format!("{done}/{all} units of {}", self.describe(status, status.samples_next));
-                match &self.bar {
-                    Some(bar) => bar.println(line),
-                    // Asked for, so said under --quiet too.
-                    None => say(&line),
-                }
+                self.say_always(&self.describe_epoch(status));
                 self.emit("progress", fields(status))
             }
             Event::Epoch(status) => {
@@ -141,6 +139,12 @@ impl<'a> Reporter<'a> {
                 self.emit("epoch", fields(status))
             }
         }
+    }
+
+    /// How far the current epoch is.
+    fn describe_epoch(&self, status: &Status) -> String {
+        let (done, all) = status.units;
+        format!("{done}/{all} units of {}", self.describe(status, status.samples_next))
     }
 
     fn describe(&self, status: &Status, samples: u32) -> String {

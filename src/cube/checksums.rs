@@ -16,7 +16,7 @@ pub(super) struct List(Vec<(String, u128)>);
 
 impl List {
     pub fn add(&mut self, name: &str, bytes: &[u8]) {
-        self.0.push((name.to_owned(), xxh3_128(bytes)));
+        self.0.push((name.to_owned(), of(bytes)));
     }
 }
 
@@ -33,7 +33,7 @@ pub(super) fn wrong_files(path: &Path) -> io::Result<(Vec<String>, u64)> {
     for line in list.lines() {
         count += 1;
         let (sum, name) = line.split_once("  ").unwrap_or(("", line));
-        let found = fs::read(path.join(name)).map(|bytes| format!("{:032x}", xxh3_128(&bytes)));
+        let found = fs::read(path.join(name)).map(|bytes| format!("{:032x}", of(&bytes)));
         if !found.is_ok_and(|found| found == sum) {
             wrong.push(name.to_owned());
         }

@@ -149,8 +149,9 @@ fn find_way(path: &Path, header: &Header, existing: Existing, tiles: &Range<u32>
 
 /// The cube at `path`, if it is what rendering into `header` would have made; else the difference is named.
 pub(super) fn open_same(path: &Path, header: &Header) -> Result<Cube> {
-    let cube = Cube::open(path)?;
-    let made_by = read_group(path)?["attributes"]["spectile_version"].as_str().unwrap_or("another version").to_owned();
+    let group = read_group(path)?;
+    let cube = Cube::from_group(path, &group)?;
+    let made_by = group["attributes"]["spectile_version"].as_str().unwrap_or("another version");
     let version = env!("CARGO_PKG_VERSION");
     let difference = if made_by == version {
         cube.header().difference(header)

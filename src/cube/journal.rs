@@ -8,8 +8,7 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::PathBuf;
 
-use xxhash_rust::xxh3::xxh3_128;
-
+use super::checksums;
 use super::faults::step;
 use super::store::{Cube, Part};
 use crate::{Error, Result, files};
@@ -57,7 +56,7 @@ impl Record {
         self.checksums.iter().for_each(|sum| bytes.extend(sum.to_le_bytes()));
         bytes.resize(HEAD_BYTES, 0);
         bytes.extend(self.spread.iter().chain(&self.square).flat_map(|v| v.to_le_bytes()));
-        let checksum = xxh3_128(&bytes);
+        let checksum = checksums::of(&bytes);
         bytes.extend(checksum.to_le_bytes());
         bytes
     }
@@ -71,7 +70,7 @@ impl Record {
             && word(8) == tile
             && word(12) as usize == channels
             && sums.len() == 16 * channels
-            && xxh3_128(content).to_le_bytes() == *checksum;
+            && checksums::of(content).to_le_bytes() == *checksum;
         if !valid {
             return None;
         }

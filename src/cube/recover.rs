@@ -10,7 +10,6 @@ use std::path::{Path, PathBuf};
 use super::checksums;
 use super::faults::step;
 use super::journal::{Journal, Record};
-use super::map::Chunk;
 use super::merge::Fold;
 use super::store::{Cube, Part};
 use super::writer::{sync_folders, take_place};
@@ -152,8 +151,8 @@ pub(super) fn checksum_of(path: &Path) -> Option<u128> {
 /// Makes derived files of a tile from its radiance.
 fn rebuild(cube: &Cube, record: &Record, parts: &[Part], folders: &mut BTreeSet<PathBuf>) -> Result<()> {
     let (grid, tile) = (cube.grid(), record.tile);
-    let chunk = Chunk::open(&cube.part_path(Part::Radiance, tile), grid.rect(tile), grid.tile, cube.channels().len())?;
-    let chunk = chunk.ok_or_else(|| Error::storage(&cube.part_path(Part::Radiance, tile), "has vanished"))?;
+    let chunk =
+        cube.chunk(tile)?.ok_or_else(|| Error::storage(&cube.part_path(Part::Radiance, tile), "has vanished"))?;
     let mut fold = Fold::new(grid, grid.rect(tile), cube.channels().len(), cube.projection());
     fold.run(None, chunk.values(), 1.0, &mut std::io::sink()).map_err(|error| Error::storage(cube.path(), error))?;
     for &part in parts {

@@ -67,8 +67,12 @@ pub struct Progress {
 impl Cube {
     /// Opens a cube that another process may be rendering at this moment.
     pub fn open(path: &Path) -> Result<Cube> {
-        let group = read_group(path)?;
-        let header = Header::parse(path, &group, |count| {
+        Cube::from_group(path, &read_group(path)?)
+    }
+
+    /// The cube at `path`, whose group's metadata have been read.
+    pub(super) fn from_group(path: &Path, group: &Value) -> Result<Cube> {
+        let header = Header::parse(path, group, |count| {
             let values = read_doubles(&path.join("wavelength_bounds/c/0/0"), 2 * count)?;
             Ok(values.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect())
         })?;

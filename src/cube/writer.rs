@@ -58,6 +58,13 @@ struct State {
     closed: bool,
 }
 
+impl State {
+    /// The error of a commit that has failed.
+    fn check(&self) -> Result<()> {
+        self.failed.as_ref().map_or(Ok(()), |(path, what)| Err(Error::storage(path, what)))
+    }
+}
+
 /// A tile merged and not committed yet: its files lie aside.
 struct Pending {
     record: Record,
@@ -169,7 +176,7 @@ impl Writer {
         }
         let _held = self.merging[tile as usize % self.merging.len()].lock().unwrap_or_else(PoisonError::into_inner);
         let base = self.base(tile)?;
-        let n_found = base.as_ref().map_or(0, Base::samples);
+        let n_found = base.as_ref().map_or(0, |base| base.record().samples);
         if n_found != n_before {
             let what = format!(
                 "tile {tile} has {n_found} samples per pixel where {n_before} were expected: another process works on it"
@@ -193,9 +200,7 @@ impl Writer {
             !(room || state.open.contains_key(&tile) || state.failed.is_some() || state.closed)
         };
         let state = self.changed.wait_while(self.state(), full).unwrap_or_else(PoisonError::into_inner);
-        if let Some((path, what)) = &state.failed {
-            return Err(Error::storage(path, what));
-        }
+        state.check()?;
         if let Some(pending) = state.open.get(&tile).or_else(|| state.committing.get(&tile)) {
             return Ok(Some(Base::Pending(Arc::clone(pending))));
         }
@@ -261,9 +266,7 @@ impl Writer {
     pub fn flush(&self) -> Result<()> {
         let _committing = self.committing.lock().unwrap_or_else(PoisonError::into_inner);
         let mut state = self.state();
-        if let Some((path, what)) = &state.failed {
-            return Err(Error::storage(path, what));
-        }
+        state.check()?;
         let batch = std::mem::take(&mut state.open);
         state.committing = batch.clone();
         drop(state);
@@ -348,10 +351,6 @@ impl Base {
             Base::Pending(pending) => &pending.chunk,
         }
     }
-
-    fn samples(&self) -> u32 {
-        self.record().samples
-    }
 }
 
 /// New files of a tile, under one suffix; removed again unless kept.
@@ -431,7 +430,7 @@ fn remove_aside(cube: &Cube, tile: u32, suffix: u64) {
 }
 
 /// Renames the files aside of a tile to their places, and adds the folders that must be synced then.
-pub(super) fn take_places(cube: &Cube, tile: u32, suffix: u64, folders: &mut BTreeSet<PathBuf>) -> Result<()> {
+fn take_places(cube: &Cube, tile: u32, suffix: u64, folders: &mut BTreeSet<PathBuf>) -> Result<()> {
     for part in Part::ALL {
         let (aside, target) = (cube.aside_path(part, tile, suffix), cube.part_path(part, tile));
         take_place(&aside, &target, folders)?;

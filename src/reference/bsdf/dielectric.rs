@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::ggx::Ggx;
-use super::reflection::{Boundary, Mirror};
+use super::reflection::{Boundary, Mirror, RoughMirror, reflected};
 use super::{Choice, Lobe, Vertex, cosine_density, cosine_direction, fresnel};
 use crate::scattering::{DielectricAlbedo, ReflectionProbability, index_range};
 use crate::scene::{Scene, SpectrumId};
@@ -28,7 +28,8 @@ pub fn lobes(scene: &Scene, eta: SpectrumId, dispersion: bool, roughness: Option
         Some(alpha) => {
             let albedo = Arc::new(DielectricAlbedo::new(alpha, range));
             let again = |transmits| Box::new(Again { index, albedo: Arc::clone(&albedo), transmits });
-            let once = RoughBoundary { surface, ggx: Ggx { alpha: [alpha; 2] }, albedo: Arc::clone(&albedo) };
+            let mirror = RoughMirror { boundary: surface, ggx: Ggx { alpha: [alpha; 2] } };
+            let once = RoughBoundary { mirror, albedo: Arc::clone(&albedo) };
             vec![Box::new(once), again(false), again(true)]
         }
     }
@@ -126,8 +127,8 @@ impl Lobe for Refraction {
 /// channel chosen at random, and weighted by the mean density over the live channels (the balance heuristic over
 /// channels, Wilkie et al. 2014), so that no channel has to stop.
 struct RoughBoundary {
-    surface: Surface,
-    ggx: Ggx,
+    /// Its reflection, and the facets that refract as well.
+    mirror: RoughMirror<Surface>,
     albedo: Arc<DielectricAlbedo>,
 }
 
@@ -140,7 +141,7 @@ struct Half {
 
 impl RoughBoundary {
     fn bending(&self, at: &Vertex, k: usize) -> f64 {
-        let eta = self.surface.index.bending(at, k);
+        let eta = self.mirror.boundary.index.bending(at, k);
         if (eta - 1.0).abs() < MATCHED { 1.0 + MATCHED.copysign(eta - 1.0) } else { eta }
     }
 
@@ -159,20 +160,12 @@ impl RoughBoundary {
     fn refracted_density(&self, at: &Vertex, i: DVec3, k: usize) -> f64 {
         let eta = self.bending(at, k);
         let Some(half) = Self::half(at.o, i, eta) else { return 0.0 };
-        let refracts = 1.0 - self.surface.decision.at(at.inside, half.o_h.min(1.0));
-        refracts * self.ggx.visible_density(at.o, half.h) * eta * eta * half.spread
-    }
-
-    fn evaluate_reflection(&self, at: &Vertex, i: DVec3, scale: f64, out: &mut [f64]) {
-        let h = (at.o + i).normalize();
-        let common = scale * self.ggx.distribution(h) * self.ggx.both_visible(at.o, i) / (4.0 * at.o.z);
-        for k in at.alive.clone() {
-            out[k] += common * self.surface.index.reflectance(at, at.o.dot(h), k);
-        }
+        let refracts = 1.0 - self.mirror.boundary.decision.at(at.inside, half.o_h.min(1.0));
+        refracts * self.mirror.ggx.visible_density(at.o, half.h) * eta * eta * half.spread
     }
 
     fn evaluate_refraction(&self, at: &Vertex, i: DVec3, scale: f64, out: &mut [f64]) {
-        let visible = scale * self.ggx.visible(at.o) * self.ggx.visible(i) / at.o.z;
+        let visible = scale * self.mirror.ggx.visible(at.o) * self.mirror.ggx.visible(i) / at.o.z;
         // (η, f |cosθ_i| without 1 - F, o·h): channels that bend alike share it.
         let mut shared: Option<(f64, f64, f64)> = None;
         for k in at.alive.clone() {
@@ -181,27 +174,28 @@ impl RoughBoundary {
                 Some(same) if same.0 == eta => same,
                 _ => match Self::half(at.o, i, eta) {
                     // η² of flux and 1/η² of radiance cancel.
-                    Some(half) => (eta, visible * self.ggx.distribution(half.h) * half.o_h * half.spread, half.o_h),
+                    Some(half) => {
+                        (eta, visible * self.mirror.ggx.distribution(half.h) * half.o_h * half.spread, half.o_h)
+                    }
                     None => (eta, 0.0, 1.0),
                 },
             };
             shared = Some((eta, geometric, o_h));
-            out[k] += geometric * (1.0 - self.surface.index.reflectance(at, o_h, k));
+            out[k] += geometric * (1.0 - self.mirror.boundary.index.reflectance(at, o_h, k));
         }
     }
 }
 
 impl Lobe for RoughBoundary {
     fn albedo(&self, at: &Vertex, k: usize) -> f64 {
-        1.0 - self.albedo.loss(at.spectra.value(self.surface.index.eta, k), at.inside, at.o.z)
+        1.0 - self.albedo.loss(at.spectra.value(self.mirror.boundary.index.eta, k), at.inside, at.o.z)
     }
 
     fn sample(&self, at: &Vertex, u: [f64; 3]) -> Option<Choice> {
-        let h = self.ggx.visible_normal(at.o, [u[1], u[2]]);
-        let reflects = self.surface.decision.at(at.inside, at.o.dot(h).min(1.0));
+        let h = self.mirror.ggx.visible_normal(at.o, [u[1], u[2]]);
+        let reflects = self.mirror.boundary.decision.at(at.inside, at.o.dot(h).min(1.0));
         if u[0] < reflects {
-            let i = 2.0 * at.o.dot(h) * h - at.o;
-            return (i.z > 0.0).then_some(Choice::Spread(i));
+            return reflected(at.o, h).map(Choice::Spread);
         }
         let k = one_of(at, (u[0] - reflects) / (1.0 - reflects));
         let i = refracted(at.o, h, self.bending(at, k))?;
@@ -210,7 +204,7 @@ impl Lobe for RoughBoundary {
 
     fn evaluate(&self, at: &Vertex, i: DVec3, scale: f64, out: &mut [f64]) {
         if i.z > 0.0 {
-            self.evaluate_reflection(at, i, scale, out);
+            self.mirror.evaluate(at, i, scale, out);
         } else if i.z < 0.0 {
             self.evaluate_refraction(at, i, scale, out);
         }
@@ -219,10 +213,10 @@ impl Lobe for RoughBoundary {
     fn density(&self, at: &Vertex, i: DVec3) -> f64 {
         if i.z >= 0.0 {
             let h = (at.o + i).normalize();
-            let reflects = self.surface.decision.at(at.inside, at.o.dot(h).min(1.0));
-            return reflects * self.ggx.visible_density(at.o, h) / (4.0 * at.o.dot(h));
+            let reflects = self.mirror.boundary.decision.at(at.inside, at.o.dot(h).min(1.0));
+            return reflects * self.mirror.density(at, i);
         }
-        if !self.surface.index.disperses(at) {
+        if !self.mirror.boundary.index.disperses(at) {
             return self.refracted_density(at, i, at.alive.start);
         }
         let sum: f64 = at.alive.clone().map(|k| self.refracted_density(at, i, k)).sum();

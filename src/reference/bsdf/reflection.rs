@@ -57,8 +57,7 @@ impl<B: Boundary> Lobe for RoughMirror<B> {
 
     fn sample(&self, at: &Vertex, u: [f64; 3]) -> Option<Choice> {
         let h = self.ggx.visible_normal(at.o, [u[1], u[2]]);
-        let i = 2.0 * at.o.dot(h) * h - at.o;
-        (i.z > 0.0).then_some(Choice::Spread(i))
+        reflected(at.o, h).map(Choice::Spread)
     }
 
     fn evaluate(&self, at: &Vertex, i: DVec3, scale: f64, out: &mut [f64]) {
@@ -79,6 +78,12 @@ impl<B: Boundary> Lobe for RoughMirror<B> {
         let h = (at.o + i).normalize();
         self.ggx.visible_density(at.o, h) / (4.0 * at.o.dot(h))
     }
+}
+
+/// `o` mirrored by a facet of normal `h`; `None` where that leads below the surface.
+pub fn reflected(o: DVec3, h: DVec3) -> Option<DVec3> {
+    let i = 2.0 * o.dot(h) * h - o;
+    (i.z > 0.0).then_some(i)
 }
 
 /// A metal: a mirror, or microfacets and, with `compensation`, what they scatter more than once.
