@@ -5,15 +5,18 @@
 //! memory apart from scene and device buffers, and where the time goes. Without `--bench`, as `cargo test` runs it, one
 //! short round shows that it still works.
 
+mod clock;
+
 use std::path::Path;
 use std::sync::Arc;
 
-use nix::time::{ClockId, clock_gettime};
+use clock::cpu_seconds;
 use spectile::Result;
 use spectile::cube::{Cube, Existing};
 use spectile::gpu::adapter::{Gpu, Selection};
+use spectile::render::job::{Job, StopRule};
 use spectile::render::prepare::Prepared;
-use spectile::render::schedule::{self, Event, Job, StopRule};
+use spectile::render::schedule::{self, Event};
 use spectile::render::wave::Budget;
 use spectile::render::worker::Worker;
 use spectile::scene::{self, Scene};
@@ -40,12 +43,6 @@ fn cornell(channels: usize) -> Scene {
     let set = |key: &str, value: usize| (key.to_owned(), value.to_string());
     let overrides = [set("film.width", 64), set("film.height", 64), set("channels.equal.count", channels)];
     scene::load(&file, &overrides).expect("the Cornell box")
-}
-
-/// CPU time of all threads of this process, seconds.
-fn cpu_seconds() -> f64 {
-    let t = clock_gettime(ClockId::CLOCK_PROCESS_CPUTIME_ID).expect("a clock");
-    t.tv_sec() as f64 + t.tv_nsec() as f64 * 1e-9
 }
 
 /// Anonymous memory of this process, bytes (Linux).

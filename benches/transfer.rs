@@ -3,11 +3,13 @@
 //! that nobody looks at. Process CPU time, all threads; rounds take turns; medians with the range of the middle half.
 //! Without `--bench`, as `cargo test` runs it, one short round shows that it still works.
 
+mod clock;
+
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use nix::time::{ClockId, clock_gettime};
+use clock::cpu_seconds;
 use spectile::Result;
 use spectile::cube::{Existing, Header, Writer};
 use spectile::gpu::adapter::Gpu;
@@ -103,13 +105,9 @@ fn into_cube(worker: &mut Worker, header: &Header, unit: UnitRect, samples: u32,
 
 /// CPU seconds and wall seconds of some work.
 fn timed(work: impl FnOnce() -> Result<()>) -> Result<[f64; 2]> {
-    let cpu = || {
-        let t = clock_gettime(ClockId::CLOCK_PROCESS_CPUTIME_ID).expect("a clock");
-        t.tv_sec() as f64 + t.tv_nsec() as f64 * 1e-9
-    };
-    let (began, cpu_began) = (Instant::now(), cpu());
+    let (began, cpu_began) = (Instant::now(), cpu_seconds());
     work()?;
-    Ok([cpu() - cpu_began, began.elapsed().as_secs_f64()])
+    Ok([cpu_seconds() - cpu_began, began.elapsed().as_secs_f64()])
 }
 
 fn quartiles(values: &mut [f64]) -> [f64; 3] {

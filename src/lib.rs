@@ -16,7 +16,10 @@ pub mod scattering;
 pub mod scene;
 pub mod spectral;
 
-// The unit tests that need a scene build it as the integration tests do.
+// The unit tests that need a scene build it as the integration tests do, and compare cubes as they do.
+#[cfg(test)]
+#[path = "../tests/cube_files/mod.rs"]
+mod cube_files;
 #[cfg(test)]
 extern crate self as spectile;
 #[cfg(test)]

@@ -11,8 +11,9 @@ use super::output::say;
 use super::render::Args;
 use crate::cube::{Cube, Existing, Progress, reduction};
 use crate::files::format_bytes;
+use crate::render::job::Job;
 use crate::render::plan;
-use crate::render::schedule::{Event, Job, PREVIEW_PIXELS, Status, Summary};
+use crate::render::schedule::{Event, PREVIEW_PIXELS, Status, Summary};
 use crate::{Error, Result};
 
 /// Epochs below which an error estimate is only rough (DESIGN section 8).

@@ -9,7 +9,8 @@ use super::scene::SceneArgs;
 use crate::Result;
 use crate::cube::Existing;
 use crate::gpu::adapter::Selection;
-use crate::render::schedule::{self, Job, Preview, StopRule};
+use crate::render::job::{Job, Preview, StopRule};
+use crate::render::schedule;
 
 /// Render a scene into a cube
 ///

@@ -4,7 +4,6 @@
 //! Writers are processes of their own: this test binary, started again for the one test [`writer`], which merges known
 //! units and dies where it is told to.
 
-use std::collections::BTreeMap;
 use std::fs;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
@@ -14,6 +13,7 @@ use super::faults::injected::{DIE, FULL, LOG};
 use super::journal::Journal;
 use super::store::Part;
 use super::*;
+use crate::cube_files::{Files, files};
 use crate::spectral::Channels;
 use crate::{Error, Result};
 
@@ -105,27 +105,25 @@ fn copy(from: &Path, to: &Path) {
 }
 
 /// The files of the arrays, and the leftovers aside.
-fn arrays(path: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    fn walk(root: &Path, folder: &Path, found: &mut BTreeMap<PathBuf, Vec<u8>>) {
-        for entry in fs::read_dir(folder).expect("list") {
-            let path = entry.expect("entry").path();
-            let name = path.strip_prefix(root).expect("inside").to_owned();
-            if path.is_dir() {
-                walk(root, &path, found);
-            } else if !name.starts_with(".spectile") || name.starts_with(".spectile/aside") {
-                found.insert(name, fs::read(&path).expect("read"));
-            }
-        }
+fn arrays(path: &Path) -> Files {
+    files(path, |name| !name.starts_with(".spectile") || name.starts_with(".spectile/aside"))
+}
+
+/// Numbers by chance, the same in every run.
+struct Chance(u64);
+
+impl Chance {
+    /// From 0 to `n` - 1.
+    fn below(&mut self, n: u64) -> u64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) % n
     }
-    let mut found = BTreeMap::new();
-    walk(path, path, &mut found);
-    found
 }
 
 /// A cube with [`BEFORE`] epochs, the bytes that [`AFTER`] must have, and a place for copies.
 struct Bench {
     folder: tempfile::TempDir,
-    expected: BTreeMap<PathBuf, Vec<u8>>,
+    expected: Files,
 }
 
 impl Bench {
@@ -240,11 +238,7 @@ fn power_may_be_cut_between_any_two_steps() {
     // One batch, so that the base holds what a rename replaces.
     let epochs = BEFORE + 1;
     let steps = bench.steps(epochs);
-    let mut random = 1u64;
-    let mut chance = |n: u64| {
-        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (random >> 33) % n
-    };
+    let mut chance = Chance(1);
     for n in 0..steps.len() {
         let done = &steps[..=n];
         let path = bench.cube();
@@ -255,9 +249,9 @@ fn power_may_be_cut_between_any_two_steps() {
             for entry in fs::read_dir(cube.aside_folder()).expect("list") {
                 let file = entry.expect("entry").path();
                 let length = fs::metadata(&file).expect("there").len();
-                match chance(3) {
+                match chance.below(3) {
                     0 => fs::remove_file(file).expect("removed"),
-                    1 => truncate(&file, chance(length + 1)),
+                    1 => truncate(&file, chance.below(length + 1)),
                     _ => {}
                 }
             }
@@ -268,14 +262,14 @@ fn power_may_be_cut_between_any_two_steps() {
                 (bench.base().join(".spectile/journal").join(newest.file_name().expect("a name")), &newest);
             let before = fs::metadata(before).expect("there").len();
             let length = fs::metadata(now).expect("there").len();
-            truncate(now, before + chance(length.saturating_sub(before) + 1));
+            truncate(now, before + chance.below(length.saturating_sub(before) + 1));
         } else if last("file in place").is_some() && last("folder synced").is_none() {
             for tile in 0..TILES {
                 let suffix = Journal::of(&cube, tile).last().expect("read").expect("a record").suffix;
                 for part in Part::ALL {
                     let (target, aside) = (cube.part_path(part, tile), cube.aside_path(part, tile, suffix));
                     let old = bench.base().join(target.strip_prefix(&path).expect("inside"));
-                    if !aside.exists() && chance(2) == 0 {
+                    if !aside.exists() && chance.below(2) == 0 {
                         fs::rename(&target, aside).expect("back");
                         fs::copy(old, &target).expect("as it was");
                     }
@@ -295,11 +289,7 @@ fn truncate(file: &Path, length: u64) {
 #[test]
 fn damaged_files_are_found_and_made_anew() {
     let bench = Bench::new();
-    let mut random = 7u64;
-    let mut chance = |n: u64| {
-        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (random >> 33) % n
-    };
+    let mut chance = Chance(7);
     let cube = Cube::open(&bench.base()).expect("a cube");
     let of_tile = |tile: u32| {
         let parts = Part::ALL.map(|part| cube.part_path(part, tile));
@@ -311,9 +301,9 @@ fn damaged_files_are_found_and_made_anew() {
             let path = bench.cube();
             let file = path.join(&name);
             let mut bytes = fs::read(&file).expect("read");
-            let at = chance(bytes.len() as u64) as usize;
+            let at = chance.below(bytes.len() as u64) as usize;
             match damage {
-                "flipped" => bytes[at] ^= 1 << chance(8),
+                "flipped" => bytes[at] ^= 1 << chance.below(8),
                 "cut" => bytes.truncate(at),
                 "emptied" => bytes.clear(),
                 _ => bytes.extend([7; 99]),

@@ -2,7 +2,6 @@
 //! whatever was merged stays.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -11,10 +10,12 @@ use std::time::{Duration, Instant};
 use glam::{DVec2, DVec3};
 
 use crate::cube::{Cube, Existing, epoch_samples};
+use crate::cube_files::{Files, arrays};
 use crate::gpu::adapter::{Gpu, Selection};
 use crate::gpu::buffer;
 use crate::gpu::fault::{self, Fault, Faults, Kind, Phase};
-use crate::render::schedule::{self, Event, Job, StopRule, Summary};
+use crate::render::job::{Job, StopRule};
+use crate::render::schedule::{self, Event, Summary};
 use crate::scene::{Filter, Projection, Scene, Sides};
 use crate::scene_builder::{Builder, look, quad, room};
 use crate::spectral::Channels;
@@ -46,30 +47,10 @@ fn scene() -> Scene {
     scene
 }
 
-/// Every file of a cube outside `.spectile`, by its path in it.
-type Arrays = BTreeMap<String, Vec<u8>>;
-
-fn arrays(cube: &Path) -> Arrays {
-    fn walk(root: &Path, folder: &Path, found: &mut Arrays) {
-        for entry in fs::read_dir(folder).expect("a folder") {
-            let path = entry.expect("an entry").path();
-            let name = path.strip_prefix(root).expect("inside").to_str().expect("UTF-8").to_owned();
-            match path.is_dir() {
-                true if name == ".spectile" => {}
-                true => walk(root, &path, found),
-                false => drop(found.insert(name, fs::read(&path).expect("read"))),
-            }
-        }
-    }
-    let mut found = Arrays::new();
-    walk(cube, cube, &mut found);
-    found
-}
-
 /// How a render went.
 struct Outcome {
     result: Result<Summary>,
-    arrays: Arrays,
+    arrays: Files,
     warnings: Vec<String>,
     /// Units merged, as was last reported.
     units: u64,
@@ -130,7 +111,7 @@ fn render_into(
             }
         }
     }
-    let arrays = if output.exists() { arrays(output) } else { Arrays::new() };
+    let arrays = if output.exists() { arrays(output) } else { Files::new() };
     Outcome { result, arrays, warnings, units, tiles }
 }
 

@@ -1,8 +1,7 @@
 //! The render: epochs of the whole image, decided one after the other; devices that pull their units; what is known so far.
 
 use std::collections::{BTreeMap, VecDeque};
-use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, OnceLock};
 use std::thread;
@@ -10,60 +9,22 @@ use std::time::{Duration, Instant};
 
 use serde_json::json;
 
-use crate::cube::{
-    Existing, Header, Writer, check_target, epoch_samples, epochs_in, reduction, samples_before, whole_epochs,
-};
-use crate::gpu::adapter::{Gpu, Selection};
+use crate::cube::{Writer, check_target, epoch_samples, epochs_in, reduction, samples_before};
+use crate::gpu::adapter::Gpu;
+use crate::render::job::Job;
 use crate::render::plan;
 use crate::render::pool::{Merged, Pool, Report, Tally};
 use crate::render::prepare::Prepared;
 use crate::render::queue::Queue;
 use crate::render::watch::{Polled, Reports};
 use crate::render::worker::{Interrupt, Profile, check_interrupt};
-use crate::scene::Scene;
 use crate::{Error, Result, files, format};
 
-/// Samples per pixel where no stop rule says otherwise.
-pub const DEFAULT_SAMPLES: u32 = 64;
 /// The preview file is rewritten at most this often, and takes at most this share of the time.
 const PREVIEW_INTERVAL: Duration = Duration::from_secs(1);
 const PREVIEW_SHARE: u32 = 20;
 /// Most pixels of the preview file: 4K. Larger pictures are reduced, so that memory does not grow with the cube.
 pub const PREVIEW_PIXELS: u64 = 3840 * 2160;
-
-/// When to stop; the first that is reached does, at the end of an epoch of the whole image.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct StopRule {
-    pub samples: Option<u32>,
-    pub time: Option<Duration>,
-}
-
-/// A picture of the cube that is kept up to date.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Preview {
-    pub file: PathBuf,
-    /// EV, or automatic.
-    pub exposure: Option<f64>,
-}
-
-/// Everything that decides a render.
-pub struct Job {
-    pub scene: Scene,
-    pub output: PathBuf,
-    /// What may be there already.
-    pub existing: Existing,
-    /// The tiles to render, if not all.
-    pub tiles: Option<Range<u32>>,
-    pub seed: u64,
-    /// Side of the tiles, if asked for.
-    pub tile: Option<u32>,
-    pub stop: StopRule,
-    pub preview: Option<Preview>,
-    pub profile: bool,
-    pub devices: Selection,
-    /// Bytes of each device that may be used.
-    pub memory: Option<u64>,
-}
 
 /// How far a render is.
 #[derive(Debug, Clone, PartialEq)]
@@ -118,20 +79,6 @@ pub struct Summary {
     /// EV of the last preview written.
     pub exposure: Option<f64>,
     pub tally: Tally,
-}
-
-impl StopRule {
-    /// The samples per pixel at which a render with full epochs of `full` samples stops; `None`: only time does.
-    pub fn samples_limit(&self, full: u32) -> Result<Option<u32>> {
-        let wanted = match self {
-            StopRule { samples: None, time: None } => DEFAULT_SAMPLES,
-            StopRule { samples: None, .. } => return Ok(None),
-            StopRule { samples: Some(wanted), .. } => *wanted,
-        };
-        let too_many =
-            || Error::Usage(format!("--spp {wanted}: the most that whole epochs make is {}", u32::MAX / full * full));
-        whole_epochs(wanted, full).ok_or_else(too_many).map(Some)
-    }
 }
 
 /// Renders `job` into a cube, new or gone on with. Errors leave the cube with every unit merged so far.
@@ -225,31 +172,6 @@ fn no_cube() -> Error {
     Error::Internal("the render ended without a cube".into())
 }
 
-impl Job {
-    /// The tiles to render, of the cube that `header` describes.
-    fn tiles(&self, header: &Header) -> Result<Range<u32>> {
-        header.validate().map_err(Error::Usage)?;
-        let count = header.grid().count();
-        match &self.tiles {
-            None => Ok(0..count),
-            Some(tiles) if tiles.start < tiles.end && tiles.end <= count => Ok(tiles.clone()),
-            Some(tiles) => Err(Error::Usage(format!(
-                "--tiles {}..{}: this picture has the tiles 0..{count}, and A must be less than B",
-                tiles.start, tiles.end
-            ))),
-        }
-    }
-
-    /// How many epochs of a new tile are rendered at once and merged once: all of the first full one where nobody could
-    /// look at the picture before, since it is too large or only a part of it is rendered here.
-    fn together(&self, header: &Header, samples_limit: Option<u32>) -> u32 {
-        let full = header.epoch;
-        let only_samples = self.stop.time.is_none() && samples_limit.is_some_and(|limit| limit >= full);
-        let larger_than_half = || files::memory_bytes().is_some_and(|memory| header.store_bytes() > memory / 2);
-        if only_samples && (self.tiles.is_some() || larger_than_half()) { epochs_in(full, full) } else { 1 }
-    }
-}
-
 struct Render<'a> {
     job: &'a Job,
     interrupt: &'a Interrupt,
@@ -321,14 +243,7 @@ impl<'a> Render<'a> {
     fn wait_for_devices(&mut self, reports: &mut Reports, observe: &mut dyn FnMut(Event) -> Result<()>) -> Result<()> {
         let (mut ready, mut refused) = (0, BTreeMap::new());
         while ready < self.active {
-            let (device, report) = match reports.poll() {
-                Polled::Said(device, report) => (device, report),
-                Polled::Silence => {
-                    check_interrupt(self.interrupt)?;
-                    continue;
-                }
-                Polled::End => return Err(no_cube()),
-            };
+            let Some((device, report)) = self.hear(reports)? else { continue };
             match report {
                 Report::Ready { bytes } => {
                     if ready == 0 {
@@ -355,24 +270,22 @@ impl<'a> Render<'a> {
         Ok(())
     }
 
-    /// What the next device has to tell. Signals are noticed meanwhile.
-    fn next_report(
-        &self,
-        cube: &Writer,
-        reports: &mut Reports,
-        observe: &mut dyn FnMut(Event) -> Result<()>,
-    ) -> Result<(usize, Report)> {
-        loop {
-            if self.interrupt.report.swap(false, Ordering::SeqCst) {
-                cube.flush()?;
-                observe(Event::Asked(&self.status))?;
-            }
-            match reports.poll() {
-                Polled::Said(device, report) => return Ok((device, report)),
-                Polled::Silence => check_interrupt(self.interrupt)?,
-                Polled::End => return Err(no_cube()),
-            }
+    /// What a device has to tell, if one has soon. An interrupt is noticed meanwhile.
+    fn hear(&self, reports: &mut Reports) -> Result<Option<(usize, Report)>> {
+        match reports.poll() {
+            Polled::Said(device, report) => Ok(Some((device, report))),
+            Polled::Silence => check_interrupt(self.interrupt).map(|()| None),
+            Polled::End => Err(no_cube()),
         }
+    }
+
+    /// Commits and tells how far the render is, if somebody has asked.
+    fn answer(&self, cube: &Writer, observe: &mut dyn FnMut(Event) -> Result<()>) -> Result<()> {
+        if self.interrupt.report.swap(false, Ordering::SeqCst) {
+            cube.flush()?;
+            observe(Event::Asked(&self.status))?;
+        }
+        Ok(())
     }
 
     /// Counts what the cube holds already, and fills the queue with what is missing. Returns the first epoch that is.
@@ -420,11 +333,13 @@ impl<'a> Render<'a> {
                 self.status.samples.checked_add(n).ok_or_else(|| {
                     Error::Usage(format!("more than {} samples per pixel cannot be counted", u32::MAX))
                 })?;
-            self.status.units.0 = self.merged.front().copied().unwrap_or(0);
+            self.status.units.0 = there;
             while self.status.units.0 < self.status.units.1 {
-                match self.next_report(cube, reports, observe)? {
-                    (device, Report::Merged(merged)) => self.note_merged(cube, epoch, device, merged, observe)?,
-                    (device, report) => self.left(device, report, observe)?,
+                self.answer(cube, observe)?;
+                match self.hear(reports)? {
+                    Some((device, Report::Merged(merged))) => self.note_merged(cube, epoch, device, merged, observe)?,
+                    Some((device, report)) => self.left(device, report, observe)?,
+                    None => {}
                 }
             }
             self.merged.pop_front();
@@ -492,11 +407,7 @@ impl<'a> Render<'a> {
         }
         self.merged.range_mut(epochs).for_each(|count| *count += merged.group.tiles.len() as u32);
         self.status.units.0 = self.merged[0];
-        self.tally += merged.tally;
-        self.first_bad = self.first_bad.or(merged.bad);
-        self.merge_s += merged.merge_s;
-        self.status.paths += merged.paths;
-        self.status.rays += merged.tally.rays;
+        self.count(&merged);
         self.update_clock();
         let rendering_s = self.status.rendering_s;
         let of_device = &mut self.status.devices[device];
@@ -517,13 +428,18 @@ impl<'a> Render<'a> {
                 sum.generate_s += of_device.generate_s;
                 sum.evaluate_s += of_device.evaluate_s;
             }
-            Report::Merged(merged) => {
-                self.tally += merged.tally;
-                self.first_bad = self.first_bad.or(merged.bad);
-                self.status.paths += merged.paths;
-            }
+            Report::Merged(merged) => self.count(&merged),
             _ => {}
         }
+    }
+
+    /// Adds what a group of units took.
+    fn count(&mut self, merged: &Merged) {
+        self.tally += merged.tally;
+        self.first_bad = self.first_bad.or(merged.bad);
+        self.merge_s += merged.merge_s;
+        self.status.paths += merged.paths;
+        self.status.rays = self.tally.rays;
     }
 
     fn update_clock(&mut self) {
@@ -588,17 +504,5 @@ impl<'a> Render<'a> {
              are), first seen in pixel {x} {y}, epoch {epoch}, up to sample {sample}: this is a bug in Spectile, please report it \
              with the scene"
         )))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::StopRule;
-
-    #[test]
-    fn limits_that_cannot_be_counted_are_refused() {
-        let limit = |samples| StopRule { samples: Some(samples), time: None }.samples_limit(64);
-        assert_eq!(limit(u32::MAX - 63).ok(), Some(Some(u32::MAX - 63)));
-        assert!(limit(u32::MAX).unwrap_err().to_string().contains("4294967232"));
     }
 }

@@ -1,6 +1,8 @@
 //! `render`, `plan` and `devices` as users meet them: the real binary, in fresh directories, on the device that is
 //! there.
 
+#[path = "../cube_files/mod.rs"]
+mod cube_files;
 mod json;
 mod memory;
 mod out_of_core;
@@ -11,13 +13,13 @@ mod several;
 mod sizes;
 mod wrong;
 
-use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::sync::{Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
+use cube_files::Files;
 use serde_json::Value;
 use spectile::cube::Cube;
 use tempfile::TempDir;
@@ -186,23 +188,8 @@ fn events(stdout: &str) -> Vec<Value> {
 }
 
 /// Every file of a cube outside `.spectile`, by its path in it.
-fn arrays(cube: &Cube) -> BTreeMap<String, Vec<u8>> {
-    fn walk(root: &Path, folder: &Path, found: &mut BTreeMap<String, Vec<u8>>) {
-        for entry in fs::read_dir(folder).expect("a folder") {
-            let path = entry.expect("an entry").path();
-            let name = path.strip_prefix(root).expect("inside").to_str().expect("UTF-8").to_owned();
-            if path.is_dir() {
-                if name != ".spectile" {
-                    walk(root, &path, found);
-                }
-            } else {
-                found.insert(name, fs::read(&path).expect("read"));
-            }
-        }
-    }
-    let mut found = BTreeMap::new();
-    walk(cube.path(), cube.path(), &mut found);
-    found
+fn arrays(cube: &Cube) -> Files {
+    cube_files::arrays(cube.path())
 }
 
 /// Samples per pixel, the same in all tiles.

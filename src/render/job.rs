@@ -1,0 +1,98 @@
+//! What decides a render: a scene, where its cube goes, what of it, on what, and when to stop.
+
+use std::ops::Range;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use crate::cube::{Existing, Header, epochs_in, whole_epochs};
+use crate::gpu::adapter::Selection;
+use crate::scene::Scene;
+use crate::{Error, Result, files};
+
+/// Samples per pixel where no stop rule says otherwise.
+pub const DEFAULT_SAMPLES: u32 = 64;
+
+/// When to stop; the first that is reached does, at the end of an epoch of the whole image.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct StopRule {
+    pub samples: Option<u32>,
+    pub time: Option<Duration>,
+}
+
+/// A picture of the cube that is kept up to date.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Preview {
+    pub file: PathBuf,
+    /// EV, or automatic.
+    pub exposure: Option<f64>,
+}
+
+/// Everything that decides a render.
+pub struct Job {
+    pub scene: Scene,
+    pub output: PathBuf,
+    /// What may be there already.
+    pub existing: Existing,
+    /// The tiles to render, if not all.
+    pub tiles: Option<Range<u32>>,
+    pub seed: u64,
+    /// Side of the tiles, if asked for.
+    pub tile: Option<u32>,
+    pub stop: StopRule,
+    pub preview: Option<Preview>,
+    pub profile: bool,
+    pub devices: Selection,
+    /// Bytes of each device that may be used.
+    pub memory: Option<u64>,
+}
+
+impl StopRule {
+    /// The samples per pixel at which a render with full epochs of `full` samples stops; `None`: only time does.
+    pub fn samples_limit(&self, full: u32) -> Result<Option<u32>> {
+        let wanted = match self {
+            StopRule { samples: None, time: None } => DEFAULT_SAMPLES,
+            StopRule { samples: None, .. } => return Ok(None),
+            StopRule { samples: Some(wanted), .. } => *wanted,
+        };
+        let too_many =
+            || Error::Usage(format!("--spp {wanted}: the most that whole epochs make is {}", u32::MAX / full * full));
+        whole_epochs(wanted, full).ok_or_else(too_many).map(Some)
+    }
+}
+
+impl Job {
+    /// The tiles to render, of the cube that `header` describes.
+    pub(super) fn tiles(&self, header: &Header) -> Result<Range<u32>> {
+        header.validate().map_err(Error::Usage)?;
+        let count = header.grid().count();
+        match &self.tiles {
+            None => Ok(0..count),
+            Some(tiles) if tiles.start < tiles.end && tiles.end <= count => Ok(tiles.clone()),
+            Some(tiles) => Err(Error::Usage(format!(
+                "--tiles {}..{}: this picture has the tiles 0..{count}, and A must be less than B",
+                tiles.start, tiles.end
+            ))),
+        }
+    }
+
+    /// How many epochs of a new tile are rendered at once and merged once: all of the first full one where nobody could
+    /// look at the picture before, since it is too large or only a part of it is rendered here.
+    pub(super) fn together(&self, header: &Header, samples_limit: Option<u32>) -> u32 {
+        let full = header.epoch;
+        let only_samples = self.stop.time.is_none() && samples_limit.is_some_and(|limit| limit >= full);
+        let larger_than_half = || files::memory_bytes().is_some_and(|memory| header.store_bytes() > memory / 2);
+        if only_samples && (self.tiles.is_some() || larger_than_half()) { epochs_in(full, full) } else { 1 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::StopRule;
+
+    #[test]
+    fn limits_that_cannot_be_counted_are_refused() {
+        let limit = |samples| StopRule { samples: Some(samples), time: None }.samples_limit(64);
+        assert_eq!(limit(u32::MAX - 63).ok(), Some(Some(u32::MAX - 63)));
+        assert!(limit(u32::MAX).unwrap_err().to_string().contains("4294967232"));
+    }
+}
