@@ -4,7 +4,7 @@ use crate::accel::{Accel, MAX_MATERIALS};
 use crate::gpu::layout::{EMITS_BOTH_SIDES, Emitter, Frame, Material, NONE};
 use crate::gpu::shader::{self, Defines, Module};
 use crate::render::lights::{LightPicks, STEPS, light_picks};
-use crate::scene::{Bsdf, Filter, Projection, Sampler, Scene, Sides};
+use crate::scene::{Bsdf, Environment, Filter, Light, Projection, Sampler, Scene, Sides};
 use crate::spectral::Curve;
 use crate::spectral::table::SpectralTables;
 use crate::{Error, Result};
@@ -54,6 +54,7 @@ impl Prepared {
     /// counters have bits for.
     pub fn new(scene: &Scene, seed: u64) -> Result<Prepared> {
         check_materials(scene)?;
+        check_lights(scene)?;
         let accel = Accel::build(scene);
         if scene.materials.len() > MAX_MATERIALS {
             return Err(Error::input(&scene.file, format!("more than {MAX_MATERIALS} materials")));
@@ -74,7 +75,7 @@ impl Prepared {
                 Emitter { primitive, spectrum: source(emission.radiance) | sides, pick: pick as f32, area: area as f32 }
             })
             .collect();
-        let environment_spectrum = scene.environment.as_ref().map_or(0, |e| source(e.radiance));
+        let environment_spectrum = scene.environment.as_ref().and_then(|e| e.uniform()).map_or(0, source);
         let features = features(scene, &accel, &tables, ids.factors.len() + ids.sources.len());
         Ok(Prepared {
             features,
@@ -232,6 +233,21 @@ fn check_materials(scene: &Scene) -> Result<()> {
     Ok(())
 }
 
+/// Scenes may have lights that the devices do not know yet.
+fn check_lights(scene: &Scene) -> Result<()> {
+    let kind = match (scene.lights.first(), &scene.environment) {
+        (Some(Light::Point { .. }), _) => "a point light",
+        (Some(Light::Directional { .. }), _) => "a directional light",
+        (Some(Light::Sun { .. }), _) => "a sun",
+        (None, Some(Environment::Map(_))) => "an environment map",
+        _ => return Ok(()),
+    };
+    Err(Error::input(
+        &scene.file,
+        format!("{kind} cannot be rendered yet: use emitting surfaces or a uniform environment"),
+    ))
+}
+
 /// Tables of the constant 1, of what multiplies throughput, then of what emits.
 fn spectral_tables(scene: &Scene) -> Result<(SpectralTables, SpectrumIds)> {
     let factors = scene.materials.iter().filter_map(|m| match m.bsdf {
@@ -239,7 +255,7 @@ fn spectral_tables(scene: &Scene) -> Result<(SpectralTables, SpectrumIds)> {
         _ => None,
     });
     let sources = scene.objects.iter().filter_map(|o| o.emission.as_ref().map(|e| e.radiance));
-    let sources = sources.chain(scene.environment.as_ref().map(|e| e.radiance));
+    let sources = sources.chain(scene.environment.as_ref().and_then(|e| e.uniform()));
     let mut curves = vec![&Curve::Constant(1.0)];
     let mut names = vec!["1".to_owned()];
     let mut number = |list: std::collections::BTreeSet<usize>| -> std::collections::BTreeMap<usize, usize> {

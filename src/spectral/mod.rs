@@ -5,6 +5,7 @@ pub mod colour;
 pub mod curve;
 mod data;
 pub mod planck;
+pub mod skylight;
 pub mod table;
 pub mod upsample;
 
