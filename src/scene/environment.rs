@@ -22,7 +22,7 @@ pub fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Environm
     if source.path == "environment.map" {
         let map = read_map(&source, spectra);
         let scale = match scale {
-            Some(item) => item.not_negative().and_then(|scale| Some((scale, item))).map(Some),
+            Some(item) => item.not_negative().map(|scale| Some((scale, item))),
             None => Some(None),
         };
         let (to_map, scale, (map, warnings)) = (to_map?, scale?, map?);

@@ -100,10 +100,7 @@ fn checked_size(path: &Path, width: u64, height: u64) -> Result<[u32; 2], Box<Pr
 fn spectral(path: &Path, nm: &[f64], planes: &[&[f32]]) -> Result<Content, Box<Problem>> {
     let order = ascending(path, nm)?;
     let texels = planes[0].len();
-    let mut values = Vec::with_capacity(texels * nm.len());
-    for texel in 0..texels {
-        values.extend(order.iter().map(|&band| planes[band][texel]));
-    }
+    let values = (0..texels).flat_map(|texel| order.iter().map(move |&band| planes[band][texel])).collect();
     Ok(Content::Spectral { nm: order.iter().map(|&band| nm[band]).collect(), values })
 }
 
