@@ -9,7 +9,7 @@ use std::path::Path;
 
 use spectile::gpu::shader::{Source, compose};
 use spectile::gpu::upload;
-use spectile::render::prepare::{EvaluateShape, Prepared};
+use spectile::render::prepare::Prepared;
 use spectile::render::wave::{Budget, DeviceLimits, WavePlan};
 use spectile::scene;
 
@@ -29,7 +29,7 @@ fn the_cornell_box_pays_for_nothing_else() {
         let limits = DeviceLimits { binding: 128 << 20, uniform_alignment: 256, software };
         let windows = upload::windows(&prepared, limits.binding).expect("windows");
         let waves = WavePlan::new(&prepared, [64, 64], limits, Budget::default()).expect("waves");
-        let shape = EvaluateShape::new(prepared.tables.channels_padded as u32 / 4, software);
+        let shape = prepared.evaluate_shape(software);
         let defines = prepared.defines(&windows);
         let passes = [
             compose(&prepared.camera_modules(), &defines),
