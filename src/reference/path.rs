@@ -96,7 +96,7 @@ impl<'a> Tracer<'a> {
             }
 
             let object = &self.scene.objects[self.world.primitives[hit.primitive].object];
-            let bsdf = &self.materials[object.material];
+            let bsdf = &self.materials[object.material.expect("null boundaries are refused")];
             let light = self.lights.sample(&self.world, rng);
             let emission = light.as_ref().and_then(|light| self.emitted(light));
             path.spectra.fill(bsdf.spectra());

@@ -8,6 +8,7 @@ use super::context::{Context, position};
 use super::decode::{Fields, Item, Keys};
 use super::digest::digest;
 use super::material::Materials;
+use super::medium::Media;
 use super::object::Objects;
 use super::overrides::{self, ENVIRONMENTS, LIGHT_KINDS};
 use super::spectrum::{Handle, Quantity, Spectra};
@@ -111,17 +112,19 @@ fn decode<'a>(cx: &'a Context<'a>, root: &'a [Entry]) -> Option<Scene> {
 
     let mut spectra = Spectra::new(cx, top.get("spectra"), channels.clone());
     let mut materials = Materials::new(top.get("materials"), &mut spectra);
-    let mut objects = Objects::new(&mut spectra, &mut materials);
+    let mut media = Media::new(top.get("media"), &mut spectra);
+    let mut objects = Objects::new(&mut spectra, &mut materials, &mut media);
     if let Some(items) = top.get("objects").and_then(|item| item.array()) {
         items.iter().for_each(|item| objects.add(item));
     }
     let objects = objects.finish();
+    let outer = top.get("camera").and_then(|item| camera::medium(&item));
+    let camera_medium = outer.map(|item| media.take_outer(&item, &mut spectra));
     let environment = top.get("environment").map(|item| {
         let radiance = decode_environment(&item, &mut spectra)?;
         Some(Environment { radiance: spectra.take(radiance) })
     });
     refuse_lights(top.get("lights"));
-    refuse_media(top.get("media"));
 
     Some(Scene {
         file: PathBuf::new(),
@@ -132,6 +135,11 @@ fn decode<'a>(cx: &'a Context<'a>, root: &'a [Entry]) -> Option<Scene> {
         materials: materials.finish(),
         spectra: spectra.finish(),
         objects,
+        media: media.finish(),
+        camera_medium: match camera_medium {
+            Some(medium) => Some(medium?),
+            None => None,
+        },
         environment: match environment {
             Some(environment) => Some(environment?),
             None => None,
@@ -239,12 +247,5 @@ fn refuse_lights(item: Option<Item>) {
         if let Some(kind) = kind {
             kind.not_supported_yet();
         }
-    }
-}
-
-/// `[media]` come with a later version.
-fn refuse_media(item: Option<Item>) {
-    for (_, medium) in item.and_then(|item| item.named_items()).unwrap_or_default() {
-        medium.not_supported_yet();
     }
 }
