@@ -147,12 +147,13 @@ fn check_temperatures(
                 grid.values.iter().fold([f32::INFINITY, f32::NEG_INFINITY], range).map(f64::from)
             }
         };
+        let range = |low: f64, high: f64| if low == high { format!("{low} K") } else { format!("{low}-{high} K") };
         let mut beyond = Vec::new();
         if low < first {
-            beyond.push(format!("{low}-{} K", high.min(first)));
+            beyond.push(range(low, high.min(first)));
         }
         if high > last {
-            beyond.push(format!("{}-{high} K", low.max(last)));
+            beyond.push(range(low.max(last), high));
         }
         if !beyond.is_empty() {
             fields.cx.warn(format!(
