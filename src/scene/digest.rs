@@ -66,6 +66,7 @@ pub fn digest(scene: &Scene) -> String {
             }
         }
         hash.option(object.interior, |hash, interior| {
+            hash.count(interior.body);
             hash.count(interior.medium);
             hash.numbers(&interior.to_grid.to_cols_array());
         });

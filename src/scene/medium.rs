@@ -15,9 +15,12 @@ const KEYS: Keys =
     Keys::new(&["absorption", "species", "pressure", "temperature", "density"]).later(&["scattering", "phase_g"]);
 const SPECIES: Keys = Keys::new(&["table", "fraction"]);
 
+/// Strength, and columns of a temperature and a spectrum each.
+type Terms = Vec<(f64, Vec<(f64, Handle)>)>;
+
 /// A medium as the file defines it.
 struct Declared {
-    absorbers: Vec<(f64, Vec<(f64, Handle)>)>,
+    absorbers: Terms,
     temperature: Option<Field>,
     density: Field,
     taken: Option<MediumId>,
@@ -126,11 +129,7 @@ fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>, grids: &mut Grids) -> 
 
 /// What tables over temperature say about the medium's: one is needed to choose a column, and where it lies beyond them,
 /// the last column is held, which is said.
-fn check_temperatures(
-    fields: &Fields,
-    temperature: Option<&Field>,
-    absorbers: &[(f64, Vec<(f64, Handle)>)],
-) -> Option<()> {
+fn check_temperatures(fields: &Fields, temperature: Option<&Field>, absorbers: &Terms) -> Option<()> {
     for (i, (_, columns)) in absorbers.iter().enumerate().filter(|(_, (_, columns))| columns.len() > 1) {
         let (first, last) = (columns[0].0, columns[columns.len() - 1].0);
         let [low, high] = match temperature {
@@ -166,7 +165,7 @@ fn check_temperatures(
     Some(())
 }
 
-fn species<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Vec<(f64, Vec<(f64, Handle)>)>> {
+fn species<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Terms> {
     const EXAMPLE: &str = "[{ table = \"co2.csv\", fraction = 0.05 }]";
     let items = item.array()?;
     if items.is_empty() {

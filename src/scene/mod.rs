@@ -217,6 +217,8 @@ pub struct Object {
 /// A medium in its place. Where several interiors overlap, the innermost counts: the one that a path entered last.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Interior {
+    /// Objects that are parts of one closed surface have the same number, all others numbers of their own.
+    pub body: usize,
     pub medium: MediumId,
     /// From the world to the unit cube that the medium's grids fill: the object's bounding box in its own space.
     pub to_grid: DAffine3,

@@ -41,6 +41,8 @@ pub struct Objects<'s, 'a> {
     /// `None` where the file is wrong, which has been said.
     meshes: HashMap<PathBuf, Option<Rc<Obj>>>,
     scene: Vec<Object>,
+    /// Interiors so far.
+    bodies: usize,
 }
 
 /// What all pieces of one object share. An outer `None` is a mistake that has been said; the rest of the object is
@@ -54,6 +56,7 @@ struct Common {
 /// The medium of an interior, and the box around it in the object's own space.
 #[derive(Clone, Copy)]
 struct Filling {
+    body: usize,
     medium: MediumId,
     bounds: [DVec3; 2],
 }
@@ -68,7 +71,7 @@ enum Look {
 
 impl<'s, 'a> Objects<'s, 'a> {
     pub fn new(spectra: &'s mut Spectra<'a>, materials: &'s mut Materials<'a>, media: &'s mut Media<'a>) -> Self {
-        Objects { spectra, materials, media, meshes: HashMap::new(), scene: Vec::new() }
+        Objects { spectra, materials, media, meshes: HashMap::new(), scene: Vec::new(), bodies: 0 }
     }
 
     /// Decodes one entry of `[[objects]]`.
@@ -169,7 +172,8 @@ impl<'s, 'a> Objects<'s, 'a> {
             );
             return None;
         }
-        Some(Some(Filling { medium: medium?, bounds: closed::bounds(local) }))
+        self.bodies += 1;
+        Some(Some(Filling { body: self.bodies - 1, medium: medium?, bounds: closed::bounds(local) }))
     }
 
     /// A null boundary leaves usemtl names alone that may have been meant.
@@ -302,9 +306,9 @@ impl<'s, 'a> Objects<'s, 'a> {
             Look::Of(material) => Some(material),
             Look::Invisible => None,
         };
-        let interior = interior.map(|Filling { medium, bounds: [low, high] }| {
+        let interior = interior.map(|Filling { body, medium, bounds: [low, high] }| {
             let to_unit = DAffine3::from_scale((high - low).recip()) * DAffine3::from_translation(-low);
-            Interior { medium, to_grid: to_unit * affine.inverse() }
+            Interior { body, medium, to_grid: to_unit * affine.inverse() }
         });
         let emission = emission.map(|(radiance, sides)| Emission { radiance: self.spectra.take(radiance), sides });
         self.scene.push(Object { name, shape, material, emission, interior });
