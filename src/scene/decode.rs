@@ -213,11 +213,6 @@ impl<'a> Item<'a> {
         };
         Some(entries.iter().map(|e| (e.key.as_str(), child(self.cx, &self.path, e))).collect())
     }
-
-    /// Refuses a value that the contract has and this version has not.
-    pub fn not_supported_yet(&self) {
-        self.error_help(format!("`{}` is not supported yet", self.path), "remove it, or use a later version");
-    }
 }
 
 impl<'a> Fields<'a> {
