@@ -163,7 +163,7 @@ async fn front(State(app): State<Arc<App>>, request: Request) -> Response {
     }
     let nonce: String = nonce.iter().map(|byte| format!("{byte:02x}")).collect();
     let policy = format!(
-        "default-src 'none'; script-src 'nonce-{nonce}'; style-src 'unsafe-inline'; img-src 'self' data: blob:; \
+        "default-src 'none'; script-src 'nonce-{nonce}'; style-src 'nonce-{nonce}'; img-src 'self' data: blob:; \
          connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
     );
     let headers = [
