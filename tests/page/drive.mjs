@@ -50,6 +50,13 @@ if (what === "render") {
   const rests = await paths();
   await page.waitForTimeout(1000);
   seen.rests = rests === (await paths());
+  await page.locator("#picture").focus();
+  await page.keyboard.press(" ");
+  await becomes("rendering");
+  await page.waitForFunction((rests) => window.spectile.page.state.paths > rests, rests);
+  await page.keyboard.press(" ");
+  await becomes("paused");
+  await page.waitForTimeout(1500);
   await page.locator("#save").click();
   await page.waitForTimeout(1000);
 }
@@ -118,12 +125,7 @@ if (what === "heat") {
 }
 
 if (what === "render") {
-  const paths = () => page.evaluate(() => window.spectile.page.state.paths);
-  const rested = await paths();
-  await page.locator("#picture").focus();
-  await page.keyboard.press(" ");
-  await becomes("rendering");
-  await page.waitForFunction((rested) => window.spectile.page.state.paths > rested, rested);
+  // While it rests: so the cube that is left is the one that was looked at.
   page.on("dialog", (dialog) => dialog.accept());
   await page.locator("#stop").click();
   await becomes("stopped");
