@@ -14,7 +14,7 @@ use std::net::SocketAddr;
 use std::pin::pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::thread::{self, JoinHandle};
+use std::thread;
 use std::time::{Duration, Instant};
 
 use axum::Router;
@@ -73,7 +73,6 @@ pub struct Server {
     url: String,
     ending: Arc<AtomicBool>,
     runtime: Option<Runtime>,
-    threads: Vec<JoinHandle<()>>,
     end: watch::Sender<bool>,
 }
 
@@ -127,8 +126,8 @@ impl Server {
                 thread::sleep(NEWS_EVERY);
             }
         };
-        let bridge = thread::Builder::new().name("web news".into()).spawn(bridge).map_err(failed)?;
-        Ok(Server { app, url, ending, runtime: Some(runtime), threads: vec![bridge], end })
+        thread::Builder::new().name("web news".into()).spawn(bridge).map_err(failed)?;
+        Ok(Server { app, url, ending, runtime: Some(runtime), end })
     }
 
     /// What to type into a browser; with the token where one is needed to look.
@@ -164,10 +163,6 @@ impl Drop for Server {
         let _ = self.end.send(true);
         if let Some(runtime) = self.runtime.take() {
             runtime.shutdown_background();
-        }
-        for thread in self.threads.drain(..) {
-            // It sends numbers, and does not panic.
-            let _ = thread.join();
         }
     }
 }
