@@ -414,7 +414,7 @@ fn spectral_tables(scene: &Scene, needed: &[Needed]) -> Result<(SpectralTables, 
     for spectrum in needed {
         let (name, curve) = match spectrum {
             Needed::Scene(id) => (&scene.spectra[*id].name, &scene.spectra[*id].curve),
-            Needed::Derived(name, curve) => (name, curve),
+            Needed::Derived(name, curve) | Needed::Pointwise(name, curve) => (name, curve),
         };
         curves.push(curve);
         names.push(name.clone());

@@ -46,6 +46,8 @@ const MATCHED: f64 = 1e-4;
 pub enum Needed {
     Scene(SpectrumId),
     Derived(String, Curve),
+    /// Within the tables' bound of every value, not of each channel's peak.
+    Pointwise(String, Curve),
 }
 
 /// The materials of a scene, flat. Spectra of parts are positions in `spectra` until [`Surfaces::name_spectra`].

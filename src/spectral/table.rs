@@ -50,11 +50,19 @@ pub struct Bounds {
 impl SpectralTables {
     /// Tables for `curves` over `channels`, in the order given (spectra that need knots move to the end).
     pub fn build(curves: &[&Curve], channels: &Channels) -> SpectralTables {
+        SpectralTables::with_pointwise(curves, &vec![false; curves.len()], channels)
+    }
+
+    /// As [`SpectralTables::build`], and where `pointwise` says so within [`POINTWISE_BOUND`] of the value itself, not of the
+    /// channel's peak: an absorption acts in an exponent, where the wing of a line matters beside its top.
+    pub fn with_pointwise(curves: &[&Curve], pointwise: &[bool], channels: &Channels) -> SpectralTables {
         let channels_padded = channels.len().next_multiple_of(4);
         // All spectra have as many strata as the one that needs most.
         let entries = MAX_ENTRIES.min(MAX_ENTRIES_IN_ALL / curves.len().max(1));
         let max_bits = (entries / channels_padded).max(1).ilog2().min(MAX_STRATUM_BITS);
-        let needed: Vec<Option<u32>> = curves.iter().map(|c| strata_needed(c, channels, max_bits)).collect();
+        let needed: Vec<Option<u32>> = (curves.iter().zip(pointwise))
+            .map(|(c, pointwise)| strata_needed(c, channels, max_bits, *pointwise))
+            .collect();
         let stratum_bits = needed.iter().flatten().copied().max().unwrap_or(0);
 
         // The stratified first, the knotted after them.
@@ -76,7 +84,7 @@ impl SpectralTables {
             bounds: vec![Bounds::default(); curves.len()],
         };
         for (id, &i) in stratified.iter().enumerate() {
-            tables.bounds[i] = tables.fill_strata(id, curves[i], channels);
+            tables.bounds[i] = tables.fill_strata(id, curves[i], channels, pointwise[i]);
         }
         for &i in &knotted {
             tables.bounds[i] = tables.add_knots(curves[i], channels);
@@ -84,13 +92,13 @@ impl SpectralTables {
         tables
     }
 
-    fn fill_strata(&mut self, id: usize, curve: &Curve, channels: &Channels) -> Bounds {
+    fn fill_strata(&mut self, id: usize, curve: &Curve, channels: &Channels, pointwise: bool) -> Bounds {
         let strata = 1usize << self.stratum_bits;
         let quads = self.channels_padded / 4;
         let mut bounds = Bounds::default();
         for k in 0..channels.len() {
             let lines = fit_channel(curve, channels, k, strata);
-            bounds = bounds.max(channel_bounds(curve, channels, k, &lines));
+            bounds = bounds.max(channel_bounds(curve, channels, k, &lines, pointwise));
             for (stratum, line) in lines.iter().enumerate() {
                 let at = (((stratum * self.stratified + id) * quads + k / 4) * 2) * 4 + k % 4;
                 self.strata[at] = line.value as f32;
@@ -153,12 +161,12 @@ impl Bounds {
 }
 
 /// Stratum bits that keep the pointwise bound in every channel, or `None` where `max_bits` do not.
-fn strata_needed(curve: &Curve, channels: &Channels, max_bits: u32) -> Option<u32> {
+fn strata_needed(curve: &Curve, channels: &Channels, max_bits: u32, pointwise: bool) -> Option<u32> {
     // What satisfied the channels so far is where the next channel starts.
     (0..channels.len()).try_fold(0, |least, k| {
         let keeps_bound = |bits: &u32| {
             let lines = fit_channel(curve, channels, k, 1 << bits);
-            channel_bounds(curve, channels, k, &lines).pointwise <= POINTWISE_BOUND
+            channel_bounds(curve, channels, k, &lines, pointwise).pointwise <= POINTWISE_BOUND
         };
         (least..=max_bits).find(keeps_bound)
     })
@@ -207,7 +215,7 @@ fn non_negative(mean: f64, slope: f64) -> Line {
     Line { value: mean - 0.5 * slope, slope }
 }
 
-fn channel_bounds(curve: &Curve, channels: &Channels, k: usize, lines: &[Line]) -> Bounds {
+fn channel_bounds(curve: &Curve, channels: &Channels, k: usize, lines: &[Line], relative: bool) -> Bounds {
     let [from, to] = channels.bounds[k];
     let peak = curve.max(from, to);
     if peak <= 0.0 {
@@ -223,7 +231,8 @@ fn channel_bounds(curve: &Curve, channels: &Channels, k: usize, lines: &[Line]) 
         });
         for (nm, value) in nodes {
             let place = (nm - a) / (b - a);
-            pointwise = pointwise.max((line.value + place * line.slope - value).abs() / peak);
+            let of = if relative { value.max(1e-9 * peak) } else { peak };
+            pointwise = pointwise.max((line.value + place * line.slope - value).abs() / of);
         }
     }
     let mean = lines.iter().map(|l| l.value + 0.5 * l.slope).sum::<f64>() / strata;
