@@ -10,6 +10,8 @@ mod lights;
 mod path;
 mod primitive;
 mod rng;
+mod shading;
+mod texture;
 mod world;
 
 use std::num::NonZeroUsize;
@@ -173,12 +175,14 @@ mod tests {
             spectra: spectra.into(),
             materials: vec![crate::scene::Material {
                 name: "grey".into(),
-                bsdf: crate::scene::Bsdf::Diffuse { reflectance: 0 },
+                bsdf: crate::scene::Bsdf::Diffuse { reflectance: crate::scene::Reflectance::Spectrum(0) },
                 two_sided: true,
             }],
+            textures: vec![],
             objects: vec![crate::scene::Object {
                 name: "ball".into(),
                 shape: Shape::Sphere { center: DVec3::ZERO, radius: 1.0 },
+                attributes: crate::scene::Attributes::default(),
                 material: 0,
                 emission: None,
             }],

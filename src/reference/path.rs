@@ -2,13 +2,14 @@
 
 use std::ops::Range;
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
 use super::bsdf::{Bsdf, SpectralValues, Vertex};
 use super::camera;
 use super::lights::{LightPoint, Lights, emits};
 use super::primitive::Ray;
 use super::rng::Rng;
+use super::shading::Shading;
 use super::world::{Hit, World};
 use crate::scene::{Scene, SpectrumId};
 
@@ -103,7 +104,10 @@ impl<'a> Tracer<'a> {
             path.spectra.fill(emission.as_slice());
 
             let inside = hit.point.normal.dot(ray.direction) > 0.0;
-            let frame = self.frame(&hit, inside);
+            let geometric = if inside { -hit.point.normal } else { hit.point.normal };
+            let shading = Shading::new(&object.attributes, &self.world.primitives[hit.primitive], &hit.point);
+            path.spectra.look_up(bsdf.textures(), shading.uv);
+            let frame = shading.frame(geometric, inside, -ray.direction);
             let o = frame.transpose() * -ray.direction;
             if o.z <= 0.0 {
                 // Along the surface to the last bit.
@@ -113,6 +117,7 @@ impl<'a> Tracer<'a> {
             let Some(scattering) = bsdf.at(Vertex { o, inside, spectra, alive: alive.clone() }) else { return };
             if let Some((light, emission)) = light.zip(emission)
                 && let Some((direction, per_area)) = self.aim(&hit, &light)
+                && shading.keeps_side(geometric, &frame, direction)
             {
                 let scattered = scattering.evaluate(frame.transpose() * direction, factor);
                 // The balance heuristic leaves f cosθ over the sum of both densities by solid angle.
@@ -142,15 +147,11 @@ impl<'a> Tracer<'a> {
             }
             ray_density = next.density;
             let direction = (frame * next.direction).normalize();
+            if !shading.keeps_side(geometric, &frame, direction) {
+                return;
+            }
             ray = Ray { origin: self.world.leave(hit.primitive, &hit.point, direction), direction };
         }
-    }
-
-    /// Columns: tangent, bitangent and the normal on the side that the ray came from.
-    fn frame(&self, hit: &Hit, inside: bool) -> DMat3 {
-        let normal = if inside { -hit.point.normal } else { hit.point.normal };
-        let tangent = self.world.primitives[hit.primitive].surface.tangent(&hit.point);
-        DMat3::from_cols(tangent, normal.cross(tangent), normal)
     }
 
     /// Emission of the surface that a ray meets.

@@ -4,7 +4,7 @@ use crate::accel::{Accel, MAX_MATERIALS};
 use crate::gpu::layout::{EMITS_BOTH_SIDES, Emitter, Frame, Material, NONE};
 use crate::gpu::shader::{self, Defines, Module};
 use crate::render::lights::{LightPicks, STEPS, light_picks};
-use crate::scene::{Bsdf, Filter, Projection, Sampler, Scene, Sides};
+use crate::scene::{Bsdf, Filter, Projection, Reflectance, Sampler, Scene, Sides};
 use crate::spectral::Curve;
 use crate::spectral::table::SpectralTables;
 use crate::{Error, Result};
@@ -217,7 +217,8 @@ struct SpectrumIds {
 fn check_materials(scene: &Scene) -> Result<()> {
     for material in &scene.materials {
         let kind = match material.bsdf {
-            Bsdf::Diffuse { .. } | Bsdf::Black => continue,
+            Bsdf::Diffuse { reflectance: Reflectance::Spectrum(_) } | Bsdf::Black => continue,
+            Bsdf::Diffuse { reflectance: Reflectance::Texture(_) } => "diffuse, with a texture",
             Bsdf::Conductor { .. } => "conductor",
             Bsdf::Dielectric { .. } => "dielectric",
             Bsdf::Plastic { .. } => "plastic",
@@ -229,13 +230,18 @@ fn check_materials(scene: &Scene) -> Result<()> {
         );
         return Err(Error::input(&scene.file, message));
     }
+    let smooth = scene.objects.iter().find(|object| object.attributes.normals.is_some());
+    if let Some(object) = smooth {
+        let message = format!("{} has vertex normals, which cannot be rendered yet: remove them", object.name);
+        return Err(Error::input(&scene.file, message));
+    }
     Ok(())
 }
 
 /// Tables of the constant 1, of what multiplies throughput, then of what emits.
 fn spectral_tables(scene: &Scene) -> Result<(SpectralTables, SpectrumIds)> {
     let factors = scene.materials.iter().filter_map(|m| match m.bsdf {
-        Bsdf::Diffuse { reflectance } => Some(reflectance),
+        Bsdf::Diffuse { reflectance: Reflectance::Spectrum(reflectance) } => Some(reflectance),
         _ => None,
     });
     let sources = scene.objects.iter().filter_map(|o| o.emission.as_ref().map(|e| e.radiance));
@@ -263,7 +269,7 @@ fn spectral_tables(scene: &Scene) -> Result<(SpectralTables, SpectrumIds)> {
 
 fn material(scene: &Scene, m: &crate::scene::Material, factor: impl Fn(usize) -> u32) -> Material {
     let (factor, albedo) = match m.bsdf {
-        Bsdf::Diffuse { reflectance } => {
+        Bsdf::Diffuse { reflectance: Reflectance::Spectrum(reflectance) } => {
             let curve = &scene.spectra[reflectance].curve;
             let albedo = scene.channels.bounds.iter().map(|b| curve.max(b[0], b[1])).fold(0.0, f64::max);
             // What reflects in no channel is black.

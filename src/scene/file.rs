@@ -116,6 +116,7 @@ fn decode<'a>(cx: &'a Context<'a>, root: &'a [Entry]) -> Option<Scene> {
         items.iter().for_each(|item| objects.add(item));
     }
     let objects = objects.finish();
+    let (materials, textures) = materials.finish();
     let environment = top.get("environment").map(|item| {
         let radiance = decode_environment(&item, &mut spectra)?;
         Some(Environment { radiance: spectra.take(radiance) })
@@ -129,7 +130,8 @@ fn decode<'a>(cx: &'a Context<'a>, root: &'a [Entry]) -> Option<Scene> {
         film: film?,
         channels: channels?,
         integrator: integrator?,
-        materials: materials.finish(),
+        materials,
+        textures,
         spectra: spectra.finish(),
         objects,
         environment: match environment {

@@ -13,12 +13,14 @@ mod object;
 mod overrides;
 mod shape;
 mod spectrum;
+mod texture;
 mod transform;
 mod tree;
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
-use glam::{DVec2, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 pub use file::{load, parse};
@@ -27,6 +29,8 @@ use crate::spectral::{Channels, Curve};
 
 /// Index into [`Scene::spectra`].
 pub type SpectrumId = usize;
+/// Index into [`Scene::textures`].
+pub type TextureId = usize;
 /// Index into [`Scene::materials`].
 pub type MaterialId = usize;
 
@@ -43,6 +47,8 @@ pub struct Scene {
     pub spectra: Vec<Spectrum>,
     /// Only materials that some object uses, itself or as a part of a blend.
     pub materials: Vec<Material>,
+    /// Only those that some material in use has.
+    pub textures: Vec<Texture>,
     pub objects: Vec<Object>,
     pub environment: Option<Environment>,
     /// Said once to the user: held tables, dropped triangles, …
@@ -154,7 +160,7 @@ pub struct Material {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Bsdf {
     Diffuse {
-        reflectance: SpectrumId,
+        reflectance: Reflectance,
     },
     /// Complex index of refraction η + i k, k > 0 absorbs.
     Conductor {
@@ -173,7 +179,7 @@ pub enum Bsdf {
     },
     /// A diffuse base under a dielectric coat.
     Plastic {
-        reflectance: SpectrumId,
+        reflectance: Reflectance,
         eta: SpectrumId,
         roughness: f64,
     },
@@ -181,9 +187,62 @@ pub enum Bsdf {
     Blend {
         a: MaterialId,
         b: MaterialId,
-        weight: f64,
+        weight: Weight,
     },
     Black,
+}
+
+/// The fraction of light that a surface reflects, over wavelength.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Reflectance {
+    /// The same all over.
+    Spectrum(SpectrumId),
+    /// A texture of [`TextureKind::Colour`] or [`TextureKind::Mixture`].
+    Texture(TextureId),
+}
+
+/// The share of a blend's second part, in [0, 1].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Weight {
+    Constant(f64),
+    /// A texture of [`TextureKind::Number`].
+    Texture(TextureId),
+}
+
+/// Numbers over a surface by its texture coordinates (u, v): u runs right, v up, both repeat. Texel (x, y), counted from
+/// the top left, is centred at u = (x + ½) / width, 1 - v = (y + ½) / height; between centres everything is bilinear:
+/// of colours the spectra, not their coefficients.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Texture {
+    /// The file, for messages.
+    pub name: String,
+    /// Width and height.
+    pub size: [u32; 2],
+    pub kind: TextureKind,
+    /// \[y\]\[x\]\[channel\], rows from the top.
+    pub texels: Arc<[f32]>,
+}
+
+/// What the channels of a texture are.
+#[derive(Debug, Clone, PartialEq)]
+pub enum TextureKind {
+    /// Linear sRGB in [0, 1]; each texel's spectrum is that of `rgb` ([`crate::spectral::upsample::reflectance`]).
+    Colour,
+    /// The share of each of these reflectances; they sum to 1 at most, and what is missing is black.
+    Mixture(Vec<SpectrumId>),
+    /// One number: a weight, or kelvins.
+    Number,
+}
+
+impl Texture {
+    /// Numbers in a texel.
+    pub fn channels(&self) -> usize {
+        match &self.kind {
+            TextureKind::Colour => 3,
+            TextureKind::Mixture(endmembers) => endmembers.len(),
+            TextureKind::Number => 1,
+        }
+    }
 }
 
 /// Roughness below this is none: a mirror, or ideal refraction.
@@ -195,15 +254,33 @@ pub struct Object {
     /// For messages, e.g. `objects.3 (floor.obj, material "white")`.
     pub name: String,
     pub shape: Shape,
+    pub attributes: Attributes,
     pub material: MaterialId,
     pub emission: Option<Emission>,
 }
 
+/// What a shape carries beside its geometry, each only where its material asks for it.
+///
+/// Textures are laid out by (u, v), and anisotropic materials turned by a tangent, of either sign, which is the direction
+/// of growing u. On a quad u runs along `edge_u`, v along `edge_v`. On each face of a cube u runs to the right and v up,
+/// seen from outside with y up; on top and bottom u runs along x. On an OBJ mesh they are its `vt`. Round shapes have an
+/// axis, y: the sphere its own y axis, the disk its normal, the cylinder that from `from` to `to`; and with (x, y, z) in
+/// [`Attributes::axes`], u = ½ + atan2(x, z) / 2π, so that u grows counter-clockwise about the axis. v is ½ + asin(y) / π
+/// on a unit sphere, 0 at `from` and 1 at `to` on a cylinder, 0 on the rim and 1 in the centre of a disk.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Attributes {
+    /// (u, v) at the corners of each triangle of a mesh.
+    pub uv: Option<Vec<[DVec2; 3]>>,
+    /// Unit shading normals at the corners of each triangle of a mesh, on its front; interpolated between.
+    pub normals: Option<Vec<[DVec3; 3]>>,
+    /// Columns: where x, y (the axis) and z of a round shape point. Orthonormal, left-handed on what is mirrored.
+    pub axes: Option<DMat3>,
+}
+
 /// World-space geometry, transforms applied.
 ///
-/// Anisotropic materials are turned by a tangent, of either sign: along the first edge (corner 0 to 1) of a triangle,
-/// which is along `edge_u` on a quad; around the axis of a disk or cylinder. Spheres and OBJ meshes have no tangent to
-/// speak of and no anisotropic material.
+/// Without texture coordinates the tangent of anisotropic materials ([`Attributes`]) is along the first edge (corner 0 to
+/// 1) of a triangle, which is that of growing u on quads and cubes.
 #[derive(Debug, Clone)]
 pub enum Shape {
     /// Also quads and cubes. Front = counter-clockwise.

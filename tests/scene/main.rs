@@ -4,6 +4,7 @@
 mod materials;
 mod never_panics;
 mod resolved;
+mod textures;
 mod wrong;
 
 use spectile::Result;

@@ -7,8 +7,8 @@ pub mod surfaces;
 
 use glam::{DVec2, DVec3};
 use spectile::scene::{
-    Bsdf, Camera, Emission, Environment, Film, Filter, Integrator, Material, Mesh, Object, Projection, Sampler, Scene,
-    Shape, Sides, Spectrum, Wavelengths,
+    Attributes, Bsdf, Camera, Emission, Environment, Film, Filter, Integrator, Material, Mesh, Object, Projection,
+    Reflectance, Sampler, Scene, Shape, Sides, Spectrum, Texture, TextureKind, Wavelengths, Weight,
 };
 use spectile::spectral::{Channels, Curve};
 
@@ -33,6 +33,7 @@ impl Builder {
             },
             spectra: Vec::new(),
             materials: Vec::new(),
+            textures: Vec::new(),
             objects: Vec::new(),
             environment: None,
             warnings: Vec::new(),
@@ -75,12 +76,12 @@ impl Builder {
     /// A shape that reflects and does not emit, on both sides.
     pub fn diffuse(mut self, shape: Shape, reflectance: impl IntoCurve) -> Self {
         let reflectance = self.spectrum(reflectance);
-        self.object(shape, Bsdf::Diffuse { reflectance }, true, None)
+        self.object(shape, Bsdf::Diffuse { reflectance: Reflectance::Spectrum(reflectance) }, true, None)
     }
 
     pub fn one_sided(mut self, shape: Shape, reflectance: impl IntoCurve) -> Self {
         let reflectance = self.spectrum(reflectance);
-        self.object(shape, Bsdf::Diffuse { reflectance }, false, None)
+        self.object(shape, Bsdf::Diffuse { reflectance: Reflectance::Spectrum(reflectance) }, false, None)
     }
 
     /// A shape that reflects and emits.
@@ -92,7 +93,12 @@ impl Builder {
         sides: Sides,
     ) -> Self {
         let (reflectance, radiance) = (self.spectrum(reflectance), self.spectrum(radiance));
-        self.object(shape, Bsdf::Diffuse { reflectance }, true, Some(Emission { radiance, sides }))
+        self.object(
+            shape,
+            Bsdf::Diffuse { reflectance: Reflectance::Spectrum(reflectance) },
+            true,
+            Some(Emission { radiance, sides }),
+        )
     }
 
     /// A shape that emits and reflects nothing.
@@ -119,14 +125,38 @@ impl Builder {
 
     pub fn plastic(mut self, shape: Shape, reflectance: impl IntoCurve, eta: impl IntoCurve, roughness: f64) -> Self {
         let (reflectance, eta) = (self.spectrum(reflectance), self.spectrum(eta));
-        self.object(shape, Bsdf::Plastic { reflectance, eta, roughness }, true, None)
+        self.object(
+            shape,
+            Bsdf::Plastic { reflectance: Reflectance::Spectrum(reflectance), eta, roughness },
+            true,
+            None,
+        )
     }
 
     /// A blend of the materials of the last two objects, which only lend theirs.
     pub fn blend_of_last_two(mut self, shape: Shape, weight: f64) -> Self {
         let last = self.0.materials.len() - 1;
         self.0.objects.truncate(self.0.objects.len() - 2);
-        self.object(shape, Bsdf::Blend { a: last - 1, b: last, weight }, true, None)
+        self.object(shape, Bsdf::Blend { a: last - 1, b: last, weight: Weight::Constant(weight) }, true, None)
+    }
+
+    /// A diffuse surface whose reflectance is a texture.
+    pub fn textured(mut self, shape: Shape, attributes: Attributes, texture: Texture) -> Self {
+        self.0.textures.push(texture);
+        let reflectance = Reflectance::Texture(self.0.textures.len() - 1);
+        self.object(shape, Bsdf::Diffuse { reflectance }, true, None).attributes(attributes)
+    }
+
+    /// Shares of `endmembers`, \[y\]\[x\]\[endmember\], rows from the top.
+    pub fn mixture(&mut self, size: [u32; 2], texels: &[f32], endmembers: &[&dyn Fn() -> Curve]) -> Texture {
+        let spectra = endmembers.iter().map(|curve| self.spectrum(curve())).collect();
+        Texture { name: "mixture".into(), size, kind: TextureKind::Mixture(spectra), texels: texels.into() }
+    }
+
+    /// The last object's attributes.
+    pub fn attributes(mut self, attributes: Attributes) -> Self {
+        self.0.objects.last_mut().expect("an object").attributes = attributes;
+        self
     }
 
     pub fn build(self) -> Scene {
@@ -143,7 +173,7 @@ impl Builder {
         let material = self.0.materials.len();
         self.0.materials.push(Material { name: format!("material {material}"), bsdf, two_sided });
         let name = format!("objects.{}", self.0.objects.len());
-        self.0.objects.push(Object { name, shape, material, emission });
+        self.0.objects.push(Object { name, shape, attributes: Attributes::default(), material, emission });
         self
     }
 }
