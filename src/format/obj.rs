@@ -471,8 +471,8 @@ mod tests {
              f 1//1 2//1 3//2\nf 1/1 2/2 4/3\nf 1/1/1 2/2 3/3/1 4/1/2\n"
         );
         let mesh = obj(&text).unwrap();
-        let given: Vec<_> = mesh.parts.iter().map(|p| (p.line, p.triangles.len(), p.uv.is_some(), p.normals.is_some()));
-        let given: Vec<_> = given.collect();
+        let given = |p: &Part| (p.line, p.triangles.len(), p.uv.is_some(), p.normals.is_some());
+        let given: Vec<_> = mesh.parts.iter().map(given).collect();
         assert_eq!(given, [(10, 2, true, true), (12, 1, false, true), (13, 3, true, false)]);
         let whole = &mesh.parts[0];
         let uv = [[[0., 0.], [1., 0.], [0.25, 0.]], [[0., 0.], [0., 0.], [1., 0.]]];

@@ -11,6 +11,7 @@ mod path;
 mod primitive;
 mod rng;
 mod shading;
+mod sky;
 mod texture;
 mod world;
 
@@ -186,7 +187,8 @@ mod tests {
                 material: 0,
                 emission: None,
             }],
-            environment: Some(Environment { radiance: 1 }),
+            lights: vec![],
+            environment: Some(Environment::Uniform(1)),
             warnings: vec![],
             digest: String::new(),
         }

@@ -4,7 +4,9 @@ pub mod channels;
 pub mod colour;
 pub mod curve;
 mod data;
+mod derived;
 pub mod planck;
+pub mod skylight;
 pub mod table;
 pub mod upsample;
 
