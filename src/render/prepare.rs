@@ -51,11 +51,33 @@ pub struct General {
     pub dispersion: bool,
     /// Rough refraction that bends each channel by itself.
     pub spread: bool,
+    /// Textures of any kind; which of them, and of what, the rest says.
+    pub textures: bool,
+    pub textured: bool,
+    pub textured_base: bool,
+    pub colours: bool,
+    pub mixtures: bool,
+    /// Blends with a texture for weight.
+    pub shares: bool,
+    /// Texture coordinates, normals or axes on surfaces.
+    pub attributes: bool,
+    /// Shading normals.
+    pub smooth: bool,
 }
 
 impl General {
-    fn of(surfaces: &Surfaces) -> General {
+    fn of(surfaces: &Surfaces, scene: &Scene) -> General {
+        let textures = surfaces.textures.as_ref();
+        let carries = |f: &dyn Fn(&Attributes) -> bool| scene.objects.iter().any(|object| f(&object.attributes));
         General {
+            textures: textures.is_some(),
+            textured: surfaces.textured,
+            textured_base: surfaces.textured_base,
+            colours: textures.is_some_and(|t| t.colours),
+            mixtures: textures.is_some_and(|t| t.mixtures),
+            shares: textures.is_some_and(|t| t.first_share.is_some()),
+            attributes: carries(&|attributes| *attributes != Attributes::default()),
+            smooth: carries(&|attributes| attributes.normals.is_some()),
             kinds: surfaces.kinds,
             rough_base: surfaces.rough_base,
             anisotropic: surfaces.anisotropic,
@@ -93,12 +115,13 @@ impl Prepared {
     /// counters have bits for.
     pub fn new(scene: &Scene, seed: u64) -> Result<Prepared> {
         check_lights(scene)?;
-        check_textures(scene)?;
         let accel = Accel::build(scene);
         if scene.materials.len() > MAX_MATERIALS {
             return Err(Error::input(&scene.file, format!("more than {MAX_MATERIALS} materials")));
         }
         let general = scene.materials.iter().any(|m| !matches!(m.bsdf, Bsdf::Diffuse { .. } | Bsdf::Black));
+        let carries = scene.objects.iter().any(|object| object.attributes != Attributes::default());
+        let general = general || carries || !scene.textures.is_empty();
         let mut surfaces = general.then(|| Surfaces::new(scene));
         // General scenes meet a uniform environment by sampling the BSDF, and do not aim at it.
         let picks = light_picks(scene, &accel, !general);
@@ -125,7 +148,7 @@ impl Prepared {
             .collect();
         let environment_spectrum = scene.environment.as_ref().and_then(|e| e.uniform()).map_or(0, source);
         let mut features = features(scene, &accel, &tables, ids.factors.len() + ids.sources.len());
-        features.general = surfaces.as_ref().map(General::of);
+        features.general = surfaces.as_ref().map(|surfaces| General::of(surfaces, scene));
         features.registers &= !general;
         let frame = frame(scene, seed, &accel, &picks, environment_spectrum, tables.stratum_bits);
         let max_records = max_records(&frame, features, surfaces.as_ref());
@@ -204,6 +227,12 @@ impl Prepared {
             modules.push(shader::GENERATE_BOUNCE);
             return modules;
         };
+        if general.attributes {
+            modules.push(shader::ATTRIBUTES);
+        }
+        if general.textures {
+            modules.push(shader::TEXTURE);
+        }
         modules.extend([shader::RECORD, shader::TABLES, shader::MATERIAL, shader::GGX, shader::BSDF]);
         if general.anisotropic {
             modules.push(shader::TANGENT);
@@ -259,6 +288,18 @@ impl Prepared {
         }
         d.set("ROUGH_BASE", general.rough_base).set("OP_ETA_TABLE", rough_glass || general.rough_base);
         d.set("OP_ONLY", general.dispersion);
+        d.set("TEXTURES", general.textures).set("TEXTURED", general.textured).set("KEPT", general.textured_base);
+        d.set("COLOURS", general.colours).set("MIXTURES", general.mixtures).set("SHARES", general.shares);
+        d.set("TEXEL_NUMBERS", general.mixtures || general.shares);
+        d.set("ATTRIBUTES", general.attributes).set("SMOOTH", general.smooth);
+        if let Some(surfaces) = &self.surfaces {
+            if let Some(first) = surfaces.textures.as_ref().and_then(|textures| textures.first_share) {
+                d.constant("FIRST_SHARE", first);
+            }
+            if let Some(place) = surfaces.visible_place {
+                d.constant("VISIBLE_PLACE", place);
+            }
+        }
         d.set("OP_ROUGH_TRANSMIT", general.spread).set("RAW_RECORDS", general.spread);
     }
 
@@ -387,20 +428,6 @@ fn check_lights(scene: &Scene) -> Result<()> {
         &scene.file,
         format!("{kind} cannot be rendered yet: use emitting surfaces or a uniform environment"),
     ))
-}
-
-/// Materials and surfaces may have what the devices do not know yet.
-fn check_textures(scene: &Scene) -> Result<()> {
-    let what = if !scene.textures.is_empty() {
-        "a texture"
-    } else if scene.objects.iter().any(|object| object.attributes.normals.is_some()) {
-        "a mesh with vertex normals"
-    } else if scene.objects.iter().any(|object| object.attributes != Attributes::default()) {
-        "a sphere or mesh of two roughnesses"
-    } else {
-        return Ok(());
-    };
-    Err(Error::input(&scene.file, format!("{what} cannot be rendered yet")))
 }
 
 /// Tables of the constant 1, of what multiplies throughput, then of what emits.

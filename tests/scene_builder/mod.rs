@@ -174,17 +174,37 @@ impl Builder {
         self.object(shape, Bsdf::Blend { a: last - 1, b: last, weight: Weight::Constant(weight) }, true, None)
     }
 
-    /// A diffuse surface whose reflectance is a texture.
-    pub fn textured(mut self, shape: Shape, attributes: Attributes, texture: Texture) -> Self {
-        self.0.textures.push(texture);
-        let reflectance = Reflectance::Texture(self.0.textures.len() - 1);
-        self.object(shape, Bsdf::Diffuse { reflectance }, true, None).attributes(attributes)
+    /// A diffuse surface with a texture.
+    pub fn textured(mut self, shape: Shape, texture: usize) -> Self {
+        self.object(shape, Bsdf::Diffuse { reflectance: Reflectance::Texture(texture) }, true, None)
+    }
+
+    /// A coat over a textured base.
+    pub fn coated(mut self, shape: Shape, texture: usize, eta: impl IntoCurve, roughness: f64) -> Self {
+        let eta = self.spectrum(eta);
+        let bsdf = Bsdf::Plastic { reflectance: Reflectance::Texture(texture), eta, roughness };
+        self.object(shape, bsdf, true, None)
+    }
+
+    /// A blend of the materials of the last two objects, which only lend theirs, by a texture.
+    pub fn masked_last_two(mut self, shape: Shape, texture: usize) -> Self {
+        self = self.blend_of_last_two(shape, 0.5);
+        let Some(Bsdf::Blend { weight, .. }) = self.0.materials.last_mut().map(|m| &mut m.bsdf) else { unreachable!() };
+        *weight = Weight::Texture(texture);
+        self
     }
 
     /// Shares of `endmembers`, \[y\]\[x\]\[endmember\], rows from the top.
-    pub fn mixture(&mut self, size: [u32; 2], texels: &[f32], endmembers: &[&dyn Fn() -> Curve]) -> Texture {
-        let spectra = endmembers.iter().map(|curve| self.spectrum(curve())).collect();
-        Texture { name: "mixture".into(), size, kind: TextureKind::Mixture(spectra), texels: texels.into() }
+    pub fn mixture(&mut self, size: [u32; 2], texels: &[f32], endmembers: &[Curve]) -> usize {
+        let spectra = endmembers.iter().map(|curve| self.spectrum(curve.clone())).collect();
+        self.texture(size, texels, TextureKind::Mixture(spectra))
+    }
+
+    pub fn texture(&mut self, size: [u32; 2], texels: &[f32], kind: TextureKind) -> usize {
+        let texture = Texture { name: "texture".into(), size, kind, texels: texels.into() };
+        assert_eq!(texels.len(), size[0] as usize * size[1] as usize * texture.channels());
+        self.0.textures.push(texture);
+        self.0.textures.len() - 1
     }
 
     /// The last object's attributes.
