@@ -129,7 +129,7 @@ pub struct Args {
 pub fn run(args: &Args, output: &Output) -> Result<()> {
     let interrupt = super::interrupt::watch()?;
     let scene = args.scene.load()?;
-    let mut reporter = Reporter::new(args, output);
+    let mut reporter = Reporter::new(args.quiet, output);
     for warning in &scene.warnings {
         reporter.warn(warning)?;
     }
@@ -157,7 +157,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
 }
 
 /// A duration as a number of seconds, or with a unit s, m or h.
-fn parse_time(text: &str) -> std::result::Result<Duration, String> {
+pub(super) fn parse_time(text: &str) -> std::result::Result<Duration, String> {
     let explain = || "a time is a positive number with s, m or h, such as 90s, 10m or 1.5h".to_owned();
     let (number, unit) = match text.char_indices().next_back() {
         Some((last, 's')) => (&text[..last], 1.0),

@@ -27,18 +27,20 @@ mod preview;
 #[cfg(all(test, unix))]
 mod protocol_tests;
 mod recover;
+mod runs;
 mod store;
 mod verify;
 mod writer;
 
 pub use compare::{ChannelMetrics, Comparison, compare};
-pub use create::{Existing, check_target};
+pub use create::{Existing, check_target, make};
 pub use epochs::{epoch_samples, epochs_in, samples_before, whole_epochs};
 pub use grid::{Grid, Rect};
 pub use map::Chunk;
 pub use merge::{merge_bytes, merge_means};
 pub use metadata::{FORMAT, Header};
 pub use preview::reduction;
+pub use runs::{Run, RunFile, RunState, SlurmTask, Stand, Work, node_name, now_s};
 pub use store::{Cube, Progress};
 pub use verify::Verification;
 pub use writer::Writer;

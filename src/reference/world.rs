@@ -201,7 +201,8 @@ mod tests {
     use crate::scene::Mesh;
 
     fn object(shape: Shape) -> Object {
-        Object { name: "test".into(), shape, attributes: Default::default(), material: 0, emission: None }
+        let attributes = crate::scene::Attributes::default();
+        Object { name: "test".into(), shape, attributes, material: Some(0), emission: None, interior: None }
     }
 
     fn vector(rng: &mut Rng) -> DVec3 {

@@ -1,15 +1,14 @@
 //! The render: epochs of the whole image, decided one after the other; devices that pull their units; what is known so far.
 
 use std::collections::{BTreeMap, VecDeque};
-use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, OnceLock};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use serde_json::json;
+use serde_json::{Value, json};
 
-use crate::cube::{Writer, check_target, epoch_samples, epochs_in, reduction, samples_before};
+use crate::cube::{Run, RunFile, Writer, check_target, epoch_samples, epochs_in, reduction, samples_before};
 use crate::gpu::adapter::Gpu;
 use crate::render::job::Job;
 use crate::render::plan;
@@ -122,7 +121,7 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
     let names = gpus.iter().map(|gpu| gpu.name.clone()).collect();
     let mut render = Render::new(job, names, samples_limit, interrupt, started);
     let mut reports = pool.start(gpus)?;
-    let mut committer = None;
+    let (mut committer, mut run) = (None, None);
     let result = render.wait_for_devices(&mut reports, observe).and_then(|()| {
         check_interrupt(interrupt)?;
         // Only now is anything written: whatever can be refused has been.
@@ -130,6 +129,7 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
         let opened = Writer::open(&job.output, &header, job.existing, tiles, &mut |what| warnings.push(what));
         warnings.into_iter().try_for_each(|what| observe(Event::Warning(what)))?;
         let opened = opened?;
+        run = Some(RunFile::create(opened.cube().path(), Run::begin(&opened.tiles(), samples_limit))?);
         let cube = pool.cube.get_or_init(|| opened);
         let commits = Arc::clone(&pool);
         // What goes wrong there is what the next unit, or the last commit, ends with.
@@ -151,7 +151,8 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
     }
     let flushed = cube.flush();
     let preview = render.write_preview(cube);
-    let facts = render.write_run_facts(cube);
+    let ended = result.as_ref().and(flushed.as_ref()).copied();
+    let facts = run.map_or(Ok(()), |run| render.write_run_facts(run, ended));
     let warned = render.report_counters(observe);
     result?;
     flushed?;
@@ -475,7 +476,7 @@ impl<'a> Render<'a> {
     }
 
     /// Facts about this process, which are not part of what the cube is.
-    fn write_run_facts(&self, cube: &Writer) -> Result<()> {
+    fn write_run_facts(&self, mut file: RunFile, ended: std::result::Result<(), &Error>) -> Result<()> {
         let devices =
             self.status.devices.iter().map(|d| json!({ "name": d.name, "units": d.units, "idle_seconds": d.idle_s }));
         let facts = json!({
@@ -490,9 +491,12 @@ impl<'a> Render<'a> {
             "negative_samples": self.tally.negative,
             "version": env!("CARGO_PKG_VERSION"),
         });
-        let folder = cube.cube().path().join(".spectile");
-        let file: &Path = &folder.join(format!("run-{}.json", files::random_suffix()));
-        files::write_atomically(file, format!("{facts:#}\n").as_bytes())
+        if let Value::Object(facts) = facts {
+            file.run.facts = facts;
+        }
+        file.run.units = self.status.devices.iter().map(|d| d.units).sum();
+        file.run.end(ended);
+        file.write()
     }
 
     /// Bad samples are bugs, never silent.
