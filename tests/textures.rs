@@ -383,13 +383,12 @@ fn a_constant_texture_is_no_texture() {
                 false => b.plastic(plate(), 0.5, 1.5, 0.2),
             }),
             with(&|mut b| {
-                let b = if textured {
+                if textured {
                     let mask = b.texture([1, 1], &[0.25], TextureKind::Number);
                     b.conductor(plate(), 0.2, 3.4, [0.3; 2]).diffuse(plate(), 0.5).masked_last_two(plate(), mask)
                 } else {
                     b.conductor(plate(), 0.2, 3.4, [0.3; 2]).diffuse(plate(), 0.5).blend_of_last_two(plate(), 0.25)
-                };
-                b
+                }
             }),
         ]
     };

@@ -177,7 +177,7 @@ impl Builder {
     }
 
     /// A diffuse surface with a texture.
-    pub fn textured(mut self, shape: Shape, texture: usize) -> Self {
+    pub fn textured(self, shape: Shape, texture: usize) -> Self {
         self.object(shape, Bsdf::Diffuse { reflectance: Reflectance::Texture(texture) }, true, None)
     }
 
