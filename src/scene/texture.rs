@@ -89,7 +89,7 @@ impl Textures {
         self.add(&file, Use::Number(number), |image, path| numbers(&file, number, image, path))
     }
 
-    /// The index of a checked texture in the scene.
+    /// The index of a checked texture in the scene. Equal ones share one.
     pub fn take(&mut self, handle: Handle, spectra: &mut Spectra) -> TextureId {
         let checked = &mut self.checked[handle];
         if let Some(id) = checked.taken {
@@ -102,9 +102,13 @@ impl Textures {
             Use::Number(_) => TextureKind::Number,
         };
         let (name, texels) = (checked.path.display().to_string(), Arc::clone(&checked.texels));
-        self.scene.push(Texture { name, size: checked.size, kind, texels });
-        checked.taken = Some(self.scene.len() - 1);
-        self.scene.len() - 1
+        let texture = Texture { name, size: checked.size, kind, texels };
+        let id = self.scene.iter().position(|same| *same == texture).unwrap_or_else(|| {
+            self.scene.push(texture);
+            self.scene.len() - 1
+        });
+        checked.taken = Some(id);
+        id
     }
 
     /// The textures in use.
