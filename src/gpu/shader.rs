@@ -32,6 +32,8 @@ modules! {
     SHAPES = "common/shapes.wgsl";
     BVH = "common/bvh.wgsl";
     LIGHT = "common/light.wgsl";
+    ATTRIBUTES = "common/attributes.wgsl";
+    TEXTURE = "common/texture.wgsl";
     RECORD = "common/record.wgsl";
     TABLES = "common/tables.wgsl";
     MATERIAL = "common/material.wgsl";

@@ -44,6 +44,8 @@ fn check_size(name: &str, bytes: u64, limits: &wgpu::Limits) -> Result<()> {
     let (what, help) = match name {
         "spectra" | "knot_starts" | "knots" => ("the spectra of the scene", "fewer channels or fewer spectra"),
         "emitters" | "emitter_cdf" => ("the emitting triangles of the scene", "a coarser mesh where it emits"),
+        "textures" | "texels" => ("the textures of the scene", "smaller ones"),
+        "attributes" => ("the texture coordinates and normals of the scene", "fewer triangles"),
         _ => ("the materials of the scene", "fewer of them"),
     };
     Err(Error::Usage(format!(
@@ -68,6 +70,13 @@ fn parts<'a>(prepared: &'a Prepared, windows: &Windows) -> Vec<(String, &'a [u8]
             ("parts".into(), bytemuck::cast_slice(&surfaces.parts)),
             ("tables".into(), bytemuck::cast_slice(&surfaces.tables)),
         ]),
+    }
+    if let Some(textures) = prepared.surfaces.as_ref().and_then(|surfaces| surfaces.textures.as_ref()) {
+        parts.push(("textures".into(), bytemuck::cast_slice(&textures.words)));
+        parts.push(("texels".into(), bytemuck::cast_slice(&textures.texels)));
+    }
+    if !prepared.accel.attributes.is_empty() {
+        parts.push(("attributes".into(), bytemuck::cast_slice(&prepared.accel.attributes)));
     }
     let mut add_windows = |name: &str, list: WindowList, bytes: &'a [u8], element: u64| {
         for i in 0..u64::from(list.count) {

@@ -12,6 +12,7 @@ pub mod queue;
 pub mod rng;
 pub mod schedule;
 pub mod surfaces;
+pub mod textures;
 pub mod watch;
 pub mod wave;
 pub mod worker;

@@ -6,7 +6,7 @@ use crate::gpu::self_test::LOOP_LIMIT;
 use crate::gpu::shader::{self, Defines, Module};
 use crate::render::lights::{LightPicks, STEPS, light_picks};
 use crate::render::surfaces::{Kind, Needed, Surfaces};
-use crate::scene::{Bsdf, Environment, Filter, Light, Projection, Sampler, Scene, Sides};
+use crate::scene::{Attributes, Bsdf, Environment, Filter, Light, Projection, Reflectance, Sampler, Scene, Sides};
 use crate::spectral::Curve;
 use crate::spectral::table::SpectralTables;
 use crate::{Error, Result};
@@ -51,11 +51,33 @@ pub struct General {
     pub dispersion: bool,
     /// Rough refraction that bends each channel by itself.
     pub spread: bool,
+    /// Textures of any kind; which of them, and of what, the rest says.
+    pub textures: bool,
+    pub textured: bool,
+    pub textured_base: bool,
+    pub colours: bool,
+    pub mixtures: bool,
+    /// Blends with a texture for weight.
+    pub shares: bool,
+    /// Texture coordinates, normals or axes on surfaces.
+    pub attributes: bool,
+    /// Shading normals.
+    pub smooth: bool,
 }
 
 impl General {
-    fn of(surfaces: &Surfaces) -> General {
+    fn of(surfaces: &Surfaces, scene: &Scene) -> General {
+        let textures = surfaces.textures.as_ref();
+        let carries = |f: &dyn Fn(&Attributes) -> bool| scene.objects.iter().any(|object| f(&object.attributes));
         General {
+            textures: textures.is_some(),
+            textured: surfaces.textured,
+            textured_base: surfaces.textured_base,
+            colours: textures.is_some_and(|t| t.colours),
+            mixtures: textures.is_some_and(|t| t.mixtures),
+            shares: textures.is_some_and(|t| t.first_share.is_some()),
+            attributes: carries(&|attributes| *attributes != Attributes::default()),
+            smooth: carries(&|attributes| attributes.normals.is_some()),
             kinds: surfaces.kinds,
             rough_base: surfaces.rough_base,
             anisotropic: surfaces.anisotropic,
@@ -98,6 +120,8 @@ impl Prepared {
             return Err(Error::input(&scene.file, format!("more than {MAX_MATERIALS} materials")));
         }
         let general = scene.materials.iter().any(|m| !matches!(m.bsdf, Bsdf::Diffuse { .. } | Bsdf::Black));
+        let carries = scene.objects.iter().any(|object| object.attributes != Attributes::default());
+        let general = general || carries || !scene.textures.is_empty();
         let mut surfaces = general.then(|| Surfaces::new(scene));
         // General scenes meet a uniform environment by sampling the BSDF, and do not aim at it.
         let picks = light_picks(scene, &accel, !general);
@@ -124,7 +148,7 @@ impl Prepared {
             .collect();
         let environment_spectrum = scene.environment.as_ref().and_then(|e| e.uniform()).map_or(0, source);
         let mut features = features(scene, &accel, &tables, ids.factors.len() + ids.sources.len());
-        features.general = surfaces.as_ref().map(General::of);
+        features.general = surfaces.as_ref().map(|surfaces| General::of(surfaces, scene));
         features.registers &= !general;
         let frame = frame(scene, seed, &accel, &picks, environment_spectrum, tables.stratum_bits);
         let max_records = max_records(&frame, features, surfaces.as_ref());
@@ -203,6 +227,12 @@ impl Prepared {
             modules.push(shader::GENERATE_BOUNCE);
             return modules;
         };
+        if general.attributes {
+            modules.push(shader::ATTRIBUTES);
+        }
+        if general.textures {
+            modules.push(shader::TEXTURE);
+        }
         modules.extend([shader::RECORD, shader::TABLES, shader::MATERIAL, shader::GGX, shader::BSDF]);
         if general.anisotropic {
             modules.push(shader::TANGENT);
@@ -258,6 +288,18 @@ impl Prepared {
         }
         d.set("ROUGH_BASE", general.rough_base).set("OP_ETA_TABLE", rough_glass || general.rough_base);
         d.set("OP_ONLY", general.dispersion);
+        d.set("TEXTURES", general.textures).set("TEXTURED", general.textured).set("KEPT", general.textured_base);
+        d.set("COLOURS", general.colours).set("MIXTURES", general.mixtures).set("SHARES", general.shares);
+        d.set("TEXEL_NUMBERS", general.mixtures || general.shares);
+        d.set("ATTRIBUTES", general.attributes).set("SMOOTH", general.smooth);
+        if let Some(surfaces) = &self.surfaces {
+            if let Some(first) = surfaces.textures.as_ref().and_then(|textures| textures.first_share) {
+                d.constant("FIRST_SHARE", first);
+            }
+            if let Some(place) = surfaces.visible_place {
+                d.constant("VISIBLE_PLACE", place);
+            }
+        }
         d.set("OP_ROUGH_TRANSMIT", general.spread).set("RAW_RECORDS", general.spread);
     }
 
@@ -393,7 +435,7 @@ fn spectral_tables(scene: &Scene, needed: &[Needed]) -> Result<(SpectralTables, 
     // General scenes have all of theirs among those needed.
     let plain = if needed.is_empty() { &scene.materials[..] } else { &[] };
     let factors = plain.iter().filter_map(|m| match m.bsdf {
-        Bsdf::Diffuse { reflectance } => Some(reflectance),
+        Bsdf::Diffuse { reflectance: Reflectance::Spectrum(reflectance) } => Some(reflectance),
         _ => None,
     });
     let sources = scene.objects.iter().filter_map(|o| o.emission.as_ref().map(|e| e.radiance));
@@ -431,7 +473,7 @@ fn spectral_tables(scene: &Scene, needed: &[Needed]) -> Result<(SpectralTables, 
 
 fn material(scene: &Scene, m: &crate::scene::Material, factor: impl Fn(usize) -> u32) -> Material {
     let (factor, albedo) = match m.bsdf {
-        Bsdf::Diffuse { reflectance } => {
+        Bsdf::Diffuse { reflectance: Reflectance::Spectrum(reflectance) } => {
             let curve = &scene.spectra[reflectance].curve;
             let albedo = scene.channels.bounds.iter().map(|b| curve.max(b[0], b[1])).fold(0.0, f64::max);
             // What reflects in no channel is black.
