@@ -102,6 +102,11 @@ fn operation_value(record: vec4<u32>, raw: vec4<f32>, quad: u32, s: SpectralSamp
         return select(vec4<f32>(0.0), vec4<f32>(1.0), vec4<u32>(4u * quad, 4u * quad + 1u, 4u * quad + 2u, 4u * quad + 3u) == vec4<u32>(record.y));
     }
 #endif
+#if OP_MAP
+    if (operation == OP_MAP) {
+        return map_value(record.y, record.w, spectrum_value(MAP_AXIS, quad, s));
+    }
+#endif
     let a = spectrum_value(record.y & 0xffffu, quad, s);
     let parameter = bitcast<f32>(record.w);
     // Channels that only fill up the last quad have index 0.

@@ -32,6 +32,8 @@ const OP_EMITTANCE: u32 = 6u;
 const OP_ETA_TABLE: u32 = 7u;
 // X = 1 in channel y, 0 elsewhere.
 const OP_ONLY: u32 = 8u;
+// X = the environment map over its source spectrum, in cell y (column | row << 16), at the fractions w (16 bits each).
+const OP_MAP: u32 = 9u;
 // X = D(h) |o h| |i h| / (o h + n i h)^2 (1 - F), each channel with its own half vector h; parameter: roughness; the next
 // record holds cos o, and i.
 const OP_ROUGH_TRANSMIT: u32 = 48u;
