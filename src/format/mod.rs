@@ -7,3 +7,4 @@ pub mod plot;
 pub mod png;
 pub mod refractive;
 pub mod text;
+pub mod volume;

@@ -136,7 +136,7 @@ impl<'a> Tracer<'a> {
             }
 
             let object = &self.scene.objects[self.world.primitives[hit.primitive].object];
-            let bsdf = &self.materials[object.material];
+            let bsdf = &self.materials[object.material.expect("null boundaries are refused")];
             let aim = self.aim(&hit, rng);
             path.spectra.fill(bsdf.spectra());
             if let Some(aim) = &aim {

@@ -197,7 +197,7 @@ mod tests {
     use crate::scene::Mesh;
 
     fn object(shape: Shape) -> Object {
-        Object { name: "test".into(), shape, material: 0, emission: None }
+        Object { name: "test".into(), shape, material: Some(0), emission: None, interior: None }
     }
 
     fn vector(rng: &mut Rng) -> DVec3 {

@@ -4,7 +4,8 @@ use glam::DVec3;
 use sha2::{Digest, Sha256};
 
 use super::{
-    Bsdf, Environment, EnvironmentMap, Filter, Light, Projection, Sampler, Scene, Shape, Sides, Texels, Wavelengths,
+    Bsdf, Environment, EnvironmentMap, Field, Filter, Light, Medium, Projection, Sampler, Scene, Shape, Sides, Texels,
+    Wavelengths,
 };
 use crate::spectral::{Curve, Outside};
 
@@ -51,11 +52,12 @@ pub fn digest(scene: &Scene) -> String {
             }
         }
         hash.tag(u8::from(material.two_sided));
+        hash.option(material.temperature, Hash::number);
     }
     hash.count(scene.objects.len());
     for object in &scene.objects {
         hash.shape(&object.shape);
-        hash.count(object.material);
+        hash.option(object.material, Hash::count);
         match &object.emission {
             None => hash.tag(0),
             Some(emission) => {
@@ -66,7 +68,15 @@ pub fn digest(scene: &Scene) -> String {
                 hash.count(emission.radiance);
             }
         }
+        hash.option(object.interior, |hash, interior| {
+            hash.count(interior.body);
+            hash.count(interior.medium);
+            hash.numbers(&interior.to_grid.to_cols_array());
+        });
     }
+    hash.count(scene.media.len());
+    scene.media.iter().for_each(|medium| hash.medium(medium));
+    hash.option(scene.camera_medium, Hash::count);
     match &scene.environment {
         None => hash.tag(0),
         Some(Environment::Uniform(radiance)) => {
@@ -110,6 +120,41 @@ impl Hash {
     fn text(&mut self, text: &str) {
         self.count(text.len());
         self.0.update(text);
+    }
+
+    fn option<T>(&mut self, value: Option<T>, some: impl FnOnce(&mut Self, T)) {
+        self.tag(u8::from(value.is_some()));
+        if let Some(value) = value {
+            some(self, value);
+        }
+    }
+
+    fn medium(&mut self, medium: &Medium) {
+        self.count(medium.absorbers.len());
+        for absorber in &medium.absorbers {
+            self.number(absorber.strength);
+            self.count(absorber.columns.len());
+            for (kelvin, spectrum) in &absorber.columns {
+                self.number(*kelvin);
+                self.count(*spectrum);
+            }
+        }
+        self.option(medium.temperature.as_ref(), Hash::field);
+        self.field(&medium.density);
+    }
+
+    fn field(&mut self, field: &Field) {
+        match field {
+            Field::Constant(value) => {
+                self.tag(0);
+                self.number(*value);
+            }
+            Field::Grid(grid) => {
+                self.tag(1);
+                grid.size.iter().for_each(|n| self.count(*n as usize));
+                grid.values.iter().for_each(|value| self.0.update(value.to_bits().to_le_bytes()));
+            }
+        }
     }
 
     /// Camera, film, channels and integrator.

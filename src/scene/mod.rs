@@ -4,6 +4,7 @@
 mod blend;
 mod camera;
 mod channels;
+mod closed;
 mod context;
 mod decode;
 mod digest;
@@ -11,6 +12,7 @@ mod environment;
 mod file;
 mod light;
 mod material;
+mod medium;
 mod object;
 mod overrides;
 mod shape;
@@ -21,7 +23,7 @@ mod tree;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DAffine3, DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 pub use file::{load, parse};
@@ -32,6 +34,8 @@ use crate::spectral::{Channels, Curve};
 pub type SpectrumId = usize;
 /// Index into [`Scene::materials`].
 pub type MaterialId = usize;
+/// Index into [`Scene::media`].
+pub type MediumId = usize;
 
 /// Everything a render needs to know about what is rendered.
 #[derive(Debug, Clone)]
@@ -47,6 +51,10 @@ pub struct Scene {
     /// Only materials that some object uses, itself or as a part of a blend.
     pub materials: Vec<Material>,
     pub objects: Vec<Object>,
+    /// Only those that fill something.
+    pub media: Vec<Medium>,
+    /// What fills space outside all interiors.
+    pub camera_medium: Option<MediumId>,
     pub lights: Vec<Light>,
     pub environment: Option<Environment>,
     /// Said once to the user: held tables, dropped triangles, …
@@ -152,6 +160,9 @@ pub struct Material {
     /// Whether the back side (against the geometric normal) scatters like the front; otherwise it absorbs. True, and
     /// without meaning, for dielectrics, whose back is their inside, and for blends, whose parts have their own.
     pub two_sided: bool,
+    /// K, above 0: emits ε(λ, ω) B(λ, T), ε = 1 - what the very same surface sends on of flux along ω, on either side. Of
+    /// a blend: for those of its parts that have none of their own. `None` on dielectrics, which absorb nothing.
+    pub temperature: Option<f64>,
 }
 
 /// How a surface scatters. Roughness is the α of the GGX distribution in [0, 1]; what is below [`SMOOTH`] is smooth.
@@ -199,8 +210,68 @@ pub struct Object {
     /// For messages, e.g. `objects.3 (floor.obj, material "white")`.
     pub name: String,
     pub shape: Shape,
-    pub material: MaterialId,
+    /// `None`: a null boundary, which only bounds its interior. Paths pass it as if it were not there.
+    pub material: Option<MaterialId>,
     pub emission: Option<Emission>,
+    /// What fills the inside of a closed shape: behind its geometric normal.
+    pub interior: Option<Interior>,
+}
+
+/// A medium in its place. Where several interiors overlap, the innermost counts: the one that a path entered last.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Interior {
+    /// Objects that are parts of one closed surface have the same number, all others numbers of their own.
+    pub body: usize,
+    pub medium: MediumId,
+    /// From the world to the unit cube that the medium's grids fill: the object's bounding box in its own space.
+    pub to_grid: DAffine3,
+}
+
+/// A gas that absorbs and emits. Its absorption coefficient in m⁻¹ is density · Σ strength · table(λ, T); where it has a
+/// temperature it emits as much as it absorbs, times Planck's radiance.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Medium {
+    pub name: String,
+    pub absorbers: Vec<Absorber>,
+    /// K, not negative.
+    pub temperature: Option<Field>,
+    /// Relative, not negative.
+    pub density: Field,
+}
+
+/// A term of a medium's absorption.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Absorber {
+    /// Fraction x pressure of a species; 1 for an absorption that is given as such.
+    pub strength: f64,
+    /// K, ascending, and the spectrum there, in m⁻¹ at strength 1. Between two, linear in temperature; beyond, the ends
+    /// are held. Where there is only one, temperature does not matter.
+    pub columns: Vec<(f64, SpectrumId)>,
+}
+
+/// A number of a medium, or one for each voxel.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Field {
+    Constant(f64),
+    Grid(Arc<Grid>),
+}
+
+/// Voxels with a constant value each, x fastest. All grids of one medium have one shape.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Grid {
+    /// Voxels along x, y and z.
+    pub size: [u32; 3],
+    pub values: Vec<f32>,
+}
+
+impl Medium {
+    /// Voxels along x, y and z, where any quantity has a grid.
+    pub fn grid_size(&self) -> Option<[u32; 3]> {
+        [self.temperature.as_ref(), Some(&self.density)].into_iter().flatten().find_map(|field| match field {
+            Field::Constant(_) => None,
+            Field::Grid(grid) => Some(grid.size),
+        })
+    }
 }
 
 /// World-space geometry, transforms applied.

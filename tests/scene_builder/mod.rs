@@ -34,6 +34,8 @@ impl Builder {
             spectra: Vec::new(),
             materials: Vec::new(),
             objects: Vec::new(),
+            media: Vec::new(),
+            camera_medium: None,
             lights: Vec::new(),
             environment: None,
             warnings: Vec::new(),
@@ -174,9 +176,9 @@ impl Builder {
 
     fn object(mut self, shape: Shape, bsdf: Bsdf, two_sided: bool, emission: Option<Emission>) -> Self {
         let material = self.0.materials.len();
-        self.0.materials.push(Material { name: format!("material {material}"), bsdf, two_sided });
+        self.0.materials.push(Material { name: format!("material {material}"), bsdf, two_sided, temperature: None });
         let name = format!("objects.{}", self.0.objects.len());
-        self.0.objects.push(Object { name, shape, material, emission });
+        self.0.objects.push(Object { name, shape, material: Some(material), emission, interior: None });
         self
     }
 }
