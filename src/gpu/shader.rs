@@ -32,6 +32,9 @@ modules! {
     SHAPES = "common/shapes.wgsl";
     BVH = "common/bvh.wgsl";
     LIGHT = "common/light.wgsl";
+    LAMP = "common/lamp.wgsl";
+    MAP = "common/map.wgsl";
+    MAP_VALUE = "common/map_value.wgsl";
     RECORD = "common/record.wgsl";
     TABLES = "common/tables.wgsl";
     MATERIAL = "common/material.wgsl";

@@ -46,6 +46,8 @@ const MATCHED: f64 = 1e-4;
 pub enum Needed {
     Scene(SpectrumId),
     Derived(String, Curve),
+    /// As `Derived`, and not to be approximated: it is a place in a table.
+    Exact(String, Curve),
 }
 
 /// The materials of a scene, flat. Spectra of parts are positions in `spectra` until [`Surfaces::name_spectra`].

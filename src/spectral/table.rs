@@ -5,6 +5,8 @@ use super::{Channels, Curve};
 
 /// Pointwise bound relative to the channel's peak (DESIGN section 7).
 pub const POINTWISE_BOUND: f64 = 1e-4;
+/// What makes a curve a line, relative to the channel's peak: some roundings of f32.
+const LINE_BOUND: f64 = 1e-6;
 /// Most entries (strata x channels) per spectrum, and of all spectra together: 96 MiB, less than what every device binds.
 const MAX_ENTRIES: usize = 1 << 18;
 const MAX_ENTRIES_IN_ALL: usize = 12 << 20;
@@ -50,11 +52,24 @@ pub struct Bounds {
 impl SpectralTables {
     /// Tables for `curves` over `channels`, in the order given (spectra that need knots move to the end).
     pub fn build(curves: &[&Curve], channels: &Channels) -> SpectralTables {
+        SpectralTables::with_exact(curves, &[], channels)
+    }
+
+    /// [`SpectralTables::build`]; the curves at the positions `exact` are kept as knots, unless a line in each channel is
+    /// all they are.
+    pub fn with_exact(curves: &[&Curve], exact: &[usize], channels: &Channels) -> SpectralTables {
         let channels_padded = channels.len().next_multiple_of(4);
         // All spectra have as many strata as the one that needs most.
         let entries = MAX_ENTRIES.min(MAX_ENTRIES_IN_ALL / curves.len().max(1));
         let max_bits = (entries / channels_padded).max(1).ilog2().min(MAX_STRATUM_BITS);
-        let needed: Vec<Option<u32>> = curves.iter().map(|c| strata_needed(c, channels, max_bits)).collect();
+        let needed: Vec<Option<u32>> = curves
+            .iter()
+            .enumerate()
+            .map(|(i, c)| match exact.contains(&i) {
+                true => strata_needed(c, channels, 0, LINE_BOUND),
+                false => strata_needed(c, channels, max_bits, POINTWISE_BOUND),
+            })
+            .collect();
         let stratum_bits = needed.iter().flatten().copied().max().unwrap_or(0);
 
         // The stratified first, the knotted after them.
@@ -153,12 +168,12 @@ impl Bounds {
 }
 
 /// Stratum bits that keep the pointwise bound in every channel, or `None` where `max_bits` do not.
-fn strata_needed(curve: &Curve, channels: &Channels, max_bits: u32) -> Option<u32> {
+fn strata_needed(curve: &Curve, channels: &Channels, max_bits: u32, bound: f64) -> Option<u32> {
     // What satisfied the channels so far is where the next channel starts.
     (0..channels.len()).try_fold(0, |least, k| {
         let keeps_bound = |bits: &u32| {
             let lines = fit_channel(curve, channels, k, 1 << bits);
-            channel_bounds(curve, channels, k, &lines).pointwise <= POINTWISE_BOUND
+            channel_bounds(curve, channels, k, &lines).pointwise <= bound
         };
         (least..=max_bits).find(keeps_bound)
     })
