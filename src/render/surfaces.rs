@@ -50,6 +50,8 @@ pub enum Needed {
     Derived(String, Curve),
     /// Within the tables' bound of every value, not of each channel's peak.
     Pointwise(String, Curve),
+    /// As `Derived`, and not to be approximated: it is a place in a table.
+    Exact(String, Curve),
 }
 
 /// The materials of a scene, flat. Spectra of parts are positions in `spectra` until [`Surfaces::name_spectra`].
