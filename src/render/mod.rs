@@ -4,6 +4,7 @@
 mod fault_tests;
 pub mod job;
 pub mod lights;
+pub mod media;
 pub mod patience;
 pub mod plan;
 pub mod pool;

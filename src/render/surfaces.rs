@@ -117,6 +117,10 @@ impl Surfaces {
             surfaces.textures = Some(textures);
         }
         surfaces.albedos.clear();
+        // A binding holds at least one.
+        if surfaces.parts.is_empty() {
+            surfaces.parts.push(Part::default());
+        }
         surfaces
     }
 
