@@ -240,16 +240,13 @@ impl Prepared {
             modules.push(shader::SHAPES);
         }
         modules.push(shader::BVH);
-        if self.features.emitters || self.features.environment {
+        if self.features.emitters || self.features.environment || self.features.general.is_some() {
             modules.push(shader::LIGHT);
         }
         let Some(general) = &self.features.general else {
             modules.push(shader::GENERATE_BOUNCE);
             return modules;
         };
-        if (general.lamps || general.map.is_some()) && !self.features.emitters && !self.features.environment {
-            modules.push(shader::LIGHT);
-        }
         if general.lamps {
             modules.push(shader::LAMP);
         }
