@@ -93,6 +93,10 @@ impl Surfaces {
             surfaces.add(scene, leaves);
         }
         surfaces.albedos.clear();
+        // Where nothing scatters, shaders still bind a part.
+        if surfaces.parts.is_empty() {
+            surfaces.parts.push(Part::default());
+        }
         surfaces
     }
 
