@@ -152,10 +152,25 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 
     let material = surface_materials[surface.material];
     var v: Vertex;
-    v.normal = select(-surface.normal, surface.normal, from_front);
+    // The geometric normal on the side of the ray.
+    let face = select(-surface.normal, surface.normal, from_front);
+    v.normal = face;
     v.inside = !from_front;
+#if ATTRIBUTES
+    let carried = carried_at(hit, surface);
+#if SMOOTH
+    v.normal = shading_normal(select(-carried.normal, carried.normal, from_front), -ray.direction);
+#endif
+#if TEXTURES
+    v.uv = carried.uv;
+#endif
+#endif
 #if ANISOTROPIC
-    v.s = surface_tangent(hit, surface, v.normal);
+#if ATTRIBUTES
+    v.s = surface_tangent(hit, surface, v.normal, carried.tangent);
+#else
+    v.s = surface_tangent(hit, surface, v.normal, vec3<f32>(0.0));
+#endif
     v.t = cross(v.normal, v.s);
 #else
     let around = tangents(v.normal);
@@ -179,12 +194,20 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     let u_choice = random_pair(key, dimension + DIMENSION_CHOICE, index, wave.epoch_mask);
     let u_lobe = random_pair(key, dimension + DIMENSION_LOBE, index, wave.epoch_mask);
 
+#if SHARES
+    v.pick_scale = 1.0;
+    var picks = 0.0;
+    for (var p = material.first_part; p < material.first_part + material.part_count; p += 1u) {
+        picks += part_pick(p, v);
+    }
+    v.pick_scale = select(1.0 / picks, 0.0, picks == 0.0);
+#endif
     // The part that goes on.
     var chosen = NONE;
     var chosen_pick = 0.0;
     var below = 0.0;
     for (var p = material.first_part; p < material.first_part + material.part_count; p += 1u) {
-        let pick = part_pick(parts[p], v);
+        let pick = part_pick(p, v);
         if (pick > 0.0 && (chosen == NONE || u_lobe.x >= below)) {
             chosen = p;
             chosen_pick = pick;
@@ -195,7 +218,7 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
         end_path(list, 2u * step.bounce + 1u, overflow);
         return;
     }
-    let part = parts[chosen];
+    let part = part_at(chosen, v);
     // The next direction, and its density; negative where it is the only one.
     var i = cosine_hemisphere(vec3<f32>(0.0, 0.0, 1.0), u_bsdf);
     var next_density = 0.0;
@@ -298,6 +321,11 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
         }
     }
 
+#if SMOOTH
+    // No light is reflected into a surface, or passes to where it came from.
+    goes_on = goes_on && dot(to_world(v, i), face) * i.z > 0.0;
+#endif
+
     // A light, and the direction to it.
     var light_direction = vec3<f32>(0.0);
     var light_weight = 0.0;
@@ -317,7 +345,7 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     {
         let u_light = random_pair(key, dimension + DIMENSION_LIGHT_POINT, index, wave.epoch_mask);
         let transmits = (material.flags & MATERIAL_TRANSMITS) != 0u;
-        let seen_from = select(offset_origin(surface.position, v.normal), surface.position, transmits);
+        let seen_from = select(offset_origin(surface.position, face), surface.position, transmits);
         var towards = vec3<f32>(0.0);
         // Where the way to the light ends, if it does.
         var end = vec3<f32>(0.0);
@@ -364,10 +392,15 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 #endif
         }
 #endif
-        let side = dot(v.normal, towards);
-        if (light_pdf > 0.0 && side != 0.0 && (side > 0.0 || transmits)) {
+        let side = dot(face, towards);
+#if SMOOTH
+        let keeps_side = side * dot(v.normal, towards) > 0.0;
+#else
+        let keeps_side = true;
+#endif
+        if (light_pdf > 0.0 && side != 0.0 && (side > 0.0 || transmits) && keeps_side) {
             light_direction = normalize(to_local(v, towards));
-            shadow.origin = offset_origin(surface.position, select(-v.normal, v.normal, side > 0.0));
+            shadow.origin = offset_origin(surface.position, select(-face, face, side > 0.0));
             shadow.direction = select(end - shadow.origin, towards, shadow_limit == INFINITE);
         } else {
             light_pdf = 0.0;
@@ -421,9 +454,8 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
             continue;
         }
         for (var p = material.first_part; p < material.first_part + material.part_count; p += 1u) {
-            let other = parts[p];
-            if (part_pick(other, v) > 0.0) {
-                append_part(&list, other, v, direction, weight);
+            if (part_pick(p, v) > 0.0) {
+                append_part(&list, part_at(p, v), v, direction, weight);
             }
         }
         if (to_light) {
@@ -464,7 +496,7 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
         atomicAdd(&counters[COUNTER_OVERFLOW], 1u);
     }
     let direction = to_world(v, i);
-    let origin = offset_origin(surface.position, select(-v.normal, v.normal, i.z > 0.0));
+    let origin = offset_origin(surface.position, select(-face, face, i.z > 0.0));
     heads[path].y = list.used;
     states[STATE_WORDS * path] = bitcast<vec4<u32>>(vec4<f32>(origin, next_density));
     states[STATE_WORDS * path + 1u] = vec4<u32>(bitcast<vec3<u32>>(direction), list.count | (list.used << 16u));

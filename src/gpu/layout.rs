@@ -146,8 +146,13 @@ pub struct Primitive {
     /// Index of the emitter, or [`NONE`].
     pub emitter: u32,
     pub c: [f32; 3],
-    pub unused: u32,
+    /// Where its [`crate::accel::Accel::attributes`] start, with [`HAS_COORDINATES`] and [`HAS_NORMALS`]; 0 without.
+    pub attributes: u32,
 }
+
+/// Bits of [`Primitive::attributes`].
+pub const HAS_COORDINATES: u32 = 0x8000_0000;
+pub const HAS_NORMALS: u32 = 0x4000_0000;
 
 /// The counters that every pass may raise, in the order of the `COUNTER_…` constants in WGSL.
 #[repr(C)]

@@ -13,6 +13,7 @@ pub mod rng;
 pub mod schedule;
 pub mod sky;
 pub mod surfaces;
+pub mod textures;
 pub mod watch;
 pub mod wave;
 pub mod worker;

@@ -9,9 +9,11 @@ use crate::gpu::shader::{self, Defines, Module};
 use crate::render::lights::{LightPicks, STEPS, light_picks};
 use crate::render::sky::SkyMap;
 use crate::render::surfaces::{Kind, Needed, Surfaces};
-use crate::scene::{Bsdf, Environment, Filter, Light, Projection, Sampler, Scene, Sides, Texels};
+use crate::scene::{
+    Attributes, Bsdf, Environment, Filter, Light, Projection, Reflectance, Sampler, Scene, Sides, Texels,
+};
 use crate::spectral::Curve;
-use crate::spectral::table::SpectralTables;
+use crate::spectral::table::{Exactness, SpectralTables};
 use crate::{Error, Result};
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -56,6 +58,18 @@ pub struct General {
     pub dispersion: bool,
     /// Rough refraction that bends each channel by itself.
     pub spread: bool,
+    /// Textures of any kind; which of them, and of what, the rest says.
+    pub textures: bool,
+    pub textured: bool,
+    pub textured_base: bool,
+    pub colours: bool,
+    pub mixtures: bool,
+    /// Blends with a texture for weight.
+    pub shares: bool,
+    /// Texture coordinates, normals or axes on surfaces.
+    pub attributes: bool,
+    /// Shading normals.
+    pub smooth: bool,
     /// Lights without a surface, and how many of them are suns.
     pub lamps: bool,
     pub suns: u32,
@@ -74,8 +88,18 @@ pub struct Map {
 }
 
 impl General {
-    fn of(surfaces: &Surfaces) -> General {
+    fn of(surfaces: &Surfaces, scene: &Scene) -> General {
+        let textures = surfaces.textures.as_ref();
+        let carries = |f: &dyn Fn(&Attributes) -> bool| scene.objects.iter().any(|object| f(&object.attributes));
         General {
+            textures: textures.is_some(),
+            textured: surfaces.textured,
+            textured_base: surfaces.textured_base,
+            colours: textures.is_some_and(|t| t.colours),
+            mixtures: textures.is_some_and(|t| t.mixtures),
+            shares: textures.is_some_and(|t| t.first_share.is_some()),
+            attributes: carries(&|attributes| *attributes != Attributes::default()),
+            smooth: carries(&|attributes| attributes.normals.is_some()),
             kinds: surfaces.kinds,
             rough_base: surfaces.rough_base,
             anisotropic: surfaces.anisotropic,
@@ -122,7 +146,10 @@ impl Prepared {
             return Err(Error::input(&scene.file, format!("more than {MAX_MATERIALS} materials")));
         }
         let sky = scene.environment.as_ref().and_then(|e| e.map()).map(|map| SkyMap::new(scene, map));
+        let carries = scene.objects.iter().any(|object| object.attributes != Attributes::default());
         let general = scene.materials.iter().any(|m| !matches!(m.bsdf, Bsdf::Diffuse { .. } | Bsdf::Black))
+            || carries
+            || !scene.textures.is_empty()
             || !scene.lights.is_empty()
             || sky.is_some();
         let mut surfaces = general.then(|| Surfaces::new(scene));
@@ -166,7 +193,8 @@ impl Prepared {
         let environment_spectrum = scene.environment.as_ref().and_then(|e| e.uniform()).map_or(0, source);
         let mut features = features(scene, &accel, &tables, ids.factors.len() + ids.sources.len());
         let suns = scene.lights.iter().filter(|light| matches!(light, Light::Sun { .. })).count() as u32;
-        features.general = surfaces.as_ref().map(|s| General { lamps: !lamps.is_empty(), suns, map, ..General::of(s) });
+        let of = |surfaces: &Surfaces| General { lamps: !lamps.is_empty(), suns, map, ..General::of(surfaces, scene) };
+        features.general = surfaces.as_ref().map(of);
         features.registers &= !general;
         let frame = frame(scene, seed, &accel, &picks, environment_spectrum, tables.stratum_bits);
         let max_records = max_records(&frame, features, surfaces.as_ref());
@@ -247,6 +275,12 @@ impl Prepared {
             modules.push(shader::GENERATE_BOUNCE);
             return modules;
         };
+        if general.attributes {
+            modules.push(shader::ATTRIBUTES);
+        }
+        if general.textures {
+            modules.push(shader::TEXTURE);
+        }
         if general.lamps {
             modules.push(shader::LAMP);
         }
@@ -311,6 +345,18 @@ impl Prepared {
         }
         d.set("ROUGH_BASE", general.rough_base).set("OP_ETA_TABLE", rough_glass || general.rough_base);
         d.set("OP_ONLY", general.dispersion);
+        d.set("TEXTURES", general.textures).set("TEXTURED", general.textured).set("KEPT", general.textured_base);
+        d.set("COLOURS", general.colours).set("MIXTURES", general.mixtures).set("SHARES", general.shares);
+        d.set("TEXEL_NUMBERS", general.mixtures || general.shares);
+        d.set("ATTRIBUTES", general.attributes).set("SMOOTH", general.smooth);
+        if let Some(surfaces) = &self.surfaces {
+            if let Some(first) = surfaces.textures.as_ref().and_then(|textures| textures.first_share) {
+                d.constant("FIRST_SHARE", first);
+            }
+            if let Some(place) = surfaces.visible_place {
+                d.constant("VISIBLE_PLACE", place);
+            }
+        }
         let chooses = self.features.emitters || general.lamps;
         d.set("CHOOSES", chooses).set("AIMS", chooses || general.map.is_some()).set("LAMPS", general.lamps);
         if general.suns > 0 {
@@ -478,7 +524,7 @@ fn spectral_tables(scene: &Scene, needed: &[Needed]) -> Result<(SpectralTables, 
     // General scenes have all of theirs among those needed.
     let plain = if needed.is_empty() { &scene.materials[..] } else { &[] };
     let factors = plain.iter().filter_map(|m| match m.bsdf {
-        Bsdf::Diffuse { reflectance } => Some(reflectance),
+        Bsdf::Diffuse { reflectance: Reflectance::Spectrum(reflectance) } => Some(reflectance),
         _ => None,
     });
     let sources = scene.objects.iter().filter_map(|o| o.emission.as_ref().map(|e| e.radiance));
@@ -497,13 +543,17 @@ fn spectral_tables(scene: &Scene, needed: &[Needed]) -> Result<(SpectralTables, 
     };
     let (factors, sources) = (number(factors.collect()), number(sources.collect()));
     let first = curves.len();
-    let mut exact = Vec::new();
+    let mut exactness = Vec::new();
     for spectrum in needed {
         let (name, curve) = match spectrum {
             Needed::Scene(id) => (&scene.spectra[*id].name, &scene.spectra[*id].curve),
             Needed::Derived(name, curve) => (name, curve),
+            Needed::Pointwise(name, curve) => {
+                exactness.push((curves.len(), Exactness::Pointwise));
+                (name, curve)
+            }
             Needed::Exact(name, curve) => {
-                exact.push(curves.len());
+                exactness.push((curves.len(), Exactness::Exact));
                 (name, curve)
             }
         };
@@ -517,12 +567,15 @@ fn spectral_tables(scene: &Scene, needed: &[Needed]) -> Result<(SpectralTables, 
             format!("{} spectra in use, at most {MAX_SPECTRA} are supported", curves.len()),
         ));
     }
-    Ok((SpectralTables::with_exact(&curves, &exact, &scene.channels), SpectrumIds { factors, sources, needed, names }))
+    Ok((
+        SpectralTables::with_exactness(&curves, &exactness, &scene.channels),
+        SpectrumIds { factors, sources, needed, names },
+    ))
 }
 
 fn material(scene: &Scene, m: &crate::scene::Material, factor: impl Fn(usize) -> u32) -> Material {
     let (factor, albedo) = match m.bsdf {
-        Bsdf::Diffuse { reflectance } => {
+        Bsdf::Diffuse { reflectance: Reflectance::Spectrum(reflectance) } => {
             let curve = &scene.spectra[reflectance].curve;
             let albedo = scene.channels.bounds.iter().map(|b| curve.max(b[0], b[1])).fold(0.0, f64::max);
             // What reflects in no channel is black.
