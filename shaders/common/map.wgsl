@@ -125,11 +125,3 @@ fn find_in_map(direction: vec3<f32>) -> MapSample {
     place.fraction = clamp(vec2<f32>(x - floor(x), y - f32(place.row)), vec2<f32>(0.0), vec2<f32>(1.0));
     return MapSample(direction, map_density_at(place, map_corners(place.column, place.row), sine), place);
 }
-
-// The instruction that looks the map up: X = its value there over the source spectrum.
-fn append_map(list: ptr<function, RecordList>, mode: u32, place: MapPlace, weight: f32) {
-    let fraction = vec2<u32>(place.fraction * 65535.0 + 0.5);
-    (*list).last = (*list).path * frame.max_records + (*list).count;
-    records[(*list).last] = vec4<u32>(OP_MAP | mode, place.column | (place.row << 16u), bitcast<u32>(weight), fraction.x | (fraction.y << 16u));
-    (*list).count += 1u;
-}

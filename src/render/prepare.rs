@@ -313,7 +313,7 @@ impl Prepared {
             modules.push(shader::SHAPES);
         }
         modules.push(shader::BVH);
-        if self.features.emitters || self.features.environment {
+        if self.features.emitters || self.features.environment || self.features.general.is_some() {
             modules.push(shader::LIGHT);
         }
         let Some(general) = &self.features.general else {
@@ -325,9 +325,6 @@ impl Prepared {
         }
         if general.textures {
             modules.push(shader::TEXTURE);
-        }
-        if (general.lamps || general.map.is_some()) && !self.features.emitters && !self.features.environment {
-            modules.push(shader::LIGHT);
         }
         if general.lamps {
             modules.push(shader::LAMP);

@@ -117,7 +117,7 @@ impl Surfaces {
             surfaces.textures = Some(textures);
         }
         surfaces.albedos.clear();
-        // A binding holds at least one.
+        // Where nothing scatters, shaders still bind a part.
         if surfaces.parts.is_empty() {
             surfaces.parts.push(Part::default());
         }
