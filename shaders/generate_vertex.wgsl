@@ -104,12 +104,12 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 
     // The next vertex.
 #if MEDIA
-    var around = vec2<u32>(volumes[1], volumes[2]);
+    var nested = vec2<u32>(volumes[1], volumes[2]);
     if (step.bounce > 0u) {
-        around = states[STATE_WORDS * path + 2u].yz;
+        nested = states[STATE_WORDS * path + 2u].yz;
     }
     var way: Way;
-    let walked = walk(ray, INFINITE, &around, &way, &overflow);
+    let walked = walk(ray, INFINITE, &nested, &way, &overflow);
     let hit = walked.hit;
     append_way(&list, &way, ray, hit.primitive == NONE, 0u, scale);
     let distance = walked.passed + hit.distance;
@@ -442,12 +442,12 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 #endif
 #if MEDIA
             way.count = 0u;
-            var around_light = around;
+            var nested_light = nested;
             let inner = boundaries[hit.primitive] & 0xffu;
-            if (direction.z < 0.0 && inner != 0u && !cross_boundary(&around_light, inner, from_front)) {
+            if (direction.z < 0.0 && inner != 0u && !cross_boundary(&nested_light, inner, from_front)) {
                 overflow = true;
             }
-            if (walk(shadow, shadow_limit, &around_light, &way, &overflow).hit.primitive != NONE) {
+            if (walk(shadow, shadow_limit, &nested_light, &way, &overflow).hit.primitive != NONE) {
                 continue;
             }
 #else
@@ -547,13 +547,13 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     states[STATE_WORDS * path + 1u] = vec4<u32>(bitcast<vec3<u32>>(direction), list.count | (list.used << 16u));
 #if MEDIA
     let behind_surface = boundaries[hit.primitive] & 0xffu;
-    if (i.z < 0.0 && behind_surface != 0u && !cross_boundary(&around, behind_surface, from_front)) {
+    if (i.z < 0.0 && behind_surface != 0u && !cross_boundary(&nested, behind_surface, from_front)) {
         atomicAdd(&counters[COUNTER_OVERFLOW], 1u);
     }
 #if DISPERSION
-    states[STATE_WORDS * path + 2u] = vec4<u32>(live, around, 0u);
+    states[STATE_WORDS * path + 2u] = vec4<u32>(live, nested, 0u);
 #else
-    states[STATE_WORDS * path + 2u] = vec4<u32>(NONE, around, 0u);
+    states[STATE_WORDS * path + 2u] = vec4<u32>(NONE, nested, 0u);
 #endif
 #else
 #if DISPERSION

@@ -73,8 +73,13 @@ impl Accel {
         let (mut degenerate, mut attributes) = (0, Vec::new());
         for (index, object) in scene.objects.iter().enumerate() {
             let first = loose.len();
-            let triangles =
-                collect(&object.shape, object.material.map_or(NO_MATERIAL, |m| m as u32), index as u32, &space, &mut loose);
+            let triangles = collect(
+                &object.shape,
+                object.material.map_or(NO_MATERIAL, |m| m as u32),
+                index as u32,
+                &space,
+                &mut loose,
+            );
             for (primitive, triangle) in loose[first..].iter_mut().zip(&triangles) {
                 primitive.attributes = attach(&object.attributes, *triangle, &mut attributes);
             }

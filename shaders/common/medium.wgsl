@@ -40,21 +40,21 @@ fn cross_boundary(around: ptr<function, vec2<u32>>, number: u32, entering: bool)
 struct Way {
     count: u32,
     volume: array<u32, MOST_STRETCHES>,
-    from: array<f32, MOST_STRETCHES>,
+    start: array<f32, MOST_STRETCHES>,
     to: array<f32, MOST_STRETCHES>,
 }
 
 // Notes the stretch up to `to` in the innermost volume. False where there are too many.
-fn add_stretch(way: ptr<function, Way>, around: vec2<u32>, from: f32, to: f32) -> bool {
+fn add_stretch(way: ptr<function, Way>, around: vec2<u32>, start: f32, to: f32) -> bool {
     let number = around.x & 0xffu;
-    if (number == 0u || !(to > from)) {
+    if (number == 0u || !(to > start)) {
         return true;
     }
     if ((*way).count == MOST_STRETCHES) {
         return false;
     }
     (*way).volume[(*way).count] = number - 1u;
-    (*way).from[(*way).count] = from;
+    (*way).start[(*way).count] = start;
     (*way).to[(*way).count] = to;
     (*way).count += 1u;
     return true;
@@ -105,15 +105,15 @@ fn append_way(list: ptr<function, RecordList>, way: ptr<function, Way>, ray: Ray
             continue;
         }
         let first = volume_at(volume);
-        let from = (*way).from[n];
+        let start = (*way).start[n];
         // Interiors end within the scene, which is some 4 units across.
-        let to = min((*way).to[n], from + 8.0 / length(ray.direction));
-        let metres = (to - from) * speed;
+        let to = min((*way).to[n], start + 8.0 / length(ray.direction));
+        let metres = (to - start) * speed;
 #if GRIDS
         if ((volumes[first] & VOLUME_GRID) != 0u) {
             let glows = mode == 0u && (volumes[first] & VOLUME_EMITS) != 0u;
             append(list, OP_MARCH | mode, volume, select(0.0, scale, glows), metres);
-            append_raw(list, vec4<f32>(to_voxels(first, ray.origin + from * ray.direction), 0.0));
+            append_raw(list, vec4<f32>(to_voxels(first, ray.origin + start * ray.direction), 0.0));
             append_raw(list, vec4<f32>(to_voxels(first, ray.origin + to * ray.direction), 0.0));
             if (glows) {
                 (*list).used = (*list).count;

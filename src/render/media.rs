@@ -157,8 +157,8 @@ impl Media {
         (words[4], words[6]) = (density.0, (density.1 as f32).to_bits());
         words[7..10].copy_from_slice(&size);
         let interior = volume.interior.expect("grids fill interiors");
-        let from_device =
-            DAffine3::from_translation(accel.space.center) * DAffine3::from_scale(DVec3::splat(1.0 / accel.space.scale));
+        let from_device = DAffine3::from_translation(accel.space.center)
+            * DAffine3::from_scale(DVec3::splat(1.0 / accel.space.scale));
         let scaled = DAffine3::from_scale(DVec3::from(size.map(f64::from))) * interior.to_grid * from_device;
         let rows = scaled.matrix3.transpose();
         for (i, value) in [rows.x_axis, rows.y_axis, rows.z_axis, scaled.translation].iter().enumerate() {
@@ -184,8 +184,7 @@ impl Media {
         if self.wavelength.is_none() {
             // µm, linear in every channel.
             let bounds = scene.channels.bounds.iter().flatten();
-            let [low, high] =
-                bounds.fold([f64::INFINITY, 0.0f64], |[low, high], &nm| [low.min(nm), high.max(nm)]);
+            let [low, high] = bounds.fold([f64::INFINITY, 0.0f64], |[low, high], &nm| [low.min(nm), high.max(nm)]);
             let curve = Curve::Linear {
                 nm: vec![low, high],
                 value: vec![low * 1e-3, high * 1e-3],

@@ -219,7 +219,13 @@ impl Prepared {
         let environment_spectrum = scene.environment.as_ref().and_then(|e| e.uniform()).map_or(0, source);
         let mut features = features(scene, &accel, &tables, ids.factors.len() + ids.sources.len());
         let suns = scene.lights.iter().filter(|light| matches!(light, Light::Sun { .. })).count() as u32;
-        let of = |surfaces: &Surfaces| General { lamps: !lamps.is_empty(), suns, map, media: media_shape, ..General::of(surfaces, scene) };
+        let of = |surfaces: &Surfaces| General {
+            lamps: !lamps.is_empty(),
+            suns,
+            map,
+            media: media_shape,
+            ..General::of(surfaces, scene)
+        };
         features.general = surfaces.as_ref().map(of);
         features.registers &= !general;
         let frame = frame(scene, seed, &accel, &picks, environment_spectrum, tables.stratum_bits);
