@@ -1,0 +1,8 @@
+//! Heat and gases: closed forms through the reference path tracer and through devices, and one against the other.
+
+#[path = "../scene_builder/mod.rs"]
+mod scene_builder;
+#[path = "../statistics/mod.rs"]
+mod statistics;
+
+mod reference;
