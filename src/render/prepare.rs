@@ -4,6 +4,7 @@ use crate::accel::{Accel, MAX_MATERIALS};
 use crate::gpu::layout::{EMITS_BOTH_SIDES, Emitter, Frame, Material, NONE};
 use crate::gpu::self_test::LOOP_LIMIT;
 use crate::gpu::shader::{self, Defines, Module};
+use crate::render::heat;
 use crate::render::lights::{LightPicks, STEPS, light_picks};
 use crate::render::surfaces::{Kind, Needed, Surfaces};
 use crate::scene::{Bsdf, Environment, Filter, Light, Projection, Sampler, Scene, Sides};
@@ -93,6 +94,7 @@ impl Prepared {
     /// counters have bits for.
     pub fn new(scene: &Scene, seed: u64) -> Result<Prepared> {
         check_lights(scene)?;
+        let scene = &*heat::as_emission(scene)?;
         let accel = Accel::build(scene);
         if scene.materials.len() > MAX_MATERIALS {
             return Err(Error::input(&scene.file, format!("more than {MAX_MATERIALS} materials")));
