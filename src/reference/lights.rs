@@ -169,6 +169,8 @@ fn heat(scene: &Scene, bsdf: &Bsdf) -> Option<Vec<f64>> {
     let mut spectra = SpectralValues::new(scene);
     spectra.begin(0.5);
     spectra.fill(bsdf.spectra());
+    // Any place will do: what is chosen too seldom there is met instead.
+    spectra.look_up(bsdf.textures(), glam::DVec2::splat(0.5));
     let (mut sum, mut directions) = (vec![0.0; scene.channels.len()], 0.0);
     for o in hemisphere() {
         directions += 1.0;

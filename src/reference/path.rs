@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use glam::{DAffine3, DMat3, DVec3};
+use glam::{DAffine3, DVec3};
 
 use super::bsdf::{Bsdf, SpectralValues, Vertex};
 use super::camera;
@@ -12,6 +12,7 @@ use super::gas::{self, Piece};
 use super::lights::{LightPoint, Lights, Target, disk_solid_angle, emits, sample_disk};
 use super::primitive::{Ray, SurfacePoint};
 use super::rng::Rng;
+use super::shading::Shading;
 use super::sky::Sky;
 use super::world::{Hit, World};
 use crate::scene::{Bsdf as Description, Environment, Interior, Light, Projection, Scene, SpectrumId};
@@ -178,7 +179,10 @@ impl<'a> Tracer<'a> {
             }
 
             let inside = hit.point.normal.dot(ray.direction) > 0.0;
-            let frame = self.frame(hit.primitive, &hit.point, inside);
+            let geometric = if inside { -hit.point.normal } else { hit.point.normal };
+            let shading = Shading::new(&object.attributes, &self.world.primitives[hit.primitive], &hit.point);
+            path.spectra.look_up(bsdf.textures(), shading.uv);
+            let frame = shading.frame(geometric, inside, -ray.direction);
             let o = frame.transpose() * -ray.direction;
             if o.z <= 0.0 {
                 // Along the surface to the last bit.
@@ -186,8 +190,9 @@ impl<'a> Tracer<'a> {
             }
             let Path { spectra, throughput, alive, radiance, factor, emitted, interiors } = &mut *path;
             let Some(scattering) = bsdf.at(Vertex { o, inside, spectra, alive: alive.clone() }) else { return };
-            let pieces = aim.as_ref().and_then(|aim| self.way_to(&hit, inside, aim, interiors));
-            if let Some((aim, pieces)) = aim.zip(pieces) {
+            let kept = aim.filter(|aim| shading.keeps_side(geometric, &frame, aim.direction));
+            let pieces = kept.as_ref().and_then(|aim| self.way_to(&hit, inside, aim, interiors));
+            if let Some((aim, pieces)) = kept.zip(pieces) {
                 pieces.iter().for_each(|piece| piece.pass(spectra, alive.clone(), emitted, None));
                 let scattered = scattering.evaluate(frame.transpose() * aim.direction, factor);
                 // The balance heuristic leaves f cosθ over the sum of both densities by solid angle.
@@ -217,18 +222,15 @@ impl<'a> Tracer<'a> {
             }
             ray_density = next.density;
             let direction = (frame * next.direction).normalize();
-            if next.direction.z < 0.0 {
-                cross(interiors, object.interior, !inside);
+            if !shading.keeps_side(geometric, &frame, direction) {
+                return;
+            }
+            let goes_inside = hit.point.normal.dot(direction) < 0.0;
+            if goes_inside != inside {
+                cross(interiors, object.interior, goes_inside);
             }
             ray = Ray { origin: self.world.leave(hit.primitive, &hit.point, direction), direction };
         }
-    }
-
-    /// Columns: tangent, bitangent and the normal on the side that the ray came from.
-    fn frame(&self, primitive: usize, point: &SurfacePoint, inside: bool) -> DMat3 {
-        let normal = if inside { -point.normal } else { point.normal };
-        let tangent = self.world.primitives[primitive].surface.tangent(point);
-        DMat3::from_cols(tangent, normal.cross(tangent), normal)
     }
 
     /// Emission of the surface that a ray meets.
@@ -260,12 +262,15 @@ impl<'a> Tracer<'a> {
         }
         path.spectra.fill(emission.as_slice());
         path.spectra.fill(bsdf.map_or(&[], |bsdf| bsdf.spectra()));
+        let geometric = if inside { -point.normal } else { point.normal };
+        let shading = Shading::new(&object.attributes, &self.world.primitives[primitive], point);
+        path.spectra.look_up(bsdf.map_or(&[], |bsdf| bsdf.textures()), shading.uv);
         let Path { spectra, alive, emitted, .. } = path;
         for k in alive.clone() {
             emitted[k] = emission.map_or(0.0, |spectrum| spectra.value(spectrum, k));
         }
         if let Some(bsdf) = bsdf {
-            let o = self.frame(primitive, point, inside).transpose() * towards;
+            let o = shading.frame(geometric, inside, towards).transpose() * towards;
             bsdf.emit(&Vertex { o, inside, spectra, alive: alive.clone() }, emitted);
         }
         true

@@ -3,7 +3,7 @@
 
 use std::borrow::Cow;
 
-use crate::scene::{Bsdf, Emission, MaterialId, Scene, Sides, Spectrum};
+use crate::scene::{Bsdf, Emission, MaterialId, Reflectance, Scene, Sides, Spectrum, Weight};
 use crate::spectral::{Channels, Curve, Outside, planck};
 use crate::{Error, Result};
 
@@ -67,9 +67,20 @@ fn collect<'a>(
     let material = &scene.materials[id];
     let kelvin = material.temperature.or(kelvin);
     let kind = match material.bsdf {
-        Bsdf::Blend { a, b, weight: of_b } => {
+        Bsdf::Blend { a, b, weight: Weight::Constant(of_b) } => {
             collect(scene, a, weight * (1.0 - of_b), kelvin, out)?;
             return collect(scene, b, weight * of_b, kelvin, out);
+        }
+        Bsdf::Blend { a, b, .. } => {
+            let (mut hot, start) = (Vec::new(), material.temperature.or(kelvin));
+            for part in [a, b] {
+                collect(scene, part, weight, start, &mut hot)?;
+            }
+            if hot.is_empty() {
+                return Ok(());
+            }
+            let what = format!("material \"{}\" is hot and blended by a texture", material.name);
+            return Err(refusal(scene, &what, "blend by a number, or remove the `temperature`"));
         }
         Bsdf::Diffuse { .. } => "diffuse",
         Bsdf::Black => "black",
@@ -85,7 +96,11 @@ fn collect<'a>(
                 format!("material \"{}\" is hot and one-sided: its back would emit as a black body", material.name);
             return Err(refusal(scene, &what, "remove two_sided = false, or the `temperature`"));
         }
-        Bsdf::Diffuse { reflectance } => Some(&scene.spectra[reflectance].curve),
+        Bsdf::Diffuse { reflectance: Reflectance::Spectrum(spectrum) } => Some(&scene.spectra[spectrum].curve),
+        Bsdf::Diffuse { .. } => {
+            let what = format!("material \"{}\" is hot and textured", material.name);
+            return Err(refusal(scene, &what, "give it one reflectance, or remove the `temperature`"));
+        }
         Bsdf::Black => None,
         _ => {
             let what = format!("material \"{}\" is hot and of kind `{kind}`", material.name);

@@ -44,7 +44,14 @@ impl Builder {
     /// A null boundary around the last medium.
     pub fn null(mut self, shape: Shape) -> Self {
         let name = format!("objects.{}", self.0.objects.len());
-        self.0.objects.push(Object { name, shape, material: None, emission: None, interior: None });
+        self.0.objects.push(Object {
+            name,
+            shape,
+            material: None,
+            emission: None,
+            interior: None,
+            attributes: Default::default(),
+        });
         self.filled()
     }
 

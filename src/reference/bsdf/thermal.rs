@@ -6,13 +6,15 @@ use std::sync::Arc;
 use super::{Vertex, fresnel};
 use crate::scattering::fresnel::{mean_conductor, mean_dielectric};
 use crate::scattering::{DielectricAlbedo, FACET_COSINES, FacetCosines, ReflectionAlbedo, facet_cosine, index_range};
-use crate::scene::{Bsdf as Description, SMOOTH, Scene, SpectrumId};
+use crate::scene::{Bsdf as Description, Material, Reflectance, SMOOTH, Scene, SpectrumId, TextureId};
 use crate::spectral::planck;
 
 /// One material, of a blend or by itself, at a temperature.
 pub struct Hot {
     /// Share of a blend.
     pub weight: f64,
+    /// Shares by texture, or what they leave.
+    shares: Vec<(TextureId, bool)>,
     pub kelvin: f64,
     /// Whether its back is as its front; otherwise it is black.
     pub two_sided: bool,
@@ -23,7 +25,7 @@ pub struct Hot {
 enum Absorber {
     Black,
     Diffuse {
-        reflectance: SpectrumId,
+        reflectance: Reflectance,
     },
     Mirror {
         eta: SpectrumId,
@@ -37,11 +39,11 @@ enum Absorber {
         again: Option<ReflectionAlbedo>,
     },
     Varnish {
-        reflectance: SpectrumId,
+        reflectance: Reflectance,
         eta: SpectrumId,
     },
     RoughPlastic {
-        reflectance: SpectrumId,
+        reflectance: Reflectance,
         eta: SpectrumId,
         facets: FacetCosines,
         /// As the base has it.
@@ -51,9 +53,15 @@ enum Absorber {
 
 impl Hot {
     /// `None` for what absorbs nothing.
-    pub fn new(scene: &Scene, bsdf: &Description, weight: f64, kelvin: f64, two_sided: bool) -> Option<Self> {
+    pub fn new(
+        scene: &Scene,
+        material: &Material,
+        weight: f64,
+        shares: &[(TextureId, bool)],
+        kelvin: f64,
+    ) -> Option<Self> {
         let smooth = |alpha: f64| alpha < SMOOTH;
-        let absorber = match *bsdf {
+        let absorber = match material.bsdf {
             Description::Black => Absorber::Black,
             Description::Diffuse { reflectance } => Absorber::Diffuse { reflectance },
             Description::Conductor { eta, k, roughness, .. } if smooth(roughness[0]) => Absorber::Mirror { eta, k },
@@ -73,13 +81,18 @@ impl Hot {
             }
             Description::Dielectric { .. } | Description::Blend { .. } => return None,
         };
-        Some(Hot { weight, kelvin, two_sided, absorber })
+        Some(Hot { weight, shares: shares.to_vec(), kelvin, two_sided: material.two_sided, absorber })
     }
 
     /// Adds weight · ε · B of every live channel to `out`.
     pub fn add(&self, at: &Vertex, out: &mut [f64]) {
+        let share = |&(texture, missing): &(TextureId, bool)| {
+            let number = at.spectra.number(texture);
+            if missing { 1.0 - number } else { number }
+        };
+        let weight = self.weight * self.shares.iter().map(share).product::<f64>();
         for k in at.alive.clone() {
-            out[k] += self.weight * self.emittance(at, k) * planck::radiance(at.spectra.wavelength(k), self.kelvin);
+            out[k] += weight * self.emittance(at, k) * planck::radiance(at.spectra.wavelength(k), self.kelvin);
         }
     }
 
@@ -96,7 +109,7 @@ impl Hot {
         };
         match &self.absorber {
             Absorber::Black => 1.0,
-            Absorber::Diffuse { reflectance } => 1.0 - value(*reflectance),
+            Absorber::Diffuse { reflectance } => 1.0 - at.spectra.reflectance(*reflectance, k),
             Absorber::Mirror { eta, k } => 1.0 - fresnel::conductor(at.o.z, value(*eta), value(*k)),
             Absorber::RoughMetal { eta, k, facets, again } => {
                 let (eta, k) = (value(*eta), value(*k));
@@ -112,11 +125,11 @@ impl Hot {
                 (once + lost - comes_back).max(0.0)
             }
             Absorber::Varnish { reflectance, eta } => {
-                let (rho, eta) = (value(*reflectance), value(*eta));
+                let (rho, eta) = (at.spectra.reflectance(*reflectance, k), value(*eta));
                 (1.0 - fresnel::dielectric(at.o.z, eta)) * kept(rho, eta, mean_dielectric(eta))
             }
             Absorber::RoughPlastic { reflectance, eta, facets, coat } => {
-                let (rho, eta) = (value(*reflectance), value(*eta));
+                let (rho, eta) = (at.spectra.reflectance(*reflectance, k), value(*eta));
                 let reflected: [f64; FACET_COSINES] =
                     std::array::from_fn(|j| fresnel::dielectric(facet_cosine(j), eta));
                 let enters = 1.0 - coat.reflected(eta, false, at.o.z);
