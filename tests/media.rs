@@ -256,10 +256,14 @@ fn isothermal_cavity_with_gas() {
     let cube = (DVec3::new(-0.9, -0.7, -0.8), DVec3::new(0.8, 0.9, 0.7));
     let voxels = || grid([5, 4, 3], |[x, y, z]| f64::from((7 * x + 3 * y + 5 * z) % 4));
     type Add<'a> = &'a dyn Fn(Builder) -> Builder;
-    let cases: [(&str, Add); 4] = [
+    let cases: [(&str, Add); 5] = [
         ("gas", &|b| b.medium(curve(), hot(), Field::Constant(1.0)).null(ball())),
         ("voxels", &|b| b.medium(curve(), hot(), voxels()).null_box(cube.0, cube.1)),
         ("glass", &|b| b.dielectric(ball(), glass_curve(), 0.0).medium(curve(), hot(), Field::Constant(1.0)).filled()),
+        ("voxels in glass", &|b| {
+            let b = b.dielectric(cuboid(cube.0, cube.1), 1.5, 0.0).medium(curve(), hot(), voxels());
+            b.filled_from(cube.0, cube.1)
+        }),
         ("around a matt ball", &|b| {
             b.diffuse(sphere(DVec3::ZERO, 0.3), 1.0).medium(curve(), hot(), voxels()).null_box(cube.0, cube.1)
         }),

@@ -37,6 +37,12 @@ fn march(record: vec4<u32>, start: vec3<f32>, to: vec3<f32>, quad: u32, s: Spect
     let temperature_at = volumes[first + 3u];
     let density_at = volumes[first + 4u];
     let wavelength = spectrum_value(WAVELENGTH, quad, s);
+    // In matter of index n sources are n^2 of those in a vacuum.
+    var squares = vec4<f32>(1.0);
+    if (volumes[first + 23u] != NONE) {
+        let index = spectrum_value(volumes[first + 23u], quad, s);
+        squares = index * index;
+    }
     var done = 0.0;
     let most = u32(size.x + size.y + size.z) + 3u;
     for (var n = 0u; n < most; n += 1u) {
@@ -56,7 +62,7 @@ fn march(record: vec4<u32>, start: vec3<f32>, to: vec3<f32>, quad: u32, s: Spect
                 let depth = (metres * (end - done) * density) * absorption(volumes[first + 22u], kelvin, quad, s);
                 let lost = absorbed(depth);
                 if (emission > 0.0) {
-                    *radiance += emission * *through * lost * planck(wavelength, kelvin);
+                    *radiance += emission * *through * lost * squares * planck(wavelength, kelvin);
                 }
                 *through *= exp(-depth);
             }

@@ -87,8 +87,9 @@ fn walk(ray: Ray, limit: f32, around: ptr<function, vec2<u32>>, way: ptr<functio
         if (number != 0u && !cross_boundary(around, number, entering)) {
             *overflow = true;
         }
-        walked.passed += walked.hit.distance;
         walked.ray.origin = offset_origin(surface.position, select(surface.normal, -surface.normal, entering));
+        // To where the rest starts, a little beyond the boundary: what is left must not lead past its end.
+        walked.passed = dot(walked.ray.origin - ray.origin, ray.direction) / dot(ray.direction, ray.direction);
     }
     *overflow = true;
     return walked;

@@ -185,10 +185,6 @@ pub fn check(scene: &Scene) -> Result<()> {
     if width == 0 || height == 0 || scene.channels.is_empty() {
         return Err(Error::input(&scene.file, "there is nothing to render: no pixels or no channels"));
     }
-    if let Some(hot) = scene.materials.iter().find(|m| m.temperature.is_some()) {
-        let message = format!("material \"{}\" has a `temperature`, which cannot be rendered yet: remove it", hot.name);
-        return Err(Error::input(&scene.file, message));
-    }
     Ok(())
 }
 
