@@ -17,7 +17,7 @@ use spectile::spectral::{Channels, Curve};
 const MAX_PLAIN_BYTES: usize = 18 << 10;
 const MAX_BYTES: usize = 32 << 10;
 /// Of general scenes, by what their materials need.
-const MAX_GENERAL_BYTES: usize = 48 << 10;
+const MAX_GENERAL_BYTES: usize = 64 << 10;
 
 fn plain_scene() -> Scene {
     Builder::new()
