@@ -7,11 +7,11 @@ use std::path::Path;
 
 use glam::{DAffine3, DVec2, DVec3, dvec2, dvec3};
 
-use crate::gases;
-use crate::mesh::{Mesh, Part};
-use crate::plume::{self, noise};
-use crate::shape::{Random, Wrap, cuboid, cushion, grid, lathe, profile, quad, tube};
-use crate::sky::Sky;
+use super::gases;
+use super::mesh::{Mesh, Part};
+use super::plume::{self, noise};
+use super::shape::{Random, Wrap, cuboid, cushion, grid, lathe, profile, quad, tube};
+use super::sky::Sky;
 
 /// Of the sun, in degrees from +x towards +z.
 const SUN_AZIMUTH: f64 = 100.0;
@@ -243,7 +243,7 @@ fn engine_frame(side: f64) -> DAffine3 {
 
 fn smooth(points: &[(f64, f64)], count: usize) -> Vec<DVec2> {
     let points: Vec<_> = points.iter().map(|&(r, y)| dvec3(r, y, 0.0)).collect();
-    crate::shape::curve(&points, count).iter().map(|p| dvec2(p.x.max(0.0), p.y)).collect()
+    super::shape::curve(&points, count).iter().map(|p| dvec2(p.x.max(0.0), p.y)).collect()
 }
 
 /// What is cold, and what is hot.

@@ -7,9 +7,9 @@ use std::path::Path;
 
 use glam::{DAffine3, DVec3, dvec2, dvec3};
 
-use crate::image::abundances;
-use crate::mesh::{Mesh, Part};
-use crate::shape::{Random, Wrap, cuboid, curve, cushion, grid, lathe, profile, quad, sphere, tube};
+use super::image::abundances;
+use super::mesh::{Mesh, Part};
+use super::shape::{Random, Wrap, cuboid, curve, cushion, grid, lathe, profile, quad, sphere, tube};
 
 const SIZE: DVec3 = dvec3(9.0, 2.9, 6.5);
 /// Where the table stands, and its half length and width.

@@ -2,12 +2,14 @@
 //!
 //! CO2: lines of a linear molecule. Energies from the constants of Herzberg, *Infrared and Raman Spectra* (1945), and
 //! Rothman et al., JQSRT 48, 537 (1992), bands of a harmonic oscillator's relative strengths with anharmonic origins.
-//! H2O: the exponential wide band model. Total intensities of both: Edwards and Balakrishnan, IJHMT 16, 25 (1973), as
+//! H2O: lines of an asymmetric top, see [`water`]. Total intensities of both: Edwards and Balakrishnan, IJHMT 16, 25 (1973), as
 //! tabulated in Modest, *Radiative Heat Transfer*, chapter "Molecular gases".
 
 use std::fmt::Write as _;
 use std::io;
 use std::path::Path;
+
+use super::water::{self, Line};
 
 /// K; the columns of the tables.
 const TEMPERATURES: [f64; 9] = [250.0, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0, 900.0, 1000.0];
@@ -21,17 +23,18 @@ const SMOOTHING: f64 = 4.0;
 const C2: f64 = 1.438_776_877;
 /// Molecules in a cm3 at 1 atm and 1 K.
 const LOSCHMIDT: f64 = 7.338_9e21;
-/// Edwards' intensities hold at this temperature, K.
-const T0: f64 = 100.0;
 const AVOGADRO: f64 = 6.022_140_76e23;
 
 /// Writes `co2.csv` and `h2o.csv`: `nm` and a column of m-1 atm-1 for each temperature.
 pub fn write(folder: &Path) -> io::Result<()> {
     let count = ((TO - FROM) / STEP) as usize + 1;
     let mut tables = [Vec::new(), Vec::new()];
+    // Edwards' intensities hold for molecules without vibration.
+    let lines = water::lines(FROM, TO, 18.015 * 1e4 / AVOGADRO);
+    let rotations = water::rotations();
     for kelvin in TEMPERATURES {
         tables[0].push(co2(kelvin, count));
-        tables[1].push(h2o(kelvin, count));
+        tables[1].push(h2o(kelvin, &lines, &rotations, count));
     }
     for (name, columns) in ["co2", "h2o"].into_iter().zip(tables) {
         let mut text = format!(
@@ -89,7 +92,7 @@ fn co2(kelvin: f64, count: usize) -> Vec<f64> {
     let vibrations: f64 = states.iter().map(|v| co2_state(*v)).map(|(energy, g, _)| g * boltzmann(energy)).sum();
     let mut bins = vec![0.0; count];
     for Band { origin, quanta, intensity } in CO2 {
-        // cm per molecule: at T0 all molecules are in the ground state.
+        // cm per molecule, for molecules without vibration.
         let strength = intensity * MASS * 1e4 / AVOGADRO;
         for v @ [v1, v2, v3] in states.iter().copied() {
             let (energy, g, b) = co2_state(v);
@@ -116,7 +119,12 @@ fn co2(kelvin: f64, count: usize) -> Vec<f64> {
             }
         }
     }
-    smooth(&bins).iter().map(|s| s / STEP * LOSCHMIDT / kelvin * 100.0).collect()
+    coefficient(&bins, kelvin)
+}
+
+/// m-1 atm-1 from sums of line strengths in cm per molecule.
+fn coefficient(bins: &[f64], kelvin: f64) -> Vec<f64> {
+    smooth(bins).iter().map(|s| s / STEP * LOSCHMIDT / kelvin * 100.0).collect()
 }
 
 /// Adds a line to the two nearest bins, by nearness.
@@ -140,43 +148,14 @@ fn smooth(bins: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// The bands of H2O: centre and width at T0 in cm-1, and for each transition the quanta it adds to v1, v2, v3 and its
-/// intensity at T0 in cm-1 / (g m-2).
-type WideBand = (f64, f64, &'static [([u32; 3], f64)]);
-const H2O: [WideBand; 5] = [
-    (1600.0, 56.4, &[([0, 1, 0], 41.2)]),
-    // Edwards counts the overtone to the band at 2.7 um; it stands at 3.2 um by itself.
-    (3151.0, 60.0, &[([0, 2, 0], 0.19)]),
-    (3760.0, 60.0, &[([1, 0, 0], 2.30), ([0, 0, 1], 22.40)]),
-    (5350.0, 43.1, &[([0, 1, 1], 3.0)]),
-    (7250.0, 32.0, &[([1, 0, 1], 2.5)]),
-];
-
-/// S/d = alpha / omega exp(-2 |eta - centre| / omega), times the density of H2O at 1 atm.
-fn h2o(kelvin: f64, count: usize) -> Vec<f64> {
-    const FUNDAMENTALS: [f64; 3] = [3652.0, 1595.0, 3756.0];
-    let density = 101_325.0 * 18.015 / (8.314_462_6 * kelvin);
-    // Emission by stimulation, and the mean of the oscillators' matrix elements over their populations.
-    let relative = |quanta: [u32; 3], t: f64| {
-        let total: f64 = (0..3).map(|k| FUNDAMENTALS[k] * f64::from(quanta[k])).sum();
-        let elements: f64 = (0..3)
-            .map(|k| {
-                let weight = |v: u32| (-C2 * FUNDAMENTALS[k] * f64::from(v) / t).exp();
-                let rises = |v: u32| (1..=quanta[k]).map(|j| f64::from(v + j)).product::<f64>();
-                (0..60).map(|v| rises(v) * weight(v)).sum::<f64>() / (0..60).map(weight).sum::<f64>()
-            })
-            .product();
-        (1.0 - (-C2 * total / t).exp()) * elements
-    };
-    let mut values = vec![0.0; count];
-    for (centre, width, transitions) in H2O {
-        let omega = width * (kelvin / T0).sqrt();
-        let alpha: f64 =
-            transitions.iter().map(|&(quanta, at_t0)| at_t0 * relative(quanta, kelvin) / relative(quanta, T0)).sum();
-        for (i, value) in values.iter_mut().enumerate() {
-            let eta = FROM + STEP * i as f64;
-            *value += density * alpha / omega * (-2.0 * (eta - centre).abs() / omega).exp();
-        }
+/// Lines of H2O at one temperature: by the population of their lower states, and less what is emitted by stimulation.
+fn h2o(kelvin: f64, lines: &[Line], rotations: &[(f64, f64)], count: usize) -> Vec<f64> {
+    let boltzmann = |energy: f64| (-C2 * energy / kelvin).exp();
+    let states: f64 = rotations.iter().map(|(energy, g)| g * boltzmann(*energy)).sum::<f64>()
+        * water::vibrations().map(boltzmann).sum::<f64>();
+    let mut bins = vec![0.0; count];
+    for line in lines {
+        add(&mut bins, line.nu, line.strength * boltzmann(line.energy) / states * (1.0 - boltzmann(line.nu)));
     }
-    values
+    coefficient(&bins, kelvin)
 }

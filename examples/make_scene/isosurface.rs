@@ -5,7 +5,7 @@ use std::collections::HashMap;
 
 use glam::{DVec3, dvec3};
 
-use crate::mesh::Part;
+use super::mesh::Part;
 
 /// Distance to a segment's neighbourhood.
 pub fn capsule(p: DVec3, a: DVec3, b: DVec3, radius: f64) -> f64 {

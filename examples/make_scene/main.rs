@@ -15,28 +15,36 @@ mod plume;
 mod shape;
 mod sky;
 mod statues;
+mod water;
 
+use std::io;
 use std::path::Path;
 use std::process::ExitCode;
+
+pub const NAMES: [&str; 3] = ["conference", "aircraft", "statues"];
+
+/// Makes what the scene in the folder `scene` needs, in its folder `generated`.
+pub fn make(name: &str, scene: &Path) -> io::Result<()> {
+    let folder = &scene.join("generated");
+    std::fs::create_dir_all(folder)?;
+    match name {
+        "conference" => conference::make(folder),
+        "aircraft" => aircraft::make(scene, folder),
+        "statues" => statues::make(scene, folder),
+        _ => Err(io::Error::other(format!("there is no scene `{name}` to make"))),
+    }
+}
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [name, scene] = &arguments[..] else {
-        eprintln!("usage: make_scene conference|aircraft|statues SCENE_FOLDER");
+        eprintln!("usage: make_scene {} SCENE_FOLDER", NAMES.join("|"));
         return ExitCode::from(2);
     };
-    let scene = Path::new(scene);
-    let folder = &scene.join("generated");
-    let made = std::fs::create_dir_all(folder).and_then(|()| match name.as_str() {
-        "conference" => conference::make(folder),
-        "aircraft" => aircraft::make(scene, folder),
-        "statues" => statues::make(scene, folder),
-        other => Err(std::io::Error::other(format!("there is no scene `{other}` to make"))),
-    });
-    match made {
+    match make(name, Path::new(scene)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("make_scene: {}: {error}", folder.display());
+            eprintln!("make_scene: {scene}: {error}");
             ExitCode::FAILURE
         }
     }

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DMat3, DVec2, DVec3, dvec2, dvec3};
 
-use crate::mesh::Part;
+use super::mesh::Part;
 
 /// How a grid closes.
 #[derive(Clone, Copy, PartialEq)]

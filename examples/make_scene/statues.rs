@@ -7,9 +7,9 @@ use std::path::Path;
 
 use glam::{DAffine3, DVec3, dvec2, dvec3};
 
-use crate::isosurface::{self, blend, capsule, ellipsoid};
-use crate::mesh::{Mesh, Part};
-use crate::shape::{Wrap, curve, cushion, grid, lathe, polyhedron, profile, quad, ring, tube};
+use super::isosurface::{self, blend, capsule, ellipsoid};
+use super::mesh::{Mesh, Part};
+use super::shape::{Wrap, curve, cushion, grid, lathe, polyhedron, profile, quad, ring, tube};
 
 pub fn make(scene: &Path, folder: &Path) -> io::Result<()> {
     let write = |name: &str, material: &str, part: Part| {
@@ -24,7 +24,7 @@ pub fn make(scene: &Path, folder: &Path) -> io::Result<()> {
     copper.add("copper", amphora());
     copper.write(&folder.join("amphora.obj"))?;
     terrace().write(&folder.join("terrace.obj"))?;
-    crate::image::soften_sun(&scene.join("sky.hdr"), &folder.join("sky.hdr"))
+    super::image::soften_sun(&scene.join("sky.hdr"), &folder.join("sky.hdr"))
 }
 
 /// Where each statue stands, and how high its plinth is.
