@@ -34,7 +34,7 @@ pub enum Existing {
 enum Way {
     Create(PathBuf),
     Replace(PathBuf),
-    GoOn(Cube),
+    GoOn(Box<Cube>),
 }
 
 /// Whether [`super::Writer::open`] may work on `tiles` of a cube at `path`, as far as can be told without changing
@@ -58,7 +58,7 @@ fn refuse_in_use(held: Option<Range<u32>>, path: &Path) -> Result<()> {
 /// several processes comes second finds the first one's.
 pub(super) fn open_or_create(path: &Path, header: &Header, existing: Existing, tiles: &Range<u32>) -> Result<Cube> {
     let (target, old) = match find_way(path, header, existing, tiles)? {
-        Way::GoOn(cube) => return Ok(cube),
+        Way::GoOn(cube) => return Ok(*cube),
         Way::Create(target) => (target, None),
         Way::Replace(target) => {
             let lock = TileLock::take(&target, &target.join(PRIVATE), ALL_TILES)?;
@@ -89,7 +89,7 @@ pub(super) fn open_or_create(path: &Path, header: &Header, existing: Existing, t
             Err(error) if matches!(error.kind(), ErrorKind::DirectoryNotEmpty | ErrorKind::AlreadyExists) => {
                 // Another process was quicker. Joining is what was asked for, or it is an error.
                 return match find_way(path, header, existing, tiles)? {
-                    Way::GoOn(cube) => Ok(cube),
+                    Way::GoOn(cube) => Ok(*cube),
                     _ => Err(failed(error)),
                 };
             }
@@ -129,7 +129,7 @@ fn find_way(path: &Path, header: &Header, existing: Existing, tiles: &Range<u32>
                 // What a killed process left aside goes first.
                 check_space(path, cube.path(), header, missing as u64, folder_bytes(&cube.aside_folder()))?;
             }
-            Ok(Way::GoOn(cube))
+            Ok(Way::GoOn(Box::new(cube)))
         }
         Existing::Resume => {
             let what = "there is no such cube to go on with; leave --resume out to begin it";

@@ -1,5 +1,6 @@
 //! Readers and writers of other people's formats; they know no GPU.
 
+pub mod image;
 pub mod obj;
 pub mod plot;
 pub mod png;

@@ -4,6 +4,7 @@ pub mod channels;
 pub mod colour;
 pub mod curve;
 mod data;
+mod derived;
 pub mod planck;
 pub mod table;
 pub mod upsample;
