@@ -67,7 +67,14 @@ impl Accel {
         let mut loose = Vec::new();
         let mut degenerate = 0;
         for (index, object) in scene.objects.iter().enumerate() {
-            collect(&object.shape, object.material as u32, index as u32, &space, &mut loose, &mut degenerate);
+            collect(
+                &object.shape,
+                object.material.map_or(NONE, |m| m as u32),
+                index as u32,
+                &space,
+                &mut loose,
+                &mut degenerate,
+            );
         }
         let has_shapes = loose.iter().any(|p| p.tag >> 24 != 0);
         let (nodes, order, depth) = build_nodes(&loose);

@@ -38,6 +38,24 @@ pub fn parse_index(bytes: &[u8], path: &Path) -> Result<[SpectrumTable; 2], Box<
     Ok([parse(bytes, path, Column::OfIndex("n"))?, parse(bytes, path, Column::OfIndex("k"))?])
 }
 
+/// Every column beside the wavelength, with the name that the header gives it.
+pub fn read_columns(path: &Path) -> Result<Vec<(String, SpectrumTable)>, Box<Problem>> {
+    parse_columns(&read(path)?, path)
+}
+
+/// [`read_columns`] on the content of the file.
+pub fn parse_columns(bytes: &[u8], path: &Path) -> Result<Vec<(String, SpectrumTable)>, Box<Problem>> {
+    let text = String::from_utf8_lossy(bytes);
+    let header = text.trim_start_matches('\u{feff}').lines();
+    let header = header.map(|line| line.split('#').next().unwrap_or("").trim()).find(|line| !line.is_empty());
+    let names = header.map_or_else(Vec::new, |header| Separator::of(header).split(header));
+    if let [_] | [] = names[..] {
+        // Says what is wrong.
+        return parse(bytes, path, Column::Only).map(|table| vec![(String::new(), table)]);
+    }
+    names[1..].iter().map(|name| Ok(((*name).to_owned(), parse(bytes, path, Column::Named(name))?))).collect()
+}
+
 /// Which column of a file is wanted.
 #[derive(Clone, Copy)]
 enum Column<'a> {

@@ -10,6 +10,7 @@ mod lights;
 mod path;
 mod primitive;
 mod rng;
+mod sky;
 mod world;
 
 use std::num::NonZeroUsize;
@@ -175,14 +176,19 @@ mod tests {
                 name: "grey".into(),
                 bsdf: crate::scene::Bsdf::Diffuse { reflectance: 0 },
                 two_sided: true,
+                temperature: None,
             }],
             objects: vec![crate::scene::Object {
                 name: "ball".into(),
                 shape: Shape::Sphere { center: DVec3::ZERO, radius: 1.0 },
-                material: 0,
+                material: Some(0),
                 emission: None,
+                interior: None,
             }],
-            environment: Some(Environment { radiance: 1 }),
+            media: vec![],
+            camera_medium: None,
+            lights: vec![],
+            environment: Some(Environment::Uniform(1)),
             warnings: vec![],
             digest: String::new(),
         }

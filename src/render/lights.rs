@@ -1,7 +1,7 @@
 //! Decision probabilities of next-event estimation (DESIGN section 6), common to all channels.
 
 use crate::accel::Accel;
-use crate::scene::{Scene, Sides};
+use crate::scene::{Environment, Scene, Sides};
 use std::f64::consts::PI;
 
 /// With which probability next-event estimation asks which light.
@@ -35,8 +35,8 @@ pub fn light_picks(scene: &Scene, accel: &Accel, environment: bool) -> LightPick
     }
     let spectrum = |group: Option<usize>| match (group, &scene.environment) {
         (Some(s), _) => s,
-        (None, Some(environment)) => environment.radiance,
-        (None, None) => unreachable!("only an environment adds a group without emitters"),
+        (None, Some(Environment::Uniform(radiance))) => *radiance,
+        (None, _) => unreachable!("only an environment adds a group without emitters"),
     };
     let shares = probabilities(
         &groups

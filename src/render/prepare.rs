@@ -6,7 +6,7 @@ use crate::gpu::self_test::LOOP_LIMIT;
 use crate::gpu::shader::{self, Defines, Module};
 use crate::render::lights::{LightPicks, STEPS, light_picks};
 use crate::render::surfaces::{Kind, Needed, Surfaces};
-use crate::scene::{Bsdf, Filter, Projection, Sampler, Scene, Sides};
+use crate::scene::{Bsdf, Environment, Filter, Light, Projection, Sampler, Scene, Sides};
 use crate::spectral::Curve;
 use crate::spectral::table::SpectralTables;
 use crate::{Error, Result};
@@ -92,6 +92,7 @@ impl Prepared {
     /// Flattens `scene`. Errors: materials that no shader knows; more materials, spectra or bounces than ids and
     /// counters have bits for.
     pub fn new(scene: &Scene, seed: u64) -> Result<Prepared> {
+        check_lights(scene)?;
         let accel = Accel::build(scene);
         if scene.materials.len() > MAX_MATERIALS {
             return Err(Error::input(&scene.file, format!("more than {MAX_MATERIALS} materials")));
@@ -121,7 +122,7 @@ impl Prepared {
                 Emitter { primitive, spectrum: source(emission.radiance) | sides, pick: pick as f32, area: area as f32 }
             })
             .collect();
-        let environment_spectrum = scene.environment.as_ref().map_or(0, |e| source(e.radiance));
+        let environment_spectrum = scene.environment.as_ref().and_then(|e| e.uniform()).map_or(0, source);
         let mut features = features(scene, &accel, &tables, ids.factors.len() + ids.sources.len());
         features.general = surfaces.as_ref().map(General::of);
         features.registers &= !general;
@@ -372,6 +373,21 @@ struct SpectrumIds {
     names: Vec<String>,
 }
 
+/// Scenes may have lights that the devices do not know yet.
+fn check_lights(scene: &Scene) -> Result<()> {
+    let kind = match (scene.lights.first(), &scene.environment) {
+        (Some(Light::Point { .. }), _) => "a point light",
+        (Some(Light::Directional { .. }), _) => "a directional light",
+        (Some(Light::Sun { .. }), _) => "a sun",
+        (None, Some(Environment::Map(_))) => "an environment map",
+        _ => return Ok(()),
+    };
+    Err(Error::input(
+        &scene.file,
+        format!("{kind} cannot be rendered yet: use emitting surfaces or a uniform environment"),
+    ))
+}
+
 /// Tables of the constant 1, of what multiplies throughput, then of what emits.
 fn spectral_tables(scene: &Scene, needed: &[Needed]) -> Result<(SpectralTables, SpectrumIds)> {
     // General scenes have all of theirs among those needed.
@@ -381,7 +397,7 @@ fn spectral_tables(scene: &Scene, needed: &[Needed]) -> Result<(SpectralTables, 
         _ => None,
     });
     let sources = scene.objects.iter().filter_map(|o| o.emission.as_ref().map(|e| e.radiance));
-    let sources = sources.chain(scene.environment.as_ref().map(|e| e.radiance));
+    let sources = sources.chain(scene.environment.as_ref().and_then(|e| e.uniform()));
     let mut curves = vec![&Curve::Constant(1.0)];
     let mut names = vec!["1".to_owned()];
     let mut number = |list: std::collections::BTreeSet<usize>| -> std::collections::BTreeMap<usize, usize> {

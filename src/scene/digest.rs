@@ -3,7 +3,10 @@
 use glam::DVec3;
 use sha2::{Digest, Sha256};
 
-use super::{Bsdf, Filter, Projection, Sampler, Scene, Shape, Sides, Wavelengths};
+use super::{
+    Bsdf, Environment, EnvironmentMap, Field, Filter, Light, Medium, Projection, Sampler, Scene, Shape, Sides, Texels,
+    Wavelengths,
+};
 use crate::spectral::{Curve, Outside};
 
 /// Hex SHA-256 over every number's bits and every choice of `scene`, in order; not over paths, names and warnings.
@@ -49,11 +52,12 @@ pub fn digest(scene: &Scene) -> String {
             }
         }
         hash.tag(u8::from(material.two_sided));
+        hash.option(material.temperature, Hash::number);
     }
     hash.count(scene.objects.len());
     for object in &scene.objects {
         hash.shape(&object.shape);
-        hash.count(object.material);
+        hash.option(object.material, Hash::count);
         match &object.emission {
             None => hash.tag(0),
             Some(emission) => {
@@ -64,14 +68,28 @@ pub fn digest(scene: &Scene) -> String {
                 hash.count(emission.radiance);
             }
         }
+        hash.option(object.interior, |hash, interior| {
+            hash.count(interior.body);
+            hash.count(interior.medium);
+            hash.numbers(&interior.to_grid.to_cols_array());
+        });
     }
+    hash.count(scene.media.len());
+    scene.media.iter().for_each(|medium| hash.medium(medium));
+    hash.option(scene.camera_medium, Hash::count);
     match &scene.environment {
         None => hash.tag(0),
-        Some(environment) => {
+        Some(Environment::Uniform(radiance)) => {
             hash.tag(1);
-            hash.count(environment.radiance);
+            hash.count(*radiance);
+        }
+        Some(Environment::Map(map)) => {
+            hash.tag(2);
+            hash.map(map);
         }
     }
+    hash.count(scene.lights.len());
+    scene.lights.iter().for_each(|light| hash.light(light));
     hash.0.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
@@ -102,6 +120,41 @@ impl Hash {
     fn text(&mut self, text: &str) {
         self.count(text.len());
         self.0.update(text);
+    }
+
+    fn option<T>(&mut self, value: Option<T>, some: impl FnOnce(&mut Self, T)) {
+        self.tag(u8::from(value.is_some()));
+        if let Some(value) = value {
+            some(self, value);
+        }
+    }
+
+    fn medium(&mut self, medium: &Medium) {
+        self.count(medium.absorbers.len());
+        for absorber in &medium.absorbers {
+            self.number(absorber.strength);
+            self.count(absorber.columns.len());
+            for (kelvin, spectrum) in &absorber.columns {
+                self.number(*kelvin);
+                self.count(*spectrum);
+            }
+        }
+        self.option(medium.temperature.as_ref(), Hash::field);
+        self.field(&medium.density);
+    }
+
+    fn field(&mut self, field: &Field) {
+        match field {
+            Field::Constant(value) => {
+                self.tag(0);
+                self.number(*value);
+            }
+            Field::Grid(grid) => {
+                self.tag(1);
+                grid.size.iter().for_each(|n| self.count(*n as usize));
+                grid.values.iter().for_each(|value| self.0.update(value.to_bits().to_le_bytes()));
+            }
+        }
     }
 
     /// Camera, film, channels and integrator.
@@ -178,6 +231,48 @@ impl Hash {
                 self.numbers(&[*kelvin, *scale]);
             }
         }
+    }
+
+    fn light(&mut self, light: &Light) {
+        match light {
+            Light::Point { position, .. } => {
+                self.tag(0);
+                self.vector(*position);
+            }
+            Light::Directional { direction, .. } => {
+                self.tag(1);
+                self.vector(*direction);
+            }
+            Light::Sun { direction, angular_radius, .. } => {
+                self.tag(2);
+                self.vector(*direction);
+                self.number(*angular_radius);
+            }
+        }
+        self.count(light.spectrum());
+    }
+
+    fn map(&mut self, map: &EnvironmentMap) {
+        for column in [map.to_map.x_axis, map.to_map.y_axis, map.to_map.z_axis] {
+            self.vector(column);
+        }
+        self.number(map.scale);
+        map.size.iter().for_each(|side| self.count(*side as usize));
+        let values = match &map.texels {
+            Texels::Rgb { rgb, daylight } => {
+                self.tag(0);
+                self.count(*daylight);
+                rgb
+            }
+            Texels::Spectral { nm, radiance } => {
+                self.tag(1);
+                self.count(nm.len());
+                self.numbers(nm);
+                radiance
+            }
+        };
+        self.count(values.len());
+        values.iter().for_each(|value| self.0.update(value.to_bits().to_le_bytes()));
     }
 
     fn shape(&mut self, shape: &Shape) {

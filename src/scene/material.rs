@@ -8,16 +8,20 @@ use super::tree::Value;
 use super::{Bsdf, Material, MaterialId, SMOOTH};
 
 const KINDS: Keys = Keys::new(&MATERIAL_KINDS);
-const DIFFUSE: Keys = Keys::new(&["reflectance", "two_sided"]).later(&["temperature"]);
-const CONDUCTOR: Keys =
-    Keys::new(&["nk", "eta", "k", "roughness", "energy_compensation", "two_sided"]).later(&["temperature"]);
-const DIELECTRIC: Keys = Keys::new(&["eta", "dispersion", "roughness"]).later(&["temperature"]);
-const PLASTIC: Keys = Keys::new(&["reflectance", "eta", "roughness", "two_sided"]).later(&["temperature"]);
-const BLEND: Keys = Keys::new(&["a", "b", "weight"]).later(&["temperature"]);
-const BLACK: Keys = Keys::new(&["two_sided"]).later(&["temperature"]);
+const DIFFUSE: Keys = Keys::new(&["reflectance", "two_sided", "temperature"]);
+const CONDUCTOR: Keys = Keys::new(&["nk", "eta", "k", "roughness", "energy_compensation", "two_sided", "temperature"]);
+const DIELECTRIC: Keys = Keys::new(&["eta", "dispersion", "roughness", "temperature"]);
+const PLASTIC: Keys = Keys::new(&["reflectance", "eta", "roughness", "two_sided", "temperature"]);
+const BLEND: Keys = Keys::new(&["a", "b", "weight", "temperature"]);
+const BLACK: Keys = Keys::new(&["two_sided", "temperature"]);
+/// K. The peak of Planck's radiance there is 4e33 W m⁻² sr⁻¹ nm⁻¹, near the end of f32.
+const HOTTEST: f64 = 1e9;
 
 const REFLECTANCE: &str = "reflectance = 0.5, or the name of a spectrum";
 const ETA: &str = "eta = 1.5, or the name of a spectrum";
+
+/// Why something cannot have a temperature.
+const TRANSPARENT: &str = "absorbs nothing, so it emits nothing and has no temperature";
 
 /// A material as the file defines it.
 pub enum Kind<'a> {
@@ -32,6 +36,7 @@ pub enum Kind<'a> {
 pub struct Declared<'a> {
     pub kind: Kind<'a>,
     two_sided: bool,
+    temperature: Option<f64>,
     taken: Option<MaterialId>,
 }
 
@@ -45,11 +50,12 @@ pub struct Materials<'a> {
 
 impl<'a> Materials<'a> {
     pub fn new(item: Option<Item<'a>>, spectra: &mut Spectra<'a>) -> Self {
-        let items = item.and_then(|item| item.named_items()).unwrap_or_default();
+        let items = item.as_ref().and_then(|item| item.named_items()).unwrap_or_default();
         let declared = items.iter().map(|(name, item)| (*name, decode(item, spectra))).collect();
         let mut materials = Materials { declared, scene: Vec::new() };
         materials.look_up_parts();
         check_blends(&mut materials.declared);
+        materials.check_temperatures(item.as_ref());
         materials
     }
 
@@ -84,7 +90,7 @@ impl<'a> Materials<'a> {
         if let Some(id) = declared.taken {
             return Some(id);
         }
-        let (name, two_sided) = ((*name).to_owned(), declared.two_sided);
+        let (name, two_sided, temperature) = ((*name).to_owned(), declared.two_sided, declared.temperature);
         let bsdf = match declared.kind {
             Kind::Diffuse { reflectance } => Bsdf::Diffuse { reflectance: spectra.take(reflectance) },
             Kind::Conductor { eta, k, roughness, energy_compensation } => {
@@ -103,7 +109,7 @@ impl<'a> Materials<'a> {
             }
             Kind::Black => Bsdf::Black,
         };
-        self.scene.push(Material { name, bsdf, two_sided });
+        self.scene.push(Material { name, bsdf, two_sided, temperature });
         let id = self.scene.len() - 1;
         if let Some(declared) = &mut self.declared[index].1 {
             declared.taken = Some(id);
@@ -127,6 +133,32 @@ impl<'a> Materials<'a> {
 
     pub fn finish(self) -> Vec<Material> {
         self.scene
+    }
+
+    /// Reports blends with a temperature of which no part can be hot, and leaves `None` in their place.
+    fn check_temperatures(&mut self, item: Option<&Item<'a>>) {
+        for i in 0..self.declared.len() {
+            let (name, Some(declared)) = &self.declared[i] else { continue };
+            if declared.temperature.is_none() || self.absorbs(i) {
+                continue;
+            }
+            let blend = item.and_then(|item| item.member(name)?.member("blend")?.member("temperature"));
+            if let Some(item) = blend {
+                item.error_help(format!("all that \"{name}\" blends {TRANSPARENT}"), "remove it");
+            }
+            self.declared[i].1 = None;
+        }
+    }
+
+    /// Whether some part absorbs, or is not known to absorb nothing.
+    fn absorbs(&self, index: usize) -> bool {
+        match self.declared[index].1.as_ref().map(|d| &d.kind) {
+            Some(Kind::Dielectric { .. }) => false,
+            Some(Kind::Blend { parts: Parts { indices: Some(indices), .. }, .. }) => {
+                indices.iter().any(|&part| self.absorbs(part))
+            }
+            _ => true,
+        }
     }
 
     /// The parts of every blend, by name; a name that does not exist is reported.
@@ -170,9 +202,17 @@ fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Declared<'a>
             let fields = kind.table(DIELECTRIC)?;
             let eta = spectrum(&fields, "eta", ETA, Quantity::Index, spectra);
             let (dispersion, roughness) = (boolean(&fields, "dispersion", true), roughness(&fields));
+            if let Some(item) = fields.get("temperature") {
+                item.error_help(
+                    format!("a dielectric {TRANSPARENT}"),
+                    "remove it; for glass that absorbs, give the object an `interior` whose medium has a temperature",
+                );
+                return None;
+            }
             return Some(Declared {
                 kind: Kind::Dielectric { eta: eta?, dispersion: dispersion?, roughness: roughness? },
                 two_sided: true,
+                temperature: None,
                 taken: None,
             });
         }
@@ -188,12 +228,13 @@ fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Declared<'a>
         }
         Some("blend") => {
             let fields = kind.table(BLEND)?;
-            return Some(Declared { kind: blend(&fields)?, two_sided: true, taken: None });
+            let (kind, temperature) = (blend(&fields), temperature(&fields));
+            return Some(Declared { kind: kind?, two_sided: true, temperature: temperature?, taken: None });
         }
         _ => (kind.table(BLACK)?, Some(Kind::Black)),
     };
-    let two_sided = boolean(&fields, "two_sided", true);
-    Some(Declared { kind: kind?, two_sided: two_sided?, taken: None })
+    let (two_sided, temperature) = (boolean(&fields, "two_sided", true), temperature(&fields));
+    Some(Declared { kind: kind?, two_sided: two_sided?, temperature: temperature?, taken: None })
 }
 
 fn conductor<'a>(fields: &Fields<'a>, spectra: &mut Spectra<'a>) -> Option<Kind<'a>> {
@@ -243,6 +284,17 @@ fn alpha(item: &Item) -> Option<f64> {
 
 fn roughness(fields: &Fields) -> Option<f64> {
     fields.get("roughness").map_or(Some(0.0), |item| alpha(&item))
+}
+
+/// The outer `None` is a mistake that has been said.
+#[expect(clippy::option_option, reason = "a mistake differs from a key that is absent")]
+fn temperature(fields: &Fields) -> Option<Option<f64>> {
+    fields.get("temperature").map_or(Some(None), |item| kelvin(&item).map(Some))
+}
+
+/// A temperature that `item` holds.
+pub fn kelvin(item: &Item) -> Option<f64> {
+    item.number_where(|kelvin| kelvin > 0.0 && kelvin <= HOTTEST, "a temperature in K, above 0 and at most 1e9")
 }
 
 fn blend<'a>(fields: &Fields<'a>) -> Option<Kind<'a>> {

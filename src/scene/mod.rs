@@ -4,11 +4,15 @@
 mod blend;
 mod camera;
 mod channels;
+mod closed;
 mod context;
 mod decode;
 mod digest;
+mod environment;
 mod file;
+mod light;
 mod material;
+mod medium;
 mod object;
 mod overrides;
 mod shape;
@@ -17,8 +21,9 @@ mod transform;
 mod tree;
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
-use glam::{DVec2, DVec3};
+use glam::{DAffine3, DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 pub use file::{load, parse};
@@ -29,6 +34,8 @@ use crate::spectral::{Channels, Curve};
 pub type SpectrumId = usize;
 /// Index into [`Scene::materials`].
 pub type MaterialId = usize;
+/// Index into [`Scene::media`].
+pub type MediumId = usize;
 
 /// Everything a render needs to know about what is rendered.
 #[derive(Debug, Clone)]
@@ -44,6 +51,11 @@ pub struct Scene {
     /// Only materials that some object uses, itself or as a part of a blend.
     pub materials: Vec<Material>,
     pub objects: Vec<Object>,
+    /// Only those that fill something.
+    pub media: Vec<Medium>,
+    /// What fills space outside all interiors.
+    pub camera_medium: Option<MediumId>,
+    pub lights: Vec<Light>,
     pub environment: Option<Environment>,
     /// Said once to the user: held tables, dropped triangles, …
     pub warnings: Vec<String>,
@@ -148,6 +160,9 @@ pub struct Material {
     /// Whether the back side (against the geometric normal) scatters like the front; otherwise it absorbs. True, and
     /// without meaning, for dielectrics, whose back is their inside, and for blends, whose parts have their own.
     pub two_sided: bool,
+    /// K, above 0: emits ε(λ, ω) B(λ, T), ε = 1 - what the very same surface sends on of flux along ω, on either side. Of
+    /// a blend: for those of its parts that have none of their own. `None` on dielectrics, which absorb nothing.
+    pub temperature: Option<f64>,
 }
 
 /// How a surface scatters. Roughness is the α of the GGX distribution in [0, 1]; what is below [`SMOOTH`] is smooth.
@@ -195,8 +210,68 @@ pub struct Object {
     /// For messages, e.g. `objects.3 (floor.obj, material "white")`.
     pub name: String,
     pub shape: Shape,
-    pub material: MaterialId,
+    /// `None`: a null boundary, which only bounds its interior. Paths pass it as if it were not there.
+    pub material: Option<MaterialId>,
     pub emission: Option<Emission>,
+    /// What fills the inside of a closed shape: behind its geometric normal.
+    pub interior: Option<Interior>,
+}
+
+/// A medium in its place. Where several interiors overlap, the innermost counts: the one that a path entered last.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Interior {
+    /// Objects that are parts of one closed surface have the same number, all others numbers of their own.
+    pub body: usize,
+    pub medium: MediumId,
+    /// From the world to the unit cube that the medium's grids fill: the object's bounding box in its own space.
+    pub to_grid: DAffine3,
+}
+
+/// A gas that absorbs and emits. Its absorption coefficient in m⁻¹ is density · Σ strength · table(λ, T); where it has a
+/// temperature it emits as much as it absorbs, times Planck's radiance.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Medium {
+    pub name: String,
+    pub absorbers: Vec<Absorber>,
+    /// K, not negative.
+    pub temperature: Option<Field>,
+    /// Relative, not negative.
+    pub density: Field,
+}
+
+/// A term of a medium's absorption.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Absorber {
+    /// Fraction x pressure of a species; 1 for an absorption that is given as such.
+    pub strength: f64,
+    /// K, ascending, and the spectrum there, in m⁻¹ at strength 1. Between two, linear in temperature; beyond, the ends
+    /// are held. Where there is only one, temperature does not matter.
+    pub columns: Vec<(f64, SpectrumId)>,
+}
+
+/// A number of a medium, or one for each voxel.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Field {
+    Constant(f64),
+    Grid(Arc<Grid>),
+}
+
+/// Voxels with a constant value each, x fastest. All grids of one medium have one shape.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Grid {
+    /// Voxels along x, y and z.
+    pub size: [u32; 3],
+    pub values: Vec<f32>,
+}
+
+impl Medium {
+    /// Voxels along x, y and z, where any quantity has a grid.
+    pub fn grid_size(&self) -> Option<[u32; 3]> {
+        [self.temperature.as_ref(), Some(&self.density)].into_iter().flatten().find_map(|field| match field {
+            Field::Constant(_) => None,
+            Field::Grid(grid) => Some(grid.size),
+        })
+    }
 }
 
 /// World-space geometry, transforms applied.
@@ -245,8 +320,88 @@ pub enum Sides {
     Both,
 }
 
-/// Radiance arriving from every direction that leaves the scene.
+/// Light that comes from no surface.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Environment {
-    pub radiance: SpectrumId,
+pub enum Light {
+    Point {
+        position: DVec3,
+        /// W sr⁻¹ nm⁻¹, the same in all directions.
+        intensity: SpectrumId,
+    },
+    Directional {
+        /// In which the light travels; a unit vector.
+        direction: DVec3,
+        /// W m⁻² nm⁻¹ on a plane facing the light.
+        irradiance: SpectrumId,
+    },
+    /// A disk at infinity, the same radiance all over, visible also to the camera.
+    Sun {
+        /// In which the light of its centre travels; a unit vector.
+        direction: DVec3,
+        /// Between centre and rim, radians, up to π/2.
+        angular_radius: f64,
+        /// W m⁻² nm⁻¹ on a plane facing its centre.
+        irradiance: SpectrumId,
+    },
+}
+
+impl Light {
+    /// Its spectrum: intensity or irradiance.
+    pub fn spectrum(&self) -> SpectrumId {
+        match self {
+            Light::Point { intensity, .. } => *intensity,
+            Light::Directional { irradiance, .. } | Light::Sun { irradiance, .. } => *irradiance,
+        }
+    }
+}
+
+/// Radiance arriving from every direction that leaves the scene, W m⁻² sr⁻¹ nm⁻¹.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Environment {
+    /// The same from everywhere.
+    Uniform(SpectrumId),
+    Map(EnvironmentMap),
+}
+
+impl Environment {
+    /// The spectrum of a uniform environment.
+    pub fn uniform(&self) -> Option<SpectrumId> {
+        match self {
+            Environment::Uniform(radiance) => Some(*radiance),
+            Environment::Map(_) => None,
+        }
+    }
+
+    pub fn map(&self) -> Option<&EnvironmentMap> {
+        match self {
+            Environment::Uniform(_) => None,
+            Environment::Map(map) => Some(map),
+        }
+    }
+}
+
+/// Radiance by direction. Direction d in the world is m = `to_map` d in the map, at u = ½ + atan2(m.x, -m.z) / 2π and
+/// v = acos(m.y) / π. Texel (x, y) is centred at u = (x + ½) / width, v = (y + ½) / height; between centres the
+/// radiance of every wavelength is bilinear, repeated in u, held in v.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EnvironmentMap {
+    /// For messages.
+    pub name: String,
+    /// A rotation.
+    pub to_map: DMat3,
+    /// Multiplies all radiance.
+    pub scale: f64,
+    /// Width and height.
+    pub size: [u32; 2],
+    pub texels: Texels,
+}
+
+/// Rows from the top (v = 0), each from u = 0. Finite and not negative.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Texels {
+    /// Linear sRGB, \[y\]\[x\]\[3\]. A texel's radiance is `daylight` times a smooth spectrum
+    /// ([`crate::spectral::upsample`]).
+    Rgb { rgb: Arc<[f32]>, daylight: SpectrumId },
+    /// \[y\]\[x\]\[band\], linear between the wavelengths `nm`, which ascend, and 0 beyond them.
+    Spectral { nm: Vec<f64>, radiance: Arc<[f32]> },
 }

@@ -20,6 +20,8 @@ const LONGEST: f64 = 1e15;
 const BRIGHTEST: f64 = 1e35;
 /// Far above any index of refraction (200 or so in metals at 20 um) and its squares far inside f32.
 const DENSEST: f64 = 1e3;
+/// Opaque within any distance that matters, and far inside f32 times one.
+const MOST_ABSORBING: f64 = 1e15;
 
 /// What a spectrum describes: decides the allowed values, what a table means beyond its ends, and what `rgb` is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -28,46 +30,62 @@ pub enum Quantity {
     Reflectance,
     /// W m⁻² sr⁻¹ nm⁻¹, not negative; zero beyond its table.
     Radiance,
+    /// Of a point light, W sr⁻¹ nm⁻¹; as [`Quantity::Radiance`].
+    Intensity,
+    /// Of a light far away, W m⁻² nm⁻¹ on a plane facing it; as [`Quantity::Radiance`].
+    Irradiance,
     /// Of refraction: dimensionless, above 0; held beyond its table, with a warning.
     Index,
     /// Of a coat: at least 1; otherwise as [`Quantity::Index`].
     CoatIndex,
     /// Imaginary part of a complex index, not negative; held beyond its table, with a warning.
     Extinction,
+    /// Of a gas: m⁻¹ (and per atmosphere of a species), not negative; zero beyond its table, with a warning.
+    Absorption,
 }
 
 impl Quantity {
+    /// Whether it is light itself rather than what becomes of light.
+    fn is_light(self) -> bool {
+        matches!(self, Quantity::Radiance | Quantity::Intensity | Quantity::Irradiance)
+    }
+
     fn default_outside(self) -> Outside {
-        if self == Quantity::Radiance { Outside::Zero } else { Outside::Hold }
+        if self.is_light() || self == Quantity::Absorption { Outside::Zero } else { Outside::Hold }
     }
 
     fn noun(self) -> &'static str {
         match self {
             Quantity::Reflectance => "a reflectance",
             Quantity::Radiance => "a radiance",
+            Quantity::Intensity => "an intensity",
+            Quantity::Irradiance => "an irradiance",
             Quantity::Index => "an index of refraction",
             Quantity::CoatIndex => "the index of refraction of a coat",
             Quantity::Extinction => "an extinction coefficient k",
+            Quantity::Absorption => "an absorption coefficient",
         }
     }
 
-    fn allows(self, value: f64) -> bool {
+    pub fn allows(self, value: f64) -> bool {
         match self {
             Quantity::Reflectance => (0.0..=1.0).contains(&value),
-            Quantity::Radiance => (0.0..=BRIGHTEST).contains(&value),
+            Quantity::Radiance | Quantity::Intensity | Quantity::Irradiance => (0.0..=BRIGHTEST).contains(&value),
             Quantity::Index => value > 0.0 && value <= DENSEST,
             Quantity::CoatIndex => (1.0..=DENSEST).contains(&value),
             Quantity::Extinction => (0.0..=DENSEST).contains(&value),
+            Quantity::Absorption => (0.0..=MOST_ABSORBING).contains(&value),
         }
     }
 
-    fn range(self) -> String {
+    pub fn range(self) -> String {
         let range = match self {
             Quantity::Reflectance => "[0, 1]",
-            Quantity::Radiance => "[0, 1e35]",
+            Quantity::Radiance | Quantity::Intensity | Quantity::Irradiance => "[0, 1e35]",
             Quantity::Index => "(0, 1000]",
             Quantity::CoatIndex => "[1, 1000]",
             Quantity::Extinction => "[0, 1000]",
+            Quantity::Absorption => "[0, 1e15]",
         };
         format!("{} must lie in {range}", self.noun())
     }
@@ -196,6 +214,34 @@ impl<'a> Spectra<'a> {
         n.zip(k)
     }
 
+    /// The columns of the file that `item` names, absorption of a species at temperatures: K, ascending, and a spectrum.
+    pub fn species(&mut self, item: &Item<'a>) -> Option<Vec<(f64, Handle)>> {
+        let written = item.text()?;
+        let path = item.cx.path(written);
+        let columns = text::read_columns(&path).map_err(|problem| report_in_file(item, *problem)).ok()?;
+        let mut found = Vec::new();
+        for (name, table) in columns {
+            let kelvin = column_kelvin(&name);
+            if kelvin.is_none() {
+                item.error_help(
+                    format!("the columns of {} must be named by temperatures, but one is \"{name}\"", path.display()),
+                    "write a header such as nm,300,600,1000: temperatures in K",
+                );
+                return None;
+            }
+            let data = table_data(table, path.clone());
+            let source = Source { data, scale: 1.0, outside: None, path: item.path.clone(), at: item.at };
+            let kelvin = kelvin?;
+            found.push((kelvin, self.check(&source, &format!("{written} ({kelvin} K)"), item, Quantity::Absorption)?));
+        }
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some(same) = found.windows(2).find(|w| w[0].0 == w[1].0) {
+            item.error_help(format!("{} has two columns for {} K", path.display(), same[0].0), "remove one");
+            return None;
+        }
+        Some(found)
+    }
+
     /// The index of a checked spectrum in the scene. Equal curves share one.
     pub fn take(&mut self, handle: Handle) -> SpectrumId {
         let spectrum = &mut self.checked[handle];
@@ -210,6 +256,12 @@ impl<'a> Spectra<'a> {
         });
         spectrum.taken = Some(id);
         id
+    }
+
+    /// The index in the scene of a curve that no spectrum of the file describes. Equal curves share one.
+    pub fn curve(&mut self, name: &str, curve: Curve) -> SpectrumId {
+        self.checked.push(Checked { name: name.to_owned(), curve, warnings: Vec::new(), taken: None });
+        self.take(self.checked.len() - 1)
     }
 
     /// `handle`, a radiance, times the number of at least 0 that `item` holds.
@@ -244,7 +296,7 @@ impl<'a> Spectra<'a> {
             self.cx.error(source.at, &source.path, message, None);
         };
         let mut warnings = Vec::new();
-        let is_index = !matches!(quantity, Quantity::Reflectance | Quantity::Radiance);
+        let is_index = quantity != Quantity::Reflectance && !quantity.is_light();
         if is_index && !quantity.allows(0.0) && source.outside == Some(Outside::Zero) {
             let help = "remove `outside`, or write outside = \"hold\"";
             let message = format!("an index of refraction cannot be 0 outside its table{used_by}");
@@ -298,10 +350,15 @@ impl<'a> Spectra<'a> {
                     return None;
                 }
                 let outside = source.outside.unwrap_or(quantity.default_outside());
-                if outside == Outside::Hold && source.outside.is_none() {
+                let instead = match (outside, quantity) {
+                    (Outside::Hold, _) => Some("its end values are held there"),
+                    (Outside::Zero, Quantity::Absorption) => Some("nothing is absorbed there"),
+                    (Outside::Zero, _) => None,
+                };
+                if let (Some(instead), None) = (instead, source.outside) {
                     warnings.extend(self.uncovered(nm[0], nm[nm.len() - 1]).map(|gap| {
                         let noun = quantity.noun();
-                        format!("spectrum `{name}` ({noun}) does not cover {gap}: its end values are held there")
+                        format!("spectrum `{name}` ({noun}) does not cover {gap}: {instead}")
                     }));
                 }
                 let value = value.iter().map(|v| v * source.scale).collect();
@@ -316,10 +373,8 @@ impl<'a> Spectra<'a> {
                     ));
                     return None;
                 }
-                let curve = match quantity {
-                    Quantity::Radiance => upsample::emission(colour),
-                    _ => upsample::reflectance(colour),
-                };
+                let curve =
+                    if quantity.is_light() { upsample::emission(colour) } else { upsample::reflectance(colour) };
                 self.rgb_outside(curve, source.outside, name, &mut warnings)
             }
         };
@@ -346,7 +401,7 @@ impl<'a> Spectra<'a> {
     }
 
     /// The parts of the channels below `first` and above `last` nm, in words.
-    fn uncovered(&self, first: f64, last: f64) -> Option<String> {
+    pub fn uncovered(&self, first: f64, last: f64) -> Option<String> {
         let bounds = &self.channels.as_ref()?.bounds;
         let hull = |parts: &mut dyn Iterator<Item = [f64; 2]>| {
             parts.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).map(|[a, b]| format!("{a}-{b} nm"))
@@ -436,6 +491,13 @@ fn index_file(item: &Item, path: PathBuf, column: Option<&str>) -> Option<Data> 
         item.error(format!("{} does not give {name}", path.display()));
     }
     Some(table_data(table?, path))
+}
+
+/// The temperature that names a column: `300`, `300K`, or with words before it as in `kappa_300K`.
+fn column_kelvin(name: &str) -> Option<f64> {
+    let number = name.trim_end_matches(['K', 'k', ' ']);
+    let start = number.rfind(|c: char| !c.is_ascii_digit() && c != '.').map_or(0, |i| i + 1);
+    number.get(start..)?.parse().ok().filter(|kelvin: &f64| kelvin.is_finite() && *kelvin > 0.0)
 }
 
 fn table_data(table: SpectrumTable, file: PathBuf) -> Data {

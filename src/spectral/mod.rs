@@ -6,6 +6,7 @@ pub mod curve;
 mod data;
 mod derived;
 pub mod planck;
+pub mod skylight;
 pub mod table;
 pub mod upsample;
 

@@ -149,7 +149,6 @@ fn wrong_materials() {
         ("roughness negative", conductor("roughness = [0.1, -0.1] #!"), "materials.m.conductor.roughness.1", &["in [0, 1]"]),
         ("half smooth", conductor("roughness = [0, 0.1] #!"), "materials.m.conductor.roughness", &["0.001", "0 and 0.1"]),
         ("compensation", conductor("energy_compensation = 1 #!"), "materials.m.conductor.energy_compensation", &["true or false"]),
-        ("temperature", conductor("temperature = 300 #!"), "materials.m.conductor.temperature", &["not supported yet"]),
         ("no eta of glass", "[materials.m.dielectric] #!".into(), "materials.m.dielectric.eta", &["`eta` is missing"]),
         ("eta negative", "[materials.m.dielectric]\neta = -1.5 #!".into(), "materials.m.dielectric.eta", &["(0, 1000]"]),
         ("eta of a body", "[materials.m.dielectric]\neta = { blackbody = 300 } #!".into(), "materials.m.dielectric.eta.blackbody", &["is a black body"]),

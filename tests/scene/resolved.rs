@@ -178,12 +178,12 @@ fn meshes_resolve_to_objects_by_material_and_group() {
     };
     assert_eq!((triangles(1), triangles(2)), (2, 1));
     assert_eq!(scene.materials.iter().map(|m| m.name.as_str()).collect::<Vec<_>>(), ["white", "soot"]);
-    assert_eq!((scene.objects[1].material, scene.objects[2].material), (0, 1));
+    assert_eq!((scene.objects[1].material, scene.objects[2].material), (Some(0), Some(1)));
     assert!(scene.objects[2].emission.as_ref().is_some_and(|e| e.sides == Sides::Front));
     assert!(scene.warnings.iter().any(|w| w.contains("1 triangles without area")), "{:?}", scene.warnings);
     let right = good(&text, &[("m.obj", mesh)], &[("objects.1.group", "right")]);
     assert_eq!(right.objects.len(), 2);
-    assert_eq!(right.materials[right.objects[1].material].bsdf, Bsdf::Black);
+    assert_eq!(right.materials[right.objects[1].material.unwrap()].bsdf, Bsdf::Black);
 }
 
 #[test]
@@ -232,7 +232,7 @@ fn spectra_resolve_from_every_source() {
         &[],
         &[("environment.scale", "4"), ("environment.up", "[0, 0, 1]"), ("environment.rotate_degrees", "30")],
     );
-    assert_eq!(sky.spectra[sky.environment.unwrap().radiance].curve, Curve::Constant(1.0));
+    assert_eq!(sky.spectra[sky.environment.unwrap().uniform().unwrap()].curve, Curve::Constant(1.0));
 }
 
 #[test]
