@@ -1,5 +1,5 @@
 //! The scenes in `scenes/`: everything they read has a source and a licence, what is glass is closed, gases absorb as
-//! much as an independent model says.
+//! much as an independent model says, and every scene loads and renders cleanly.
 
 #[path = "../examples/make_scene/main.rs"]
 #[allow(dead_code, reason = "its `main` is the example's")]
@@ -8,8 +8,10 @@ mod make_scene;
 use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
 use std::sync::OnceLock;
 
+use spectile::cube::Cube;
 use tempfile::TempDir;
 
 fn committed() -> PathBuf {
@@ -48,6 +50,17 @@ fn made() -> &'static Path {
         copy
     })
     .path()
+}
+
+/// Scene files as (folder, name without `.toml`).
+fn scenes() -> Vec<(String, String)> {
+    let text = |path: &Path| path.file_name().expect("a name").to_string_lossy().into_owned();
+    let mut all: Vec<_> = (files(&committed()).iter())
+        .filter(|file| file.extension() == Some("toml".as_ref()))
+        .map(|file| (text(file.parent().expect("a folder")), text(&file.with_extension(""))))
+        .collect();
+    all.sort();
+    all
 }
 
 #[test]
@@ -176,5 +189,80 @@ fn hot_gases_absorb_as_much_as_radcal_says() {
             let ratio = ours / theirs;
             assert!((0.5..2.0).contains(&ratio), "{gas} {low}-{high} cm-1 at {kelvin} K: {ours} against {theirs}");
         }
+    }
+}
+
+fn spectile(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_spectile")).args(arguments).output().expect("spectile runs")
+}
+
+/// What an output says, for messages.
+fn words(output: &Output) -> String {
+    format!("{}\n{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr))
+}
+
+/// Whether devices cannot render this scene yet, and say so: only the one with gases and heat may.
+fn waits(name: &str, output: &Output) -> bool {
+    let refused = output.status.code() == Some(2) && words(output).contains("cannot be rendered yet");
+    if refused && name == "aircraft-infrared" {
+        println!("SKIPPED: {name}: {}", words(output));
+    }
+    refused && name == "aircraft-infrared"
+}
+
+#[test]
+fn every_scene_loads_without_a_warning() {
+    let scenes = scenes();
+    assert!(scenes.len() >= 5, "{scenes:?}");
+    for (folder, name) in scenes {
+        let scene = made().join(&folder).join(format!("{name}.toml"));
+        let output = spectile(&["plan", &scene.to_string_lossy()]);
+        if waits(&name, &output) {
+            continue;
+        }
+        assert!(output.status.success(), "{name}: {}", words(&output));
+        let warned = String::from_utf8_lossy(&output.stderr).contains("warning");
+        assert!(!warned, "{name}: {}", words(&output));
+    }
+}
+
+#[test]
+fn every_scene_renders_a_small_picture_cleanly() {
+    for (folder, name) in scenes() {
+        let scene = made().join(&folder).join(format!("{name}.toml"));
+        let out = TempDir::new().expect("a folder");
+        let cube = out.path().join("cube.zarr");
+        let output = spectile(&[
+            "render",
+            &scene.to_string_lossy(),
+            "-o",
+            &cube.to_string_lossy(),
+            "--size",
+            "40x25",
+            "--spp",
+            "4",
+        ]);
+        if waits(&name, &output) {
+            continue;
+        }
+        if output.status.code() == Some(3) {
+            println!("SKIPPED: no device: {}", words(&output));
+            assert!(std::env::var_os("CI").is_none(), "must not be skipped under CI");
+            return;
+        }
+        // A sample that is not finite or negative is a warning.
+        assert!(output.status.success() && !words(&output).contains("warning"), "{name}: {}", words(&output));
+        let cube = Cube::open(&cube).expect("a cube");
+        let mut lit = 0;
+        for tile in 0..cube.grid().count() {
+            let rect = cube.grid().rect(tile);
+            for (x, y) in (rect.y0..rect.y1).flat_map(|y| (rect.x0..rect.x1).map(move |x| (x, y))) {
+                let spectrum = cube.spectrum(x, y).expect("a pixel").expect("a rendered one");
+                assert!(spectrum.iter().all(|v| v.is_finite() && *v >= 0.0), "{name} ({x}, {y}): {spectrum:?}");
+                lit += usize::from(spectrum.iter().any(|v| *v > 0.0));
+            }
+        }
+        // Hardly a pixel of these scenes is black in all of its four paths.
+        assert!(lit > 900, "{name}: {lit} of 1000 pixels are lit");
     }
 }

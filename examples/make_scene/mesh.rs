@@ -45,6 +45,27 @@ impl Part {
         self
     }
 
+    /// Where a normal points behind its triangle, as at the sharp rim of a thin wall, the triangle becomes flat.
+    fn flat_where_folded(mut self) -> Part {
+        for t in 0..if self.normals.is_empty() { 0 } else { self.triangles.len() } {
+            let corners = self.triangles[t].map(|i| i as usize);
+            let [a, b, c] = corners.map(|i| self.positions[i]);
+            let front = (b - a).cross(c - a).normalize_or(DVec3::Y);
+            if corners.iter().any(|i| self.normals[*i].dot(front) < 0.02) {
+                let first = self.positions.len() as u32;
+                for i in corners {
+                    self.positions.push(self.positions[i]);
+                    self.normals.push(front);
+                    if !self.uvs.is_empty() {
+                        self.uvs.push(self.uvs[i]);
+                    }
+                }
+                self.triangles[t] = [first, first + 1, first + 2];
+            }
+        }
+        self
+    }
+
     /// Turns the surface inside out.
     pub fn flipped(mut self) -> Part {
         self.triangles.iter_mut().for_each(|t| t.swap(1, 2));
@@ -112,7 +133,7 @@ pub struct Mesh {
 
 impl Mesh {
     pub fn add(&mut self, material: &str, part: Part) {
-        self.parts.push((material.to_owned(), part));
+        self.parts.push((material.to_owned(), part.flat_where_folded()));
     }
 
     pub fn triangles(&self) -> usize {
