@@ -137,7 +137,7 @@ fn requeue<'r>(
             job.samples.min(64)
         )));
     }
-    if client::requeue(slurm.job)? {
+    if client::requeue(&slurm.name())? {
         say("requeued: what is merged stays, and the next run goes on from there");
     }
     Ok(())
