@@ -10,6 +10,7 @@ pub mod error;
 pub mod files;
 pub mod format;
 pub mod gpu;
+pub mod preview;
 pub mod reference;
 pub mod render;
 pub mod scattering;

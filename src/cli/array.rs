@@ -160,6 +160,7 @@ fn render(cube: &Path, job: &Job, number: u32, interrupt: &std::sync::Arc<Interr
         profile: false,
         devices: Default::default(),
         memory: job.memory,
+        feed: None,
     };
     reporter.start(&job)?;
     let summary = schedule::run(&job, interrupt, &mut |event| reporter.event(event));

@@ -11,9 +11,11 @@ mod plan;
 mod progress;
 mod render;
 mod scene;
+mod sinks;
 mod spectrum;
 mod standing;
 mod submit;
+mod view;
 
 use clap::{Parser, Subcommand};
 
@@ -39,6 +41,7 @@ Examples:
   spectile info cube.zarr                               how far it got, how large the error is
   spectile spectrum cube.zarr 120 80                    the spectrum of one pixel, as CSV
   spectile export cube.zarr -o picture.png              a picture of it
+  spectile view cube.zarr                               a page to look at it
   spectile compare cube.zarr reference.zarr             how it differs from another cube
 
 Radiance is in W m-2 sr-1 nm-1, wavelengths are in nm (vacuum), pixels are counted from 0 at the top left.
@@ -63,6 +66,7 @@ enum Command {
     Spectrum(spectrum::Args),
     Compare(compare::Args),
     Export(export::Args),
+    View(view::Args),
     /// A task of an array job (written into the batch script by `submit`)
     #[command(hide = true)]
     ArrayTask(array::Args),
@@ -84,6 +88,7 @@ impl Cli {
             Command::Info(args) => args.json,
             Command::Compare(args) => args.json,
             Command::Export(args) => args.json,
+            Command::View(args) => args.json,
             Command::Submit(args) => args.json,
             Command::Spectrum(_) | Command::ArrayTask(_) | Command::ArrayEnd(_) | Command::ArrayProbe(_) => false,
         }
@@ -99,6 +104,7 @@ impl Cli {
             Command::Spectrum(args) => spectrum::run(args, output),
             Command::Compare(args) => compare::run(args, output),
             Command::Export(args) => export::run(args, output),
+            Command::View(args) => view::run(args, output),
             Command::Submit(args) => submit::run(args, output),
             Command::ArrayTask(args) => array::task(args, output),
             Command::ArrayEnd(args) => array::end(args),

@@ -73,6 +73,12 @@ impl<'a> Reporter<'a> {
         self.emit("warning", json!({ "message": text }))
     }
 
+    /// Where the page is; always said, since nobody else knows.
+    pub fn listening(&self, text: &str, fields: Value) -> Result<()> {
+        self.say_always(text);
+        self.emit("listening", fields)
+    }
+
     pub fn start(&mut self, job: &Job) -> Result<()> {
         self.epoch = job.scene.integrator.epoch;
         let [width, height] = job.scene.film.cube_size();
@@ -126,6 +132,10 @@ impl<'a> Reporter<'a> {
                     self.line(&self.describe_epoch(status));
                 }
                 self.emit("progress", fields(status))
+            }
+            Event::Rests(rests) => {
+                self.line(if rests { "paused, as was asked on the page" } else { "goes on, as was asked on the page" });
+                self.emit(if rests { "paused" } else { "resumed" }, json!({}))
             }
             Event::Asked(status) => {
                 self.say_always(&self.describe_epoch(status));

@@ -1,18 +1,17 @@
 //! `spectile spectrum`: one pixel of a cube.
 
-use std::fmt::Write;
 use std::path::PathBuf;
 
 use super::Output;
 use crate::cube::Cube;
 use crate::files::write_atomically;
-use crate::format::plot;
+use crate::format::{plot, text};
 use crate::{Error, Result};
 
 /// Print the spectrum of one pixel as CSV
 ///
 /// A header, then one line a channel, in the order of the cube: the centre of the channel in nm and its mean spectral
-/// radiance in W m-2 sr-1 nm-1, with as many digits as bring back the stored number exactly.
+/// radiance in W m-2 sr-1 nm-1 (and its standard error, where the cube has it), with as many digits as bring back the stored number exactly.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = "\
 Examples:
@@ -46,11 +45,6 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         let title = format!("{}, column {}, row {}, {samples} samples", args.cube.display(), args.x, args.y);
         write_atomically(path, plot::spectrum(cube.channels(), &spectrum, &title)?.as_bytes())?;
     }
-    // The header stands first: many readers of CSV know no comments.
-    let mut csv = "wavelength_nm,radiance\n".to_owned();
-    for (k, radiance) in spectrum.iter().enumerate() {
-        // Debug, not Display: 1e-30 instead of thirty zeros. Writing to a string cannot fail.
-        let _ = writeln!(csv, "{},{radiance:?}", cube.channels().centre(k));
-    }
-    output.text(&csv)
+    let standard_error = cube.look().standard_error(args.x, args.y)?;
+    output.text(&text::spectrum_csv(cube.channels(), &spectrum, standard_error.as_deref()))
 }

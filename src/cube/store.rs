@@ -1,7 +1,7 @@
 //! The cube as a folder: opening and reading it.
 
-use std::fs::{self, File};
-use std::io::{ErrorKind, Read, Seek, SeekFrom};
+use std::fs;
+use std::io::ErrorKind;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -158,21 +158,7 @@ impl Cube {
             let what = format!("pixel {x} {y} is outside the picture; columns are 0..{width}, rows 0..{height}");
             return Err(Error::Usage(format!("{}: {what}", self.path.display())));
         }
-        let grid = self.grid();
-        let tile = grid.tile_at(x, y);
-        let path = self.part_path(Part::Radiance, tile);
-        let mut file = match File::open(&path) {
-            Ok(file) => file,
-            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
-            Err(error) => return Err(Error::storage(&path, error)),
-        };
-        let rect = grid.rect(tile);
-        let pixel = u64::from(y - rect.y0) * u64::from(grid.tile[0]) + u64::from(x - rect.x0);
-        let mut spectrum = vec![0.0f32; self.channels().len()];
-        file.seek(SeekFrom::Start(pixel * spectrum.len() as u64 * 4))
-            .and_then(|_| file.read_exact(bytemuck::cast_slice_mut(&mut spectrum)))
-            .map_err(|error| Error::storage(&path, format!("is damaged: {error}")))?;
-        Ok(Some(spectrum))
+        self.look().spectrum(x, y)
     }
 
     /// The error estimate of every channel (DESIGN section 8), from the spread of the epochs: sqrt(Σ variance of the

@@ -12,7 +12,8 @@ pub fn write(path: &Path, picture: &Picture, ev: f64) -> Result<()> {
     write_atomically(path, &bytes)
 }
 
-fn encode(picture: &Picture, ev: f64) -> std::result::Result<Vec<u8>, png::EncodingError> {
+/// A picture as the bytes of a PNG file.
+pub fn encode(picture: &Picture, ev: f64) -> std::result::Result<Vec<u8>, png::EncodingError> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, picture.size[0], picture.size[1]);
     encoder.set_color(png::ColorType::Rgb);

@@ -1,8 +1,10 @@
 //! Spectra in text files: CSV (`nm,value`, with more columns by name; `nm,n,k`) and `.spd` (`nm value`).
 
+use std::fmt::{Debug, Write};
 use std::path::Path;
 
 use crate::error::Problem;
+use crate::spectral::Channels;
 
 /// Wavelengths in nm, ascending (two equal ones make a step), and a value for each.
 #[derive(Debug, Clone, PartialEq)]
@@ -11,6 +13,23 @@ pub struct SpectrumTable {
     pub value: Vec<f64>,
     /// The 1-based line each value stands on.
     pub line: Vec<usize>,
+}
+
+/// A spectrum as CSV: a header, then the centre of each channel in nm, its radiance and, where known, standard error, with as
+/// many digits as bring back the numbers exactly.
+pub fn spectrum_csv<T: Debug>(channels: &Channels, radiance: &[T], standard_error: Option<&[T]>) -> String {
+    // The header stands first: many readers of CSV know no comments.
+    let mut csv = "wavelength_nm,radiance".to_owned();
+    csv += if standard_error.is_some() { ",standard_error\n" } else { "\n" };
+    for (k, radiance) in radiance.iter().enumerate() {
+        // Debug, not Display: 1e-30 instead of thirty zeros. Writing to a string cannot fail.
+        let _ = write!(csv, "{},{radiance:?}", channels.centre(k));
+        let _ = match standard_error {
+            Some(errors) => writeln!(csv, ",{:?}", errors[k]),
+            None => writeln!(csv),
+        };
+    }
+    csv
 }
 
 /// Reads the spectrum of `column` (by name; absent: the only value column) of the file at `path`.

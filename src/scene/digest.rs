@@ -4,8 +4,8 @@ use glam::DVec3;
 use sha2::{Digest, Sha256};
 
 use super::{
-    Bsdf, Environment, EnvironmentMap, Field, Filter, Light, Medium, Projection, Sampler, Scene, Shape, Sides, Texels,
-    Wavelengths,
+    Attributes, Bsdf, Environment, EnvironmentMap, Field, Filter, Light, Medium, Projection, Reflectance, Sampler,
+    Scene, Shape, Sides, Texels, TextureKind, Wavelengths, Weight,
 };
 use crate::spectral::{Curve, Outside};
 
@@ -20,9 +20,13 @@ pub fn digest(scene: &Scene) -> String {
     hash.count(scene.materials.len());
     for material in &scene.materials {
         match material.bsdf {
-            Bsdf::Diffuse { reflectance } => {
+            Bsdf::Diffuse { reflectance: Reflectance::Spectrum(spectrum) } => {
                 hash.tag(0);
-                hash.count(reflectance);
+                hash.count(spectrum);
+            }
+            Bsdf::Diffuse { reflectance: Reflectance::Texture(texture) } => {
+                hash.tag(6);
+                hash.count(texture);
             }
             Bsdf::Black => hash.tag(1),
             Bsdf::Conductor { eta, k, roughness, energy_compensation } => {
@@ -39,23 +43,41 @@ pub fn digest(scene: &Scene) -> String {
                 hash.number(roughness);
             }
             Bsdf::Plastic { reflectance, eta, roughness } => {
-                hash.tag(4);
-                hash.count(reflectance);
+                match reflectance {
+                    Reflectance::Spectrum(spectrum) => {
+                        hash.tag(4);
+                        hash.count(spectrum);
+                    }
+                    Reflectance::Texture(texture) => {
+                        hash.tag(7);
+                        hash.count(texture);
+                    }
+                }
                 hash.count(eta);
                 hash.number(roughness);
             }
             Bsdf::Blend { a, b, weight } => {
-                hash.tag(5);
+                match weight {
+                    Weight::Constant(weight) => {
+                        hash.tag(5);
+                        hash.number(weight);
+                    }
+                    Weight::Texture(texture) => {
+                        hash.tag(8);
+                        hash.count(texture);
+                    }
+                }
                 hash.count(a);
                 hash.count(b);
-                hash.number(weight);
             }
         }
         hash.tag(u8::from(material.two_sided));
         hash.option(material.temperature, Hash::number);
     }
+    hash.textures(scene);
     hash.count(scene.objects.len());
     for object in &scene.objects {
+        hash.attributes(&object.attributes);
         hash.shape(&object.shape);
         hash.option(object.material, Hash::count);
         match &object.emission {
@@ -230,6 +252,45 @@ impl Hash {
                 self.tag(3);
                 self.numbers(&[*kelvin, *scale]);
             }
+        }
+    }
+
+    fn textures(&mut self, scene: &Scene) {
+        if scene.textures.is_empty() {
+            return;
+        }
+        self.text("textures");
+        self.count(scene.textures.len());
+        for texture in &scene.textures {
+            match &texture.kind {
+                TextureKind::Colour => self.tag(0),
+                TextureKind::Mixture(endmembers) => {
+                    self.tag(1);
+                    self.count(endmembers.len());
+                    endmembers.iter().for_each(|spectrum| self.count(*spectrum));
+                }
+                TextureKind::Number => self.tag(2),
+            }
+            texture.size.iter().for_each(|size| self.count(*size as usize));
+            texture.texels.iter().for_each(|texel| self.0.update(texel.to_bits().to_le_bytes()));
+        }
+    }
+
+    /// Tags that no shape has, before the shape; nothing where there are none.
+    fn attributes(&mut self, attributes: &Attributes) {
+        if let Some(uv) = &attributes.uv {
+            self.tag(100);
+            self.count(uv.len());
+            self.numbers(uv.iter().flatten().flat_map(|uv| [&uv.x, &uv.y]));
+        }
+        if let Some(normals) = &attributes.normals {
+            self.tag(101);
+            self.count(normals.len());
+            normals.iter().flatten().for_each(|normal| self.vector(*normal));
+        }
+        if let Some(axes) = &attributes.axes {
+            self.tag(102);
+            self.numbers(&axes.to_cols_array());
         }
     }
 

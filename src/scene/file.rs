@@ -119,6 +119,7 @@ fn decode<'a>(cx: &'a Context<'a>, root: &'a [Entry]) -> Option<Scene> {
         items.iter().for_each(|item| objects.add(item));
     }
     let objects = objects.finish();
+    let (materials, textures) = materials.finish();
     let outer = top.get("camera").and_then(|item| camera::medium(&item));
     let camera_medium = outer.map(|item| media.take_outer(&item, &mut spectra));
     let lights = light::decode_lights(top.get("lights"), &mut spectra);
@@ -130,7 +131,8 @@ fn decode<'a>(cx: &'a Context<'a>, root: &'a [Entry]) -> Option<Scene> {
         film: film?,
         channels: channels?,
         integrator: integrator?,
-        materials: materials.finish(),
+        materials,
+        textures,
         spectra: spectra.finish(),
         objects,
         media: media.finish(),

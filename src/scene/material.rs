@@ -4,8 +4,9 @@ use super::blend::{Parts, check_blends};
 use super::decode::{Fields, Item, Keys, did_you_mean, list};
 use super::overrides::MATERIAL_KINDS;
 use super::spectrum::{Handle, Quantity, Spectra};
+use super::texture::{self, Number, Textures, is_texture};
 use super::tree::Value;
-use super::{Bsdf, Material, MaterialId, SMOOTH};
+use super::{Bsdf, Material, MaterialId, Reflectance, SMOOTH, Texture, Weight};
 
 const KINDS: Keys = Keys::new(&MATERIAL_KINDS);
 const DIFFUSE: Keys = Keys::new(&["reflectance", "two_sided", "temperature"]);
@@ -25,12 +26,37 @@ const TRANSPARENT: &str = "absorbs nothing, so it emits nothing and has no tempe
 
 /// A material as the file defines it.
 pub enum Kind<'a> {
-    Diffuse { reflectance: Handle },
+    Diffuse { reflectance: Reflects },
     Conductor { eta: Handle, k: Handle, roughness: [f64; 2], energy_compensation: bool },
     Dielectric { eta: Handle, dispersion: bool, roughness: f64 },
-    Plastic { reflectance: Handle, eta: Handle, roughness: f64 },
-    Blend { parts: Parts<'a>, weight: f64 },
+    Plastic { reflectance: Reflects, eta: Handle, roughness: f64 },
+    Blend { parts: Parts<'a>, weight: Share },
     Black,
+}
+
+/// A reflectance, the same all over or textured.
+#[derive(Clone, Copy)]
+pub enum Reflects {
+    Spectrum(Handle),
+    Texture(texture::Handle),
+}
+
+/// The share of a blend's second part.
+#[derive(Clone, Copy)]
+pub enum Share {
+    Constant(f64),
+    Texture(texture::Handle),
+}
+
+/// What a material asks of the surfaces that have it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Needs {
+    /// Texture coordinates.
+    pub uv: bool,
+    /// A direction on the surface: the look depends on how it is turned about its normal.
+    pub tangent: bool,
+    /// The normal that light sees; nothing on black.
+    pub normal: bool,
 }
 
 pub struct Declared<'a> {
@@ -46,13 +72,15 @@ pub struct Materials<'a> {
     declared: Vec<(&'a str, Option<Declared<'a>>)>,
     /// In the order of their first use, parts before their blend.
     scene: Vec<Material>,
+    textures: Textures,
 }
 
 impl<'a> Materials<'a> {
     pub fn new(item: Option<Item<'a>>, spectra: &mut Spectra<'a>) -> Self {
         let items = item.as_ref().and_then(|item| item.named_items()).unwrap_or_default();
-        let declared = items.iter().map(|(name, item)| (*name, decode(item, spectra))).collect();
-        let mut materials = Materials { declared, scene: Vec::new() };
+        let mut textures = Textures::default();
+        let declared = items.iter().map(|(name, item)| (*name, decode(item, spectra, &mut textures))).collect();
+        let mut materials = Materials { declared, scene: Vec::new(), textures };
         materials.look_up_parts();
         check_blends(&mut materials.declared);
         materials.check_temperatures(item.as_ref());
@@ -92,7 +120,7 @@ impl<'a> Materials<'a> {
         }
         let (name, two_sided, temperature) = ((*name).to_owned(), declared.two_sided, declared.temperature);
         let bsdf = match declared.kind {
-            Kind::Diffuse { reflectance } => Bsdf::Diffuse { reflectance: spectra.take(reflectance) },
+            Kind::Diffuse { reflectance } => Bsdf::Diffuse { reflectance: self.take_reflectance(reflectance, spectra) },
             Kind::Conductor { eta, k, roughness, energy_compensation } => {
                 Bsdf::Conductor { eta: spectra.take(eta), k: spectra.take(k), roughness, energy_compensation }
             }
@@ -100,10 +128,15 @@ impl<'a> Materials<'a> {
                 Bsdf::Dielectric { eta: spectra.take(eta), dispersion, roughness }
             }
             Kind::Plastic { reflectance, eta, roughness } => {
-                Bsdf::Plastic { reflectance: spectra.take(reflectance), eta: spectra.take(eta), roughness }
+                let reflectance = self.take_reflectance(reflectance, spectra);
+                Bsdf::Plastic { reflectance, eta: spectra.take(eta), roughness }
             }
             Kind::Blend { ref parts, weight } => {
                 let [a, b] = parts.indices?;
+                let weight = match weight {
+                    Share::Constant(weight) => Weight::Constant(weight),
+                    Share::Texture(handle) => Weight::Texture(self.textures.take(handle, spectra)),
+                };
                 let (a, b) = (self.take_declared(a, spectra), self.take_declared(b, spectra));
                 Bsdf::Blend { a: a?, b: b?, weight }
             }
@@ -117,22 +150,40 @@ impl<'a> Materials<'a> {
         Some(id)
     }
 
+    fn take_reflectance(&mut self, reflectance: Reflects, spectra: &mut Spectra) -> Reflectance {
+        match reflectance {
+            Reflects::Spectrum(handle) => Reflectance::Spectrum(spectra.take(handle)),
+            Reflects::Texture(handle) => Reflectance::Texture(self.textures.take(handle, spectra)),
+        }
+    }
+
     /// The name of a material of the scene.
     pub fn name(&self, id: MaterialId) -> &str {
         &self.scene[id].name
     }
 
-    /// Whether the look of a material of the scene depends on how the surface is turned about its normal.
-    pub fn is_anisotropic(&self, id: MaterialId) -> bool {
+    /// What a material of the scene asks of its surfaces.
+    pub fn needs(&self, id: MaterialId) -> Needs {
+        let textured =
+            |reflectance| Needs { uv: matches!(reflectance, Reflectance::Texture(_)), tangent: false, normal: true };
         match self.scene[id].bsdf {
-            Bsdf::Conductor { roughness: [x, y], .. } => x != y,
-            Bsdf::Blend { a, b, .. } => self.is_anisotropic(a) || self.is_anisotropic(b),
-            _ => false,
+            Bsdf::Diffuse { reflectance } | Bsdf::Plastic { reflectance, .. } => textured(reflectance),
+            Bsdf::Conductor { roughness: [x, y], .. } => Needs { uv: false, tangent: x != y, normal: true },
+            Bsdf::Dielectric { .. } => Needs { uv: false, tangent: false, normal: true },
+            Bsdf::Blend { a, b, weight } => {
+                let (a, b) = (self.needs(a), self.needs(b));
+                Needs {
+                    uv: a.uv || b.uv || matches!(weight, Weight::Texture(_)),
+                    tangent: a.tangent || b.tangent,
+                    normal: a.normal || b.normal,
+                }
+            }
+            Bsdf::Black => Needs::default(),
         }
     }
 
-    pub fn finish(self) -> Vec<Material> {
-        self.scene
+    pub fn finish(self) -> (Vec<Material>, Vec<Texture>) {
+        (self.scene, self.textures.finish())
     }
 
     /// Reports blends with a temperature of which no part can be hot, and leaves `None` in their place.
@@ -184,13 +235,13 @@ impl<'a> Materials<'a> {
     }
 }
 
-fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Declared<'a>> {
+fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>, textures: &mut Textures) -> Option<Declared<'a>> {
     let fields = item.table(KINDS)?;
     let kind = fields.exactly_one(&MATERIAL_KINDS, "kind of material")?;
     let (fields, kind) = match kind.path.rsplit('.').next() {
         Some("diffuse") => {
             let fields = kind.table(DIFFUSE)?;
-            let reflectance = spectrum(&fields, "reflectance", REFLECTANCE, Quantity::Reflectance, spectra);
+            let reflectance = reflects(&fields, spectra, textures);
             (fields, reflectance.map(|reflectance| Kind::Diffuse { reflectance }))
         }
         Some("conductor") => {
@@ -218,7 +269,7 @@ fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Declared<'a>
         }
         Some("plastic") => {
             let fields = kind.table(PLASTIC)?;
-            let reflectance = spectrum(&fields, "reflectance", REFLECTANCE, Quantity::Reflectance, spectra);
+            let reflectance = reflects(&fields, spectra, textures);
             let eta = spectrum(&fields, "eta", ETA, Quantity::CoatIndex, spectra);
             let kind = match (reflectance, eta, roughness(&fields)) {
                 (Some(reflectance), Some(eta), Some(roughness)) => Some(Kind::Plastic { reflectance, eta, roughness }),
@@ -228,7 +279,7 @@ fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Declared<'a>
         }
         Some("blend") => {
             let fields = kind.table(BLEND)?;
-            let (kind, temperature) = (blend(&fields), temperature(&fields));
+            let (kind, temperature) = (blend(&fields, textures), temperature(&fields));
             return Some(Declared { kind: kind?, two_sided: true, temperature: temperature?, taken: None });
         }
         _ => (kind.table(BLACK)?, Some(Kind::Black)),
@@ -297,7 +348,7 @@ pub fn kelvin(item: &Item) -> Option<f64> {
     item.number_where(|kelvin| kelvin > 0.0 && kelvin <= HOTTEST, "a temperature in K, above 0 and at most 1e9")
 }
 
-fn blend<'a>(fields: &Fields<'a>) -> Option<Kind<'a>> {
+fn blend<'a>(fields: &Fields<'a>, textures: &mut Textures) -> Option<Kind<'a>> {
     let part = |key: &str| {
         let item = fields.require(key, &format!("{key} = \"white\", the name of a material"))?;
         item.text().map(|_| item)
@@ -305,12 +356,19 @@ fn blend<'a>(fields: &Fields<'a>) -> Option<Kind<'a>> {
     let (a, b) = (part("a"), part("b"));
     let weight = fields.require("weight", "weight = 0.5, the share of b").and_then(|item| {
         if matches!(item.node.value, Value::Table(_)) {
-            item.table(Keys::new(&[]).later(&["texture"]));
-            return None;
+            return textures.number(&item, Number::Weight).map(Share::Texture);
         }
-        item.number_where(|weight| (0.0..=1.0).contains(&weight), "the share of b, in [0, 1]")
+        item.number_where(|weight| (0.0..=1.0).contains(&weight), "the share of b, in [0, 1]").map(Share::Constant)
     });
     Some(Kind::Blend { parts: Parts { items: [a?, b?], indices: None }, weight: weight? })
+}
+
+fn reflects<'a>(fields: &Fields<'a>, spectra: &mut Spectra<'a>, textures: &mut Textures) -> Option<Reflects> {
+    let item = fields.require("reflectance", REFLECTANCE)?;
+    if is_texture(&item) {
+        return textures.reflectance(&item, spectra).map(Reflects::Texture);
+    }
+    spectra.resolve(&item, Quantity::Reflectance).map(Reflects::Spectrum)
 }
 
 fn spectrum<'a>(

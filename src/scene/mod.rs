@@ -17,6 +17,7 @@ mod object;
 mod overrides;
 mod shape;
 mod spectrum;
+mod texture;
 mod transform;
 mod tree;
 
@@ -32,6 +33,8 @@ use crate::spectral::{Channels, Curve};
 
 /// Index into [`Scene::spectra`].
 pub type SpectrumId = usize;
+/// Index into [`Scene::textures`].
+pub type TextureId = usize;
 /// Index into [`Scene::materials`].
 pub type MaterialId = usize;
 /// Index into [`Scene::media`].
@@ -50,6 +53,8 @@ pub struct Scene {
     pub spectra: Vec<Spectrum>,
     /// Only materials that some object uses, itself or as a part of a blend.
     pub materials: Vec<Material>,
+    /// Only those that some material in use has.
+    pub textures: Vec<Texture>,
     pub objects: Vec<Object>,
     /// Only those that fill something.
     pub media: Vec<Medium>,
@@ -169,7 +174,7 @@ pub struct Material {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Bsdf {
     Diffuse {
-        reflectance: SpectrumId,
+        reflectance: Reflectance,
     },
     /// Complex index of refraction η + i k, k > 0 absorbs.
     Conductor {
@@ -188,7 +193,7 @@ pub enum Bsdf {
     },
     /// A diffuse base under a dielectric coat.
     Plastic {
-        reflectance: SpectrumId,
+        reflectance: Reflectance,
         eta: SpectrumId,
         roughness: f64,
     },
@@ -196,9 +201,62 @@ pub enum Bsdf {
     Blend {
         a: MaterialId,
         b: MaterialId,
-        weight: f64,
+        weight: Weight,
     },
     Black,
+}
+
+/// The fraction of light that a surface reflects, over wavelength.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Reflectance {
+    /// The same all over.
+    Spectrum(SpectrumId),
+    /// A texture of [`TextureKind::Colour`] or [`TextureKind::Mixture`].
+    Texture(TextureId),
+}
+
+/// The share of a blend's second part, in [0, 1].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Weight {
+    Constant(f64),
+    /// A texture of [`TextureKind::Number`].
+    Texture(TextureId),
+}
+
+/// Numbers over a surface by its texture coordinates (u, v): u runs right, v up, both repeat. Texel (x, y), counted from
+/// the top left, is centred at u = (x + ½) / width, 1 - v = (y + ½) / height; between centres everything is bilinear:
+/// of colours the spectra, not their coefficients.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Texture {
+    /// The file, for messages.
+    pub name: String,
+    /// Width and height.
+    pub size: [u32; 2],
+    pub kind: TextureKind,
+    /// \[y\]\[x\]\[channel\], rows from the top.
+    pub texels: Arc<[f32]>,
+}
+
+/// What the channels of a texture are.
+#[derive(Debug, Clone, PartialEq)]
+pub enum TextureKind {
+    /// Linear sRGB in [0, 1]; each texel's spectrum is that of `rgb` ([`crate::spectral::upsample::reflectance`]).
+    Colour,
+    /// The share of each of these reflectances; they sum to 1 at most, and what is missing is black.
+    Mixture(Vec<SpectrumId>),
+    /// One number: a weight, or kelvins.
+    Number,
+}
+
+impl Texture {
+    /// Numbers in a texel.
+    pub fn channels(&self) -> usize {
+        match &self.kind {
+            TextureKind::Colour => 3,
+            TextureKind::Mixture(endmembers) => endmembers.len(),
+            TextureKind::Number => 1,
+        }
+    }
 }
 
 /// Roughness below this is none: a mirror, or ideal refraction.
@@ -210,6 +268,7 @@ pub struct Object {
     /// For messages, e.g. `objects.3 (floor.obj, material "white")`.
     pub name: String,
     pub shape: Shape,
+    pub attributes: Attributes,
     /// `None`: a null boundary, which only bounds its interior. Paths pass it as if it were not there.
     pub material: Option<MaterialId>,
     pub emission: Option<Emission>,
@@ -274,11 +333,28 @@ impl Medium {
     }
 }
 
+/// What a shape carries beside its geometry, each only where its material asks for it.
+///
+/// Textures are laid out by (u, v), and anisotropic materials turned by a tangent, of either sign, which is the direction
+/// of growing u. On a quad u runs along `edge_u`, v along `edge_v`. On each face of a cube u runs to the right and v up,
+/// seen from outside with y up; on top and bottom u runs along x. On an OBJ mesh they are its `vt`. Round shapes have an
+/// axis, y: the sphere its own y axis, the disk its normal, the cylinder that from `from` to `to`; and with (x, y, z) in
+/// [`Attributes::axes`], u = ½ + atan2(x, z) / 2π, so that u grows counter-clockwise about the axis. v is ½ + asin(y) / π
+/// on a unit sphere, 0 at `from` and 1 at `to` on a cylinder, 0 on the rim and 1 in the centre of a disk.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Attributes {
+    /// (u, v) at the corners of each triangle of a mesh.
+    pub uv: Option<Vec<[DVec2; 3]>>,
+    /// Unit shading normals at the corners of each triangle of a mesh, on its front; interpolated between.
+    pub normals: Option<Vec<[DVec3; 3]>>,
+    /// Columns: where x, y (the axis) and z of a round shape point. Orthonormal, left-handed on what is mirrored.
+    pub axes: Option<DMat3>,
+}
+
 /// World-space geometry, transforms applied.
 ///
-/// Anisotropic materials are turned by a tangent, of either sign: along the first edge (corner 0 to 1) of a triangle,
-/// which is along `edge_u` on a quad; around the axis of a disk or cylinder. Spheres and OBJ meshes have no tangent to
-/// speak of and no anisotropic material.
+/// Without texture coordinates the tangent of anisotropic materials ([`Attributes`]) is along the first edge (corner 0 to
+/// 1) of a triangle, which is that of growing u on quads and cubes.
 #[derive(Debug, Clone)]
 pub enum Shape {
     /// Also quads and cubes. Front = counter-clockwise.

@@ -8,14 +8,15 @@ use glam::{DAffine3, DVec3};
 
 use super::closed;
 use super::decode::{Fields, Item, Keys, list};
-use super::material::Materials;
+use super::material::{Materials, Needs};
 use super::medium::Media;
 use super::overrides::SHAPES;
-use super::shape;
+use super::shape::{self, Replaced};
 use super::spectrum::{Handle, Quantity, Spectra, report_in_file};
 use super::transform;
 use super::tree::Value;
-use super::{Emission, Interior, MaterialId, MediumId, Object, Shape, Sides};
+use super::{Attributes, Emission, Interior, MaterialId, MediumId, Object, Shape, Sides};
+use crate::error::Problem;
 use crate::format::obj::{self, Obj, Part};
 
 const KEYS: Keys = Keys::new(&[
@@ -96,7 +97,7 @@ impl<'s, 'a> Objects<'s, 'a> {
             let Some(mesh) = self.read(&shape) else { return };
             let Some(parts) = pick(&mesh, &shape, group.as_ref()) else { return };
             if fields.has("interior") {
-                common.interior = self.filling(&fields, &Shape::Mesh(shape::join(&parts)));
+                common.interior = self.filling(&fields, &Shape::Mesh(shape::join(&parts, Needs::default()).0));
             }
             match look {
                 Some(look) => {
@@ -118,11 +119,9 @@ impl<'s, 'a> Objects<'s, 'a> {
             common.interior = self.filling(&fields, &local);
         }
         let kind = shape.path.rsplit('.').next().unwrap_or_default();
-        if let (Some(Look::Of(material)), "sphere") = (look, kind) {
-            self.refuse_anisotropic(&fields, "a sphere", material);
-        }
+        let attributes = shape::attributes(&local, self.needs(look));
         let name = format!("{} ({kind})", item.path);
-        self.push(&fields, name, local, look, &common);
+        self.push(&fields, name, (local, attributes), look, &common);
     }
 
     pub fn finish(self) -> Vec<Object> {
@@ -260,27 +259,55 @@ impl<'s, 'a> Objects<'s, 'a> {
         look: Option<Look>,
         common: &Common,
     ) {
-        if let Some(Look::Of(material)) = look {
-            self.refuse_anisotropic(fields, "an OBJ mesh", material);
+        let needs = self.needs(look);
+        let bare = parts.iter().find(|part| (needs.uv || needs.tangent) && part.uv.is_none());
+        if let (Some(part), Some(Look::Of(material))) = (bare, look) {
+            let why = if needs.uv { "is textured" } else { "has two roughnesses" };
+            let message = format!(
+                "material \"{}\" {why}, but the faces from here on have no texture coordinates (vt)",
+                self.materials.name(material)
+            );
+            shape.cx.push(Problem {
+                file: shape.cx.path(shape.text().unwrap_or_default()),
+                line: Some(part.line),
+                key: Some(shape.path.clone()),
+                message,
+                help: Some("export the mesh with its UV map, or give it another material".to_owned()),
+                ..Problem::default()
+            });
+            return;
         }
         let label = usemtl.map_or_else(String::new, |name| format!(", material \"{name}\""));
         let name = format!("{} ({}{label})", fields.path, file_name(shape));
-        self.push(fields, name, Shape::Mesh(shape::join(parts)), look, common);
+        let (mesh, attributes) = shape::join(parts, needs);
+        if needs.tangent {
+            let count = shape::without_tangent(&attributes);
+            if count > 0 {
+                shape.cx.warn(format!(
+                    "{name}: on {count} triangles the texture coordinates give no direction for its two roughnesses; \
+                     their first edge does"
+                ));
+            }
+        }
+        self.push(fields, name, (Shape::Mesh(mesh), attributes), look, common);
     }
 
-    /// Roughness that differs along and across needs directions on the surface, which not all shapes have yet.
-    fn refuse_anisotropic(&self, fields: &Fields<'a>, shape: &str, material: MaterialId) {
-        if self.materials.is_anisotropic(material) {
-            let name = self.materials.name(material);
-            fields.error_help(
-                format!("material \"{name}\" has two roughnesses, which is not supported yet on {shape}"),
-                "use one roughness, or a quad, cube, disk or cylinder",
-            );
+    fn needs(&self, look: Option<Look>) -> Needs {
+        match look {
+            Some(Look::Of(material)) => self.materials.needs(material),
+            _ => Needs::default(),
         }
     }
 
     /// Moves `local` into the world and adds it to the scene.
-    fn push(&mut self, fields: &Fields<'a>, name: String, local: Shape, look: Option<Look>, common: &Common) {
+    fn push(
+        &mut self,
+        fields: &Fields<'a>,
+        name: String,
+        (local, mut attributes): (Shape, Attributes),
+        look: Option<Look>,
+        common: &Common,
+    ) {
         let Some(affine) = common.affine else { return };
         let mut shape = match transform::apply(&affine, local) {
             Ok(shape) => shape,
@@ -291,14 +318,28 @@ impl<'s, 'a> Objects<'s, 'a> {
                 return;
             }
         };
+        transform::apply_attributes(&affine, &mut attributes);
         if let Shape::Mesh(mesh) = &mut shape {
-            let dropped = shape::drop_degenerate(mesh);
+            let dropped = shape::drop_degenerate(mesh, &mut attributes);
             if mesh.triangles.is_empty() {
                 fields.error_help(format!("{name} has no area: all its triangles are degenerate"), "correct the mesh");
                 return;
             }
             if dropped > 0 {
                 fields.cx.warn(format!("{name}: {dropped} triangles without area were dropped"));
+            }
+            let Replaced { without_length, behind } = shape::settle_normals(mesh, &mut attributes);
+            if without_length > 0 {
+                let warning =
+                    format!("{name}: {without_length} vertex normals of length 0 are replaced by their triangle's");
+                fields.cx.warn(warning);
+            }
+            if behind > 0 {
+                let warning = format!(
+                    "{name}: {behind} vertex normals point behind their triangle, whose front is where its corners run \
+                     counter-clockwise; they are turned round"
+                );
+                fields.cx.warn(warning);
             }
         }
         let (Some(look), Some(emission), Some(interior)) = (look, common.emission, common.interior) else { return };
@@ -311,7 +352,7 @@ impl<'s, 'a> Objects<'s, 'a> {
             Interior { body, medium, to_grid: to_unit * affine.inverse() }
         });
         let emission = emission.map(|(radiance, sides)| Emission { radiance: self.spectra.take(radiance), sides });
-        self.scene.push(Object { name, shape, material, emission, interior });
+        self.scene.push(Object { name, shape, attributes, material, emission, interior });
     }
 }
 
@@ -347,9 +388,6 @@ fn pick<'m>(mesh: &'m Obj, shape: &Item, group: Option<&Item>) -> Option<Vec<&'m
 
 fn warn_about(item: &Item, mesh: &Obj) {
     let file = file_name(item);
-    if mesh.has_normals {
-        item.cx.warn(format!("{file}: its vertex normals are not used; shading follows the triangles"));
-    }
     if mesh.without_surface > 0 {
         item.cx.warn(format!("{file}: {} points and lines have no surface and are left out", mesh.without_surface));
     }

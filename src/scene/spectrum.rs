@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use super::context::Context;
 use super::decode::{Item, Keys, did_you_mean, list};
 use super::overrides::SPECTRUM_SOURCES;
+use super::texture::is_texture;
 use super::tree::{Origin, Value};
 use super::{Spectrum, SpectrumId};
 use crate::error::Problem;
@@ -140,8 +141,7 @@ pub struct Spectra<'a> {
 }
 
 const KEYS: Keys =
-    Keys::new(&["file", "constant", "blackbody", "samples", "regular", "rgb", "column", "scale", "outside"])
-        .later(&["texture", "endmembers"]);
+    Keys::new(&["file", "constant", "blackbody", "samples", "regular", "rgb", "column", "scale", "outside"]);
 
 impl<'a> Spectra<'a> {
     /// Decodes `[spectra]`. `channels` decide what a table leaves uncovered.
@@ -283,6 +283,11 @@ impl<'a> Spectra<'a> {
         Some(self.checked.len() - 1)
     }
 
+    /// Says `warning` to the user, once.
+    pub fn warn(&self, warning: String) {
+        self.cx.warn(warning);
+    }
+
     /// The spectra in use.
     pub fn finish(self) -> Vec<Spectrum> {
         self.scene
@@ -415,7 +420,7 @@ impl<'a> Spectra<'a> {
 
 /// A spectrum written as a number or a table.
 fn source<'a>(item: &Item<'a>) -> Option<Source<'a>> {
-    let Value::Table(entries) = &item.node.value else {
+    let Value::Table(_) = &item.node.value else {
         if !matches!(item.node.value, Value::Integer(_) | Value::Float(_)) {
             item.error_help(
                 format!("must be a spectrum, but is {}", item.node.value.kind()),
@@ -426,10 +431,14 @@ fn source<'a>(item: &Item<'a>) -> Option<Source<'a>> {
         let data = Data::Constant(item.number()?);
         return Some(Source { data, scale: 1.0, outside: None, path: item.path.clone(), at: item.at });
     };
-    let fields = item.table(KEYS)?;
-    if entries.iter().any(|e| KEYS.later.contains(&e.key.as_str())) {
+    if is_texture(item) {
+        item.error_help(
+            "is the same all over a surface, so it cannot be a texture",
+            "textures are for `reflectance` of diffuse and plastic, `weight` of blend, and `temperature`",
+        );
         return None;
     }
+    let fields = item.table(KEYS)?;
     let kind = fields.exactly_one(&SPECTRUM_SOURCES, "spectrum source");
     let scale = match fields.get("scale") {
         Some(item) => item.not_negative(),

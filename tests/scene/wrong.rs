@@ -228,7 +228,6 @@ fn spectra_and_materials() {
         ("unknown far spectrum", USE, "reflectance = \"copper\" #!", white, &["no spectrum is named", "grey, lamp"]),
         ("file for a name", USE, "reflectance = \"white.csv\" #!", white, &["write { file = \"white.csv\" }"]),
         ("boolean spectrum", USE, "reflectance = true #!", white, &["must be a spectrum", "a boolean"]),
-        ("texture", USE, "reflectance = { texture = \"a.png\" } #!", "materials.white.diffuse.reflectance.texture", &["not supported yet"]),
         ("two_sided", USE, "reflectance = 0.5\ntwo_sided = \"yes\" #!", "materials.white.diffuse.two_sided", &["true or false"]),
         ("two kinds", "[materials.soot.black]", "[materials.soot.black]\n[materials.soot.diffuse] #!\nreflectance = 1", "materials.soot.diffuse", &["only one kind of material"]),
         ("no kind", "[materials.soot.black]", "[materials.soot.black]\n[materials.bare] #!", "materials.bare", &["no kind of material"]),
