@@ -9,7 +9,7 @@ use scene_builder::*;
 use spectile::gpu::adapter::STORAGE_BUFFERS;
 use spectile::gpu::shader::{Module, Source, compose};
 use spectile::render::prepare::{EvaluateShape, Features, Prepared, WindowList, Windows};
-use spectile::scene::{Attributes, Filter, Projection, Sampler, Scene, Shape, Sides, TextureKind};
+use spectile::scene::{Attributes, Filter, Projection, Sampler, Scene, Shape, Sides, Texels, TextureKind};
 use spectile::spectral::{Channels, Curve};
 
 /// Bytes of a kernel's code, comments and indentation apart: of a plain scene's, and of one that needs everything and spreads its
@@ -174,6 +174,26 @@ fn general_scenes() -> Vec<(String, Scene)> {
         }
     }
     scenes.extend(textured_scenes());
+    scenes.extend(light_scenes());
+    scenes
+}
+
+/// Every subset of what may light a scene beside a uniform sky, maps of both kinds, before matt and glass.
+fn light_scenes() -> Vec<(String, Scene)> {
+    let mut scenes = Vec::new();
+    for i in 1..24u32 {
+        let mut builder = Builder::new().diffuse(room(-DVec3::ONE, DVec3::ONE), 0.5);
+        builder = if i & 1 != 0 { builder.point(DVec3::ZERO, 1.0).directional(DVec3::X, 1.0) } else { builder };
+        builder = if i & 2 != 0 { builder.sun(DVec3::Y, 0.1, 1.0) } else { builder };
+        builder = if i & 4 != 0 { builder.lamp(disk(), surfaces::glass_curve(), Sides::Both) } else { builder };
+        builder = match i / 8 {
+            0 => builder,
+            1 => builder.rgb_map([3, 2], vec![0.5; 18]),
+            _ => builder.map([2, 1], Texels::Spectral { nm: vec![500.0, 600.0, 700.0], radiance: vec![1.0; 6].into() }),
+        };
+        builder = if i % 3 == 0 { builder.dielectric(disk(), surfaces::glass_curve(), 0.5) } else { builder };
+        scenes.push((format!("lights {i}"), builder.build()));
+    }
     scenes
 }
 

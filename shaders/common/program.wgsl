@@ -119,6 +119,11 @@ fn operation_value(record: vec4<u32>, raw: vec4<f32>, quad: u32, s: SpectralSamp
         return smooth_spectrum(record.y, spectrum_value(VISIBLE_PLACE, quad, s));
     }
 #endif
+#if OP_MAP
+    if (operation == OP_MAP) {
+        return map_value(record.y, record.w, spectrum_value(MAP_AXIS, quad, s));
+    }
+#endif
     let a = spectrum_value(record.y & 0xffffu, quad, s);
     let parameter = bitcast<f32>(record.w);
     // Channels that only fill up the last quad have index 0.

@@ -45,6 +45,8 @@ const OP_SMOOTH: u32 = 20u;
 // X = Q / (1 - Q S_a), Q = 0: what comes out of a base of reflectance Q under a coat that reflects S_a back to it.
 const OP_INNER: u32 = 21u;
 #endif
+// X = the environment map over its source spectrum, in cell y (column | row << 16), at the fractions w (16 bits each).
+const OP_MAP: u32 = 9u;
 // X = D(h) |o h| |i h| / (o h + n i h)^2 (1 - F), each channel with its own half vector h; parameter: roughness; the next
 // record holds cos o, and i.
 const OP_ROUGH_TRANSMIT: u32 = 48u;

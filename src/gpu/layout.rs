@@ -111,6 +111,26 @@ pub struct Part {
     pub eta_greatest: f32,
 }
 
+/// A light without a surface, two vectors of words (shaders/common/lamp.wgsl).
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
+pub struct Lamp {
+    /// Position in device units, or the unit vector towards the light.
+    pub place: [f32; 3],
+    /// One of `LAMP_…`.
+    pub kind: u32,
+    /// Of a sun's angular radius: sine squared, and 1 - cos.
+    pub sine2: f32,
+    pub versine: f32,
+    pub unused: [u32; 2],
+}
+
+pub const LAMP_POINT: u32 = 0;
+pub const LAMP_DIRECTIONAL: u32 = 1;
+pub const LAMP_SUN: u32 = 2;
+/// Bit of [`Emitter::spectrum`].
+pub const EMITTER_IS_LAMP: u32 = 0x4000_0000;
+
 /// `NONE` in WGSL.
 pub const NONE: u32 = u32::MAX;
 

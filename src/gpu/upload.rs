@@ -43,6 +43,7 @@ fn check_size(name: &str, bytes: u64, limits: &wgpu::Limits) -> Result<()> {
     }
     let (what, help) = match name {
         "spectra" | "knot_starts" | "knots" => ("the spectra of the scene", "fewer channels or fewer spectra"),
+        "map_table" | "map_texels" => ("the environment map", "a smaller one"),
         "emitters" | "emitter_cdf" => ("the emitting triangles of the scene", "a coarser mesh where it emits"),
         "textures" | "texels" => ("the textures of the scene", "smaller ones"),
         "attributes" => ("the texture coordinates and normals of the scene", "fewer triangles"),
@@ -77,6 +78,13 @@ fn parts<'a>(prepared: &'a Prepared, windows: &Windows) -> Vec<(String, &'a [u8]
     }
     if !prepared.accel.attributes.is_empty() {
         parts.push(("attributes".into(), bytemuck::cast_slice(&prepared.accel.attributes)));
+    }
+    if prepared.features.general.is_some_and(|general| general.lamps) {
+        parts.push(("lamps".into(), bytemuck::cast_slice(&prepared.lamps)));
+    }
+    if let Some(sky) = &prepared.sky {
+        parts.push(("map_table".into(), bytemuck::cast_slice(&sky.table)));
+        parts.push(("map_texels".into(), bytemuck::cast_slice(&sky.texels)));
     }
     let mut add_windows = |name: &str, list: WindowList, bytes: &'a [u8], element: u64| {
         for i in 0..u64::from(list.count) {

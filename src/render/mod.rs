@@ -11,6 +11,7 @@ pub mod prepare;
 pub mod queue;
 pub mod rng;
 pub mod schedule;
+pub mod sky;
 pub mod surfaces;
 pub mod textures;
 pub mod watch;

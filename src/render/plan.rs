@@ -75,7 +75,7 @@ pub fn feature_lines(prepared: &Prepared, waves: &WavePlan) -> Vec<FeatureLine> 
         line("spheres, disks, cylinders", f.shapes, format!("{}, a test per primitive", module(s::SHAPES))),
         line(
             "next-event estimation",
-            f.emitters || f.environment,
+            f.emitters || f.environment || f.general.is_some_and(|g| g.lamps || g.map.is_some()),
             format!("{}, a shadow ray a bounce", module(s::LIGHT)),
         ),
         line("thin lens", f.thin_lens, "a pair of random numbers a path".into()),
@@ -108,6 +108,16 @@ pub fn feature_lines(prepared: &Prepared, waves: &WavePlan) -> Vec<FeatureLine> 
                 module(s::ATTRIBUTES),
                 format_bytes(size_of_val(prepared.accel.attributes.as_slice()) as u64)
             ),
+        ),
+        line(
+            "point, directional, sun lights",
+            f.general.is_some_and(|g| g.lamps),
+            format!("{}, 32 bytes a light", module(s::LAMP)),
+        ),
+        line(
+            "environment map",
+            f.general.is_some_and(|g| g.map.is_some()),
+            format!("{}, two records a bounce", module(s::MAP)),
         ),
         line("dispersion", f.general.is_some_and(|g| g.dispersion), "16 bytes a path".into()),
         line(
@@ -143,6 +153,8 @@ pub fn host_memory(prepared: &Prepared, header: &Header) -> HostMemory {
                 + size_of_val(s.parts.as_slice())
                 + size_of_val(s.tables.as_slice())
         })
+        + prepared.sky.as_ref().map_or(0, |s| size_of_val(s.table.as_slice()) + size_of_val(s.texels.as_slice()))
+        + size_of_val(prepared.lamps.as_slice())
         + size_of_val(prepared.emitters.as_slice())
         + size_of_val(prepared.picks.cdf.as_slice())
         + size_of_val(prepared.tables.strata.as_slice())

@@ -48,6 +48,10 @@ const MATCHED: f64 = 1e-4;
 pub enum Needed {
     Scene(SpectrumId),
     Derived(String, Curve),
+    /// Within the tables' bound of every value, not of each channel's peak.
+    Pointwise(String, Curve),
+    /// As `Derived`, and not to be approximated: it is a place in a table.
+    Exact(String, Curve),
 }
 
 /// The materials of a scene, flat. Spectra of parts are positions in `spectra` until [`Surfaces::name_spectra`].
@@ -113,6 +117,10 @@ impl Surfaces {
             surfaces.textures = Some(textures);
         }
         surfaces.albedos.clear();
+        // Where nothing scatters, shaders still bind a part.
+        if surfaces.parts.is_empty() {
+            surfaces.parts.push(Part::default());
+        }
         surfaces
     }
 
