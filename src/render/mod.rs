@@ -2,6 +2,7 @@
 
 #[cfg(test)]
 mod fault_tests;
+mod heat;
 pub mod job;
 pub mod lights;
 pub mod patience;

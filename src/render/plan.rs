@@ -175,10 +175,6 @@ pub fn check(scene: &Scene) -> Result<()> {
     if width == 0 || height == 0 || scene.channels.is_empty() {
         return Err(Error::input(&scene.file, "there is nothing to render: no pixels or no channels"));
     }
-    if let Some(hot) = scene.materials.iter().find(|m| m.temperature.is_some()) {
-        let message = format!("material \"{}\" has a `temperature`, which cannot be rendered yet: remove it", hot.name);
-        return Err(Error::input(&scene.file, message));
-    }
     if let Some(medium) = scene.media.first() {
         let message = format!("medium \"{}\" fills something, which cannot be rendered yet: remove it", medium.name);
         return Err(Error::input(&scene.file, message));

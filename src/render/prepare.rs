@@ -6,6 +6,7 @@ use crate::gpu::layout::{
 };
 use crate::gpu::self_test::LOOP_LIMIT;
 use crate::gpu::shader::{self, Defines, Module};
+use crate::render::heat;
 use crate::render::lights::{LightPicks, STEPS, light_picks};
 use crate::render::sky::SkyMap;
 use crate::render::surfaces::{Kind, Needed, Surfaces};
@@ -141,6 +142,7 @@ impl Prepared {
     /// Flattens `scene`. Errors: materials that no shader knows; more materials, spectra or bounces than ids and
     /// counters have bits for.
     pub fn new(scene: &Scene, seed: u64) -> Result<Prepared> {
+        let scene = &*heat::as_emission(scene)?;
         let accel = Accel::build(scene);
         if scene.materials.len() > MAX_MATERIALS {
             return Err(Error::input(&scene.file, format!("more than {MAX_MATERIALS} materials")));
