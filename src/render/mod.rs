@@ -2,8 +2,10 @@
 
 #[cfg(test)]
 mod fault_tests;
+mod heat;
 pub mod job;
 pub mod lights;
+pub mod media;
 pub mod patience;
 pub mod plan;
 pub mod pool;
