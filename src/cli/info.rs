@@ -195,6 +195,9 @@ fn describe_samples(progress: &Progress) -> String {
 }
 
 fn describe_estimate(cube: &Cube, progress: &Progress, estimate: &[f64]) -> String {
+    if cube.header().attributes.contains_key("derived") {
+        return "unknown: made of the channels of another cube, whose errors belong together".into();
+    }
     let epochs = epochs(cube, progress);
     if epochs < 2 {
         return format!("unknown before 2 epochs ({} samples per pixel)", 2 * cube.header().epoch);

@@ -1,5 +1,6 @@
 //! Arguments → job → exit code; one file per subcommand.
 
+mod bands;
 mod compare;
 mod devices;
 mod export;
@@ -10,6 +11,7 @@ mod plan;
 mod progress;
 mod render;
 mod scene;
+mod sensor;
 mod spectrum;
 
 use clap::{Parser, Subcommand};
@@ -35,6 +37,7 @@ Examples:
   spectile info cube.zarr                               how far it got, how large the error is
   spectile spectrum cube.zarr 120 80                    the spectrum of one pixel, as CSV
   spectile export cube.zarr -o picture.png              a picture of it
+  spectile sensor cube.zarr --responses s.csv -o s.zarr what a sensor would see of it
   spectile compare cube.zarr reference.zarr             how it differs from another cube
 
 Radiance is in W m-2 sr-1 nm-1, wavelengths are in nm (vacuum), pixels are counted from 0 at the top left.
@@ -58,6 +61,7 @@ enum Command {
     Spectrum(spectrum::Args),
     Compare(compare::Args),
     Export(export::Args),
+    Sensor(sensor::Args),
 }
 
 impl Cli {
@@ -70,6 +74,7 @@ impl Cli {
             Command::Info(args) => args.json,
             Command::Compare(args) => args.json,
             Command::Export(args) => args.json,
+            Command::Sensor(args) => args.json,
             Command::Spectrum(_) => false,
         }
     }
@@ -84,6 +89,7 @@ impl Cli {
             Command::Spectrum(args) => spectrum::run(args, output),
             Command::Compare(args) => compare::run(args, output),
             Command::Export(args) => export::run(args, output),
+            Command::Sensor(args) => sensor::run(args, output),
         }
     }
 }

@@ -22,6 +22,15 @@ const ROUGH_BELOW: u32 = 8;
 const LINE_EVERY: Duration = Duration::from_secs(1);
 const LINE_AT_LEAST_EVERY: Duration = Duration::from_secs(10);
 
+/// A bar for work that is not a render, on a terminal.
+pub fn bar(json: bool) -> Option<ProgressBar> {
+    (!json && std::io::stderr().is_terminal()).then(|| {
+        let bar = ProgressBar::with_draw_target(Some(1), ProgressDrawTarget::stderr_with_hz(5));
+        let style = ProgressStyle::with_template("{bar:30} {percent} %  {eta} left").expect("a valid template");
+        bar.with_style(style)
+    })
+}
+
 pub struct Reporter<'a> {
     output: &'a Output,
     quiet: bool,

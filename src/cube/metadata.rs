@@ -5,8 +5,8 @@ use std::path::Path;
 use serde_json::{Map, Value, json};
 
 use super::grid::Grid;
-use crate::spectral::Channels;
 use crate::spectral::colour::{Projection, ProjectionKind};
+use crate::spectral::{Channels, Curve, Response};
 use crate::{Error, Result};
 
 /// The version of the layout, `spectile_format` among the attributes of the group.
@@ -29,8 +29,17 @@ pub struct Header {
 }
 
 /// Attributes of the group that the header's own fields make.
-const RESERVED: [&str; 8] =
-    ["Conventions", "title", "spectile_format", "spectile_version", "epoch", "origin", "channel_names", "false_colour"];
+const RESERVED: [&str; 9] = [
+    "Conventions",
+    "title",
+    "spectile_format",
+    "spectile_version",
+    "epoch",
+    "origin",
+    "channel_names",
+    "false_colour",
+    "responses",
+];
 
 impl Header {
     pub fn grid(&self) -> Grid {
@@ -63,6 +72,12 @@ impl Header {
         let [_, rows] = self.grid().tiles().map(u64::from);
         // Names stand on a line each; centres, bounds and integrals are four doubles.
         let names: u64 = self.channels.names.iter().map(|name| name.len() as u64 + 16).sum();
+        // A node of a response is two numbers, a line each.
+        let nodes = |response: &Response| match response.curve() {
+            Curve::Linear { nm, .. } => 64 * nm.len() as u64,
+            _ => 0,
+        };
+        let names = names + self.channels.responses.iter().map(nodes).sum::<u64>();
         let coordinates = 32 * channels + 8 * (u64::from(self.size[0]) + u64::from(self.size[1]));
         let metadata = FIXED_BLOCKS * BLOCK_BYTES + in_blocks(names) + in_blocks(coordinates) + 4 * rows * BLOCK_BYTES;
         tile.saturating_mul(tiles).saturating_add(metadata)
@@ -93,7 +108,7 @@ impl Header {
                     let bounds = |[from, to]: [f64; 2]| format!("{from} to {to} nm");
                     there_and_wanted(&format!("channel {k}"), bounds(there.bounds[k]), bounds(wanted.bounds[k]))
                 }
-                None => Some("the names of the channels, or channels.false_colour".into()),
+                None => Some("the responses or names of the channels, or channels.false_colour".into()),
             };
         }
         if self.tile != wanted.tile {
@@ -151,6 +166,9 @@ impl Header {
         if channels.is_empty() || channels.names.len() != channels.len() {
             return Err(format!("{} channels with {} names", channels.len(), channels.names.len()));
         }
+        if !channels.responses.is_empty() && channels.responses.len() != channels.len() {
+            return Err(format!("{} channels with {} responses", channels.len(), channels.responses.len()));
+        }
         for (k, [from, to]) in channels.bounds.iter().enumerate() {
             if !(*from > 0.0 && from < to && to.is_finite()) {
                 return Err(format!("channel {k} from {from} to {to} nm is no interval of wavelength"));
@@ -180,6 +198,9 @@ impl Header {
             ("channel_names".into(), json!(self.channels.names)),
             ("false_colour".into(), json!(self.channels.false_colour)),
         ]);
+        if !self.channels.responses.is_empty() {
+            attributes.insert("responses".into(), json!(self.channels.responses));
+        }
         let arrays = arrays(self);
         let consolidated: Map<String, Value> = arrays.iter().map(|(name, v)| ((*name).into(), v.clone())).collect();
         let group = json!({
@@ -217,6 +238,9 @@ impl Header {
             serde_json::from_value(take("false_colour")).map_err(|_| damaged("has no `false_colour`"))?;
         let epoch = serde_json::from_value(take("epoch")).map_err(|_| damaged("has no `epoch`"))?;
         let origin = serde_json::from_value(take("origin")).map_err(|_| damaged("has no `origin`"))?;
+        let responses = attributes.remove("responses").unwrap_or_else(|| json!([]));
+        let responses =
+            serde_json::from_value(responses).map_err(|what| damaged(&format!("holds no valid `responses`: {what}")))?;
         for name in RESERVED {
             attributes.remove(name);
         }
@@ -224,7 +248,7 @@ impl Header {
             size: [*width, *height],
             origin,
             tile: [*tile_width, *tile_height],
-            channels: Channels { bounds: read_bounds(*count as usize)?, names, false_colour },
+            channels: Channels { bounds: read_bounds(*count as usize)?, names, false_colour, responses },
             epoch,
             attributes,
         };

@@ -27,8 +27,10 @@ mod preview;
 #[cfg(all(test, unix))]
 mod protocol_tests;
 mod recover;
+mod sensor;
 mod store;
 mod verify;
+mod view;
 mod writer;
 
 pub use compare::{ChannelMetrics, Comparison, compare};
@@ -39,8 +41,10 @@ pub use map::Chunk;
 pub use merge::{merge_bytes, merge_means};
 pub use metadata::{FORMAT, Header};
 pub use preview::reduction;
+pub use sensor::{Findings, integrate};
 pub use store::{Cube, Progress};
 pub use verify::Verification;
+pub use view::{Quantity, Reader, Strides, View};
 pub use writer::Writer;
 
 /// Side, in pixels, of the blocks whose means make up `overview`.

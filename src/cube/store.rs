@@ -167,8 +167,11 @@ impl Cube {
 
     /// The error estimate of every channel (DESIGN section 8), from the spread of the epochs: sqrt(Σ variance of the
     /// mean / Σ mean²), sums over the pixels of all tiles begun. NaN while any of those has fewer than two epochs, 0
-    /// where a channel is all zero.
+    /// where a channel is all zero. NaN in a cube made of another one's channels: these spread together.
     pub fn error_estimate(&self) -> Result<Vec<f64>> {
+        if self.header.attributes.contains_key("derived") {
+            return Ok(vec![f64::NAN; self.channels().len()]);
+        }
         let mut totals = estimate::Totals::new(self.channels().len(), self.header.epoch);
         for tile in 0..self.grid().count() {
             if let Some(record) = Journal::of(self, tile).last()? {

@@ -168,6 +168,22 @@ impl Writer {
     ///
     /// Waits while the open batch is full. On an error the tile is what it was.
     pub fn merge_unit(&self, tile: u32, n_before: u32, n_unit: u32, unit: &[f32]) -> Result<()> {
+        self.merge(tile, n_before, n_unit, unit, check_portion)
+    }
+
+    /// Stores what was made of another cube's tile, with as many samples per pixel as that has, into one that has none.
+    pub fn store(&self, tile: u32, samples: u32, values: &[f32]) -> Result<()> {
+        self.merge(tile, 0, samples, values, |_, samples, _| Ok(samples))
+    }
+
+    fn merge(
+        &self,
+        tile: u32,
+        n_before: u32,
+        n_unit: u32,
+        unit: &[f32],
+        samples_after: fn(u32, u32, u32) -> Result<u32>,
+    ) -> Result<()> {
         let (cube, grid) = (&self.cube, self.cube.grid());
         let expected = grid.tile_pixels() * cube.channels().len();
         if !self.tiles.contains(&tile) || unit.len() != expected {
@@ -183,7 +199,7 @@ impl Writer {
             );
             return Err(Error::storage(cube.path(), what));
         }
-        let samples = check_portion(n_before, n_unit, cube.header().epoch)?;
+        let samples = samples_after(n_before, n_unit, cube.header().epoch)?;
         let aside = Aside::new(cube, tile);
         let record = aside.write(base.as_ref(), samples, n_unit, unit)?;
         let chunk = Chunk::open(&aside.path(Part::Radiance), grid.rect(tile), grid.tile, cube.channels().len())?;

@@ -1,7 +1,11 @@
 //! Readers and writers of other people's formats; they know no GPU.
 
+pub mod envi;
+pub mod library;
+pub mod modtran;
 pub mod obj;
 pub mod plot;
 pub mod png;
 pub mod refractive;
+pub mod response;
 pub mod text;

@@ -6,7 +6,8 @@ pub mod curve;
 mod data;
 pub mod planck;
 pub mod table;
+pub mod temperature;
 pub mod upsample;
 
-pub use channels::Channels;
+pub use channels::{Channels, Response};
 pub use curve::{Curve, Outside};
