@@ -3,6 +3,7 @@
 pub mod envi;
 pub mod library;
 pub mod modtran;
+pub mod image;
 pub mod obj;
 pub mod plot;
 pub mod png;

@@ -2,9 +2,12 @@
 //! Efficient Spectral Upsampling* (Computer Graphics Forum 38(2), 2019).
 //!
 //! A reflectance is S(c₀t² + c₁t + c₂), S(x) = ½ + x / (2√(1+x²)) (Eqs. 3 and 4), t the wavelength scaled to [0, 1].
-//! The paper tabulates the coefficients; a scene has few colours, so they are solved for one by one here.
+//! The paper tabulates the coefficients; here they are solved for, one by one or a picture at a time.
 
+use std::collections::HashMap;
+use std::num::NonZeroUsize;
 use std::sync::LazyLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::{DMat3, DVec3};
 
@@ -58,6 +61,97 @@ pub fn reflectance(rgb: [f64; 3]) -> Curve {
     on_grid((0..NODES).map(|i| smooth(coefficients, i)))
 }
 
+/// A smooth reflectance by its coefficients.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Smooth(pub [f64; 3]);
+
+impl Smooth {
+    /// That of [`reflectance`] for `rgb`, without its grid. Greys are constant to rounding.
+    pub fn new(rgb: [f64; 3]) -> Self {
+        match grey(rgb) {
+            Some(grey) => grey,
+            None => Smooth(solve(DVec3::from_array(rgb)).to_array()),
+        }
+    }
+
+    /// The value at `nm`; beyond 360-830 nm the end values hold.
+    pub fn eval(&self, nm: f64) -> f64 {
+        let (first, last) = (f64::from(FIRST_NM), f64::from(LAST_NM));
+        let t = (nm.clamp(first, last) - first) / (last - first);
+        let [a, b, c] = self.0;
+        let x = (a * t + b) * t + c;
+        // Without the cancellation of Eq. 4 where x is far below 0.
+        let root = (1.0 + x * x).sqrt();
+        let tail = 0.5 / (root * (root + x.abs()));
+        if x < 0.0 { tail } else { 1.0 - tail }
+    }
+}
+
+/// [`Smooth::new`] of every colour in turn: the same but for the last digits, and much faster where there are many,
+/// as each is solved for from the solution of a similar one. All cores take part, and change no bit.
+pub fn smooth_of(colours: &[[f32; 3]]) -> Vec<Smooth> {
+    // Along a curve that visits the colour cube piece by piece, so that neighbours on it are alike.
+    let key = |rgb: &[f32; 3]| (interleaved(rgb), rgb.map(f32::to_bits));
+    let mut distinct = colours.to_vec();
+    distinct.sort_unstable_by_key(key);
+    distinct.dedup_by_key(|rgb| rgb.map(f32::to_bits));
+
+    const BLOCK: usize = 256;
+    let blocks: Vec<&[[f32; 3]]> = distinct.chunks(BLOCK).collect();
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let mut done = Vec::new();
+        while let Some(block) = blocks.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let mut before = None;
+            for rgb in *block {
+                let smooth = near(rgb.map(f64::from), before);
+                before = Some(smooth).filter(|_| grey(rgb.map(f64::from)).is_none());
+                done.push((rgb.map(f32::to_bits), smooth));
+            }
+        }
+        done
+    };
+    let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get).min(blocks.len());
+    let solved: HashMap<[u32; 3], Smooth> = std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..cores).map(|_| scope.spawn(work)).collect();
+        let join = |worker: std::thread::ScopedJoinHandle<_>| {
+            worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        };
+        workers.into_iter().flat_map(join).collect()
+    });
+    colours.iter().map(|rgb| solved[&rgb.map(f32::to_bits)]).collect()
+}
+
+/// The solution for `rgb` from that of a similar colour, or from none.
+fn near(rgb: [f64; 3], similar: Option<Smooth>) -> Smooth {
+    if let (Some(similar), None) = (similar, grey(rgb)) {
+        let target = lab(OBSERVER.from_rgb * DVec3::from_array(rgb)).0;
+        let coefficients = descend(DVec3::from_array(similar.0), target, 12);
+        if (appearance(coefficients).0 - target).length_squared() < CLOSE_ENOUGH {
+            return Smooth(coefficients.to_array());
+        }
+    }
+    Smooth::new(rgb)
+}
+
+/// Ten bits of each component, taken in turn (Morton 1966).
+fn interleaved(rgb: &[f32; 3]) -> u32 {
+    let bits = rgb.map(|v| (v.clamp(0.0, 1.0) * 1023.0) as u32);
+    (0..30).fold(0, |key, i| key | (bits[i % 3] >> (i / 3) & 1) << i)
+}
+
+/// The coefficients of a grey: S⁻¹, of what is 1e-18 from its ends the ends.
+fn grey(rgb: [f64; 3]) -> Option<Smooth> {
+    let [v, g, b] = rgb;
+    (v == g && g == b).then(|| {
+        let inverse = (2.0 * v - 1.0) / (2.0 * (v * (1.0 - v)).max(0.0).sqrt());
+        Smooth([0.0, 0.0, inverse.clamp(-FARTHEST, FARTHEST)])
+    })
+}
+
+/// Beyond, S is 0 or 1 to 1e-18; its square is far inside f32.
+const FARTHEST: f64 = 5e8;
+
 /// An emission, in W m⁻² sr⁻¹ nm⁻¹, of colour `rgb`, linear sRGB of at least 0: D65 times a smooth spectrum times a
 /// scale, such that [1, 1, 1] is D65 with Y = ∫L ȳ dλ / ∫ȳ dλ = 1. Beyond 360-830 nm the end values hold.
 pub fn emission(rgb: [f64; 3]) -> Curve {
@@ -87,7 +181,7 @@ fn basis(i: usize) -> DVec3 {
 
 /// Eq. 4 of the paper.
 fn sigmoid(x: f64) -> f64 {
-    0.5 + x / (2.0 * x.hypot(1.0))
+    0.5 + x / (2.0 * (1.0 + x * x).sqrt())
 }
 
 fn smooth(coefficients: DVec3, i: usize) -> f64 {
@@ -122,8 +216,9 @@ fn appearance(coefficients: DVec3) -> (DVec3, DMat3) {
     for (i, &weight) in OBSERVER.weight.iter().enumerate() {
         let b = basis(i);
         let x = coefficients.dot(b);
-        xyz += weight * sigmoid(x);
-        let slope = weight * (0.5 / x.hypot(1.0).powi(3));
+        let root = (1.0 + x * x).sqrt().recip();
+        xyz += weight * (0.5 + 0.5 * x * root);
+        let slope = weight * (0.5 * root * root * root);
         derivative += DMat3::from_cols(slope * b.x, slope * b.y, slope * b.z);
     }
     let (value, by_xyz) = lab(xyz);
@@ -139,21 +234,21 @@ fn solve(rgb: DVec3) -> DVec3 {
     let mut coefficients = DVec3::new(0.0, 0.0, x / (1.0 - x * x).sqrt());
     for step in 1..=STEPS {
         let target = DVec3::splat(grey).lerp(rgb, f64::from(step) / f64::from(STEPS));
-        coefficients = descend(coefficients, lab(OBSERVER.from_rgb * target).0);
+        coefficients = descend(coefficients, lab(OBSERVER.from_rgb * target).0, 100);
     }
     coefficients
 }
 
+/// CIELAB units, squared: far below what f32 output can show.
+const CLOSE_ENOUGH: f64 = 1e-18;
+
 /// Gauss-Newton on the CIELAB difference to `target`, damped (Levenberg-Marquardt) so that it also ends well where
 /// the colour is out of reach and the coefficients would run away.
-fn descend(mut coefficients: DVec3, target: DVec3) -> DVec3 {
-    const ITERATIONS: usize = 100;
-    /// CIELAB units, squared: far below what f32 output can show.
-    const CLOSE_ENOUGH: f64 = 1e-18;
+fn descend(mut coefficients: DVec3, target: DVec3, iterations: usize) -> DVec3 {
     let mut damping = 1e-3;
     let (value, mut jacobian) = appearance(coefficients);
     let mut residual = value - target;
-    for _ in 0..ITERATIONS {
+    for _ in 0..iterations {
         if residual.length_squared() < CLOSE_ENOUGH || damping > 1e12 {
             break;
         }
@@ -227,6 +322,31 @@ mod tests {
         for v in [0.0, 0.25, 1.0] {
             assert_eq!(reflectance([v; 3]), Curve::Constant(v));
         }
+    }
+
+    /// Many at once are what each is alone: on the grid to 1e-9, greys, corners and repeated ones among them.
+    #[test]
+    fn many_colours_are_the_same_as_one_by_one() {
+        let mut colours: Vec<[f32; 3]> = Vec::new();
+        for i in 0..3000u32 {
+            let byte = |shift: u32| (i.wrapping_mul(2_654_435_761) >> shift & 255) as f32 / 255.0;
+            colours.push([byte(8), byte(16), byte(24)]);
+        }
+        colours.extend([[0.0; 3], [1.0; 3], [0.5; 3], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 0.0], [0.5; 3]]);
+        let start = std::time::Instant::now();
+        let all = smooth_of(&colours);
+        println!("{} colours in {:?}", colours.len(), start.elapsed());
+        assert_eq!(all, smooth_of(&colours));
+        for (rgb, smooth) in colours.iter().zip(&all).rev().step_by(17).chain([(&[0.0; 3], &all[3000])]) {
+            let curve = reflectance(rgb.map(f64::from));
+            for nm in [300.0, 360.0, 450.0, 551.0, 702.0, 830.0, 2000.0] {
+                let (one, many) = (curve.eval(nm), smooth.eval(nm));
+                assert!((one - many).abs() < 1e-8, "{rgb:?} at {nm} nm: {one} {many}");
+            }
+        }
+        assert_eq!(all[3000].eval(500.0), Smooth::new([0.0; 3]).eval(500.0));
+        assert!(all[3000].eval(500.0) < 1e-17 && all[3001].eval(500.0) == 1.0 && all[3002].eval(500.0) == 0.5);
+        assert!(smooth_of(&[]).is_empty());
     }
 
     /// DESIGN section 3: rgb emission [1, 1, 1] is D65 with Y = 1.
