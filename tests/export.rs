@@ -136,12 +136,13 @@ fn envi_in_every_order_is_read_by_spectral_and_rasterio() {
         );
         let bands = [20].into_iter().chain(3..9).collect();
         let part = Part { cube: &cube, bands, crop: [5, 7, 66, 30], integrated: true };
-        let more = json!({ "interleave": interleave, "units": "W m^-2 sr^-1", "default_bands": [0, 6, 2] });
+        let more = json!({ "interleave": interleave, "units": "W m^-2 sr^-1", "default_bands": [6, 6, 2] });
         part.check(folder.path(), "envi", &done["files"], more);
     }
     // Bit for bit without Python too.
     let (done, _) = export(folder.path(), &["-o", "raw.bip"]);
-    let expected: Vec<f32> = whole(&cube).values().0.into_iter().map(|v| if v.is_nan() { -9999.0 } else { v }).collect();
+    let expected: Vec<f32> =
+        whole(&cube).values().0.into_iter().map(|v| if v.is_nan() { -9999.0 } else { v }).collect();
     let path = folder.path().join(done["files"][0].as_str().expect("a name"));
     assert_eq!(fs::read(path).expect("read"), bytemuck::cast_slice::<f32, u8>(&expected));
 }
@@ -195,7 +196,8 @@ fn compressed_zarr_is_read_by_xarray() {
     whole(&cube).check(folder.path(), "zarr", &done["files"], more(true, "W m-2 sr-1 nm-1"));
     let (done, _) = export(folder.path(), &["-o", "loose.zarr", "--zarr-no-shards"]);
     whole(&cube).check(folder.path(), "zarr", &done["files"], more(false, "W m-2 sr-1 nm-1"));
-    let (done, _) = export(folder.path(), &["-o", "part.zarr", "--bands", "7..9,1", "--crop", "9,0,70,37", "--integrated"]);
+    let (done, _) =
+        export(folder.path(), &["-o", "part.zarr", "--bands", "7..9,1", "--crop", "9,0,70,37", "--integrated"]);
     let part = Part { cube: &cube, bands: vec![7, 8, 1], crop: [9, 0, 70, 37], integrated: true };
     part.check(folder.path(), "zarr", &done["files"], more(true, "W m-2 sr-1"));
     refused(folder.path(), &["-o", "part.zarr"], "exists already");
@@ -278,7 +280,8 @@ mod memory {
     /// The peak, bytes, of an export of `arguments`.
     fn peak(folder: &Path, arguments: &[&str]) -> u64 {
         let mut command = Command::new(env!("CARGO_BIN_EXE_spectile"));
-        let mut child = command.current_dir(folder).args(["export", "cube.zarr"]).args(arguments).spawn().expect("started");
+        let mut child =
+            command.current_dir(folder).args(["export", "cube.zarr"]).args(arguments).spawn().expect("started");
         let mut peak = 0;
         loop {
             let status = fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap_or_default();

@@ -129,6 +129,7 @@ impl Found {
             "epochs": epochs(cube, progress),
             "error_estimate_is_rough": epochs(cube, progress) < ROUGH_BELOW,
             "store_bytes": header.store_bytes(),
+            "uncertainty": header.has_uncertainty(),
             "preview": shows(cube),
             "attributes": header.attributes,
             "channels": each.collect::<Vec<_>>(),
@@ -162,6 +163,14 @@ impl Found {
             row("in use", format!("a process works on the tiles {}..{}", tiles.start, tiles.end));
         }
         row("error estimate", describe_estimate(cube, progress, estimate));
+        if header.has_uncertainty() {
+            let epochs = epochs(cube, progress);
+            let what = match epochs {
+                0 | 1 => "of every pixel and channel once there are 2 epochs".to_owned(),
+                n => format!("of every pixel and channel, from {n} epochs (Student's t, {} degrees of freedom)", n - 1),
+            };
+            row("standard error", what);
+        }
         row("preview", shows(cube));
         row("on disk", format!("{} when all tiles are begun", crate::files::format_bytes(header.store_bytes())));
         for (name, value) in &header.attributes {

@@ -87,9 +87,9 @@ impl<'a> Reporter<'a> {
         self.epoch = job.scene.integrator.epoch;
         let [width, height] = job.scene.film.cube_size();
         let tile = plan::tile_size(&job.scene, job.tile);
-        let disk = plan::header(&job.scene, tile, job.seed).store_bytes();
+        let disk = job.header(tile).store_bytes();
         let channels = job.scene.channels.len();
-        let samples_limit = job.stop.samples_limit(self.epoch)?;
+        let samples_limit = job.stop.samples_limit(self.epoch, job.uncertainty)?;
         self.line(&format!(
             "{}: {width} x {height} pixels x {channels} channels, {} on disk",
             job.scene.file.display(),

@@ -12,7 +12,9 @@ use crate::{Error, Result};
 /// Print the spectrum of one pixel as CSV
 ///
 /// A header, then one line a channel, in the order of the cube: the centre of the channel in nm and its mean spectral
-/// radiance in W m-2 sr-1 nm-1, with as many digits as bring back the stored number exactly.
+/// radiance in W m-2 sr-1 nm-1, with as many digits as bring back the stored number exactly. Cubes rendered with
+/// --uncertainty have a third column, the standard error (NaN below two epochs); a plot shows the values plus and minus
+/// two of them.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = "\
 Examples:
@@ -41,16 +43,23 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         let what = format!("pixel {} {} has no samples yet; try again when its tile is rendered", args.x, args.y);
         return Err(Error::Usage(format!("{}: {what}", args.cube.display())));
     };
+    let errors = cube.standard_error(args.x, args.y)?;
     if let Some(path) = &args.plot {
         let samples = cube.samples(cube.grid().tile_at(args.x, args.y))?;
         let title = format!("{}, column {}, row {}, {samples} samples", args.cube.display(), args.x, args.y);
-        write_atomically(path, plot::spectrum(cube.channels(), &spectrum, &title)?.as_bytes())?;
+        let plot = plot::spectrum(cube.channels(), &spectrum, errors.as_deref(), &title)?;
+        write_atomically(path, plot.as_bytes())?;
     }
     // The header stands first: many readers of CSV know no comments.
-    let mut csv = "wavelength_nm,radiance\n".to_owned();
+    let mut csv = "wavelength_nm,radiance".to_owned();
+    csv.push_str(if errors.is_some() { ",standard_error\n" } else { "\n" });
     for (k, radiance) in spectrum.iter().enumerate() {
         // Debug, not Display: 1e-30 instead of thirty zeros. Writing to a string cannot fail.
-        let _ = writeln!(csv, "{},{radiance:?}", cube.channels().centre(k));
+        let _ = write!(csv, "{},{radiance:?}", cube.channels().centre(k));
+        if let Some(errors) = &errors {
+            let _ = write!(csv, ",{:?}", errors[k]);
+        }
+        csv.push('\n');
     }
     output.text(&csv)
 }

@@ -14,9 +14,6 @@ use super::store::{Cube, PRIVATE, Part, read_group};
 use super::writer::BATCH_BYTES;
 use crate::{Error, Result, files};
 
-/// Arrays that later versions add and this one must not mistake for somebody else's files.
-const OTHER_ARRAYS: [&str; 1] = ["standard_error"];
-
 /// What may be at the path of a cube that is going to be written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Existing {
@@ -235,11 +232,8 @@ fn check_removable(path: &Path) -> Result<()> {
         error => error,
     })?;
     let arrays = group["consolidated_metadata"]["metadata"].as_object();
-    let known = |name: &str| {
-        [PRIVATE, "zarr.json"].contains(&name)
-            || OTHER_ARRAYS.contains(&name)
-            || arrays.is_some_and(|arrays| arrays.contains_key(name))
-    };
+    let known =
+        |name: &str| [PRIVATE, "zarr.json"].contains(&name) || arrays.is_some_and(|arrays| arrays.contains_key(name));
     for entry in fs::read_dir(path).map_err(|error| Error::storage(path, error))? {
         let name = entry.map_err(|error| Error::storage(path, error))?.file_name();
         if !name.to_str().is_some_and(known) {

@@ -28,6 +28,9 @@ pub struct Header {
     pub attributes: Map<String, Value>,
 }
 
+/// The attribute of cubes with standard errors.
+pub(super) const UNCERTAINTY: &str = "uncertainty";
+
 /// Attributes of the group that the header's own fields make.
 const RESERVED: [&str; 9] = [
     "Conventions",
@@ -42,6 +45,17 @@ const RESERVED: [&str; 9] = [
 ];
 
 impl Header {
+    /// Whether the cube has the array `standard_error`: an attribute says so where it has.
+    pub fn has_uncertainty(&self) -> bool {
+        self.attributes.get(UNCERTAINTY) == Some(&Value::Bool(true))
+    }
+
+    /// The same with the array `standard_error`.
+    pub fn with_uncertainty(mut self) -> Header {
+        self.attributes.insert(UNCERTAINTY.into(), Value::Bool(true));
+        self
+    }
+
     pub fn grid(&self) -> Grid {
         Grid { size: self.size, tile: self.tile }
     }
@@ -59,14 +73,15 @@ impl Header {
     /// Bytes on disk of a cube that has so many of its tiles. Files take whole blocks of 4 KiB, and folders one.
     pub(super) fn bytes_with_tiles(&self, tiles: u64) -> u64 {
         const BLOCK_BYTES: u64 = 4096;
-        // Metadata and coordinates of nine arrays, the facts of a few runs, and their folders.
-        const FIXED_BLOCKS: u64 = 60;
+        // Metadata and coordinates of ten arrays, the facts of a few runs, and their folders.
+        const FIXED_BLOCKS: u64 = 66;
         let in_blocks = |bytes: u64| bytes.div_ceil(BLOCK_BYTES) * BLOCK_BYTES;
         let channels = self.channels.len() as u64;
         let pixels = u64::from(self.tile[0]) * u64::from(self.tile[1]);
         let blocks = self.grid().tile_blocks().map(u64::from);
         let journal = super::journal::MAX_BYTES_PER_CHANNEL * channels + super::journal::MAX_BYTES;
-        let files = [pixels * channels * 4, pixels * 12, blocks[0] * blocks[1] * channels * 4, 4, journal];
+        let errors = if self.has_uncertainty() { pixels * channels * 4 } else { 0 };
+        let files = [pixels * channels * 4, errors, pixels * 12, blocks[0] * blocks[1] * channels * 4, 4, journal];
         // Each tile has a folder of `preview`, each row of tiles one of every array.
         let tile = files.into_iter().map(in_blocks).sum::<u64>() + BLOCK_BYTES;
         let [_, rows] = self.grid().tiles().map(u64::from);
@@ -79,7 +94,7 @@ impl Header {
         };
         let names = names + self.channels.responses.iter().map(nodes).sum::<u64>();
         let coordinates = 32 * channels + 8 * (u64::from(self.size[0]) + u64::from(self.size[1]));
-        let metadata = FIXED_BLOCKS * BLOCK_BYTES + in_blocks(names) + in_blocks(coordinates) + 4 * rows * BLOCK_BYTES;
+        let metadata = FIXED_BLOCKS * BLOCK_BYTES + in_blocks(names) + in_blocks(coordinates) + 5 * rows * BLOCK_BYTES;
         tile.saturating_mul(tiles).saturating_add(metadata)
     }
 
@@ -239,8 +254,8 @@ impl Header {
         let epoch = serde_json::from_value(take("epoch")).map_err(|_| damaged("has no `epoch`"))?;
         let origin = serde_json::from_value(take("origin")).map_err(|_| damaged("has no `origin`"))?;
         let responses = attributes.remove("responses").unwrap_or_else(|| json!([]));
-        let responses =
-            serde_json::from_value(responses).map_err(|what| damaged(&format!("holds no valid `responses`: {what}")))?;
+        let responses = serde_json::from_value(responses)
+            .map_err(|what| damaged(&format!("holds no valid `responses`: {what}")))?;
         for name in RESERVED {
             attributes.remove(name);
         }
@@ -296,7 +311,7 @@ fn arrays(header: &Header) -> Vec<(&'static str, Value)> {
         }
     };
     let pixel = |side: &str| json!({ "long_name": format!("pixel centre on the full film, from the {side}"), "units": "pixel" });
-    vec![
+    let mut arrays = vec![
         (
             "radiance",
             Array {
@@ -369,7 +384,19 @@ fn arrays(header: &Header) -> Vec<(&'static str, Value)> {
             }
             .chunked(&[channels, tile_blocks_y, tile_blocks_x]),
         ),
-    ]
+    ];
+    if header.has_uncertainty() {
+        let errors = Array {
+            codecs: channel_fastest(),
+            attributes: json!({
+                "long_name": "standard error of radiance, from the spread of equal epochs; NaN below two of them",
+                "units": radiance_units,
+            }),
+            ..Array::new("float32", &[channels, height, width], &["wavelength", "y", "x"])
+        };
+        arrays.push(("standard_error", errors.chunked(&[channels, tile_height, tile_width])));
+    }
+    arrays
 }
 
 /// `radiance` is encoded as [y, x, wavelength]: the chunk is the raw tile, a pixel's spectrum contiguous.

@@ -33,7 +33,7 @@ mod verify;
 mod view;
 mod writer;
 
-pub use compare::{ChannelMetrics, Comparison, compare};
+pub use compare::{ChannelMetrics, Comparison, ZTest, compare};
 pub use create::{Existing, check_target};
 pub use epochs::{epoch_samples, epochs_in, samples_before, whole_epochs};
 pub use grid::{Grid, Rect};

@@ -115,7 +115,11 @@ impl Neighbours {
         let find = |list: &[(f64, usize)], nm: f64| {
             let tolerance = 1e-9 * nm;
             let at = list.partition_point(|(end, _)| *end < nm - tolerance);
-            list[at..].iter().take_while(|(end, _)| *end <= nm + tolerance).map(|(_, other)| *other).find(|&other| other != k)
+            list[at..]
+                .iter()
+                .take_while(|(end, _)| *end <= nm + tolerance)
+                .map(|(_, other)| *other)
+                .find(|&other| other != k)
         };
         let [from, to] = self.bounds[k];
         (find(&self.by_upper, from), find(&self.by_lower, to))
@@ -150,12 +154,10 @@ pub fn integrate(
     }
     let of_bands = bands.iter().map(|band| (band.name.clone(), band.response.clone())).collect();
     let mut attributes = cube.header().attributes.clone();
+    // The errors of channels that one path made belong together: those of their sums are not known.
+    attributes.remove(super::metadata::UNCERTAINTY);
     attributes.insert("derived".into(), json!({ "sensor": about, "channels_integrated": channels.len() }));
-    let header = Header {
-        channels: Channels::from_responses(of_bands, None),
-        attributes,
-        ..cube.header().clone()
-    };
+    let header = Header { channels: Channels::from_responses(of_bands, None), attributes, ..cube.header().clone() };
     let grid = cube.grid();
     let count = grid.count();
     let writer = Writer::open(path, &header, existing, 0..count, &mut |_| {})?;

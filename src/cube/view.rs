@@ -6,8 +6,9 @@ use std::ops::Range;
 use super::grid::Rect;
 use super::map::Chunk;
 use super::store::Cube;
-use crate::spectral::temperature::BandTemperature;
 use crate::spectral::Channels;
+use crate::spectral::colour::{Observer, Projection, xyz_weights};
+use crate::spectral::temperature::BandTemperature;
 use crate::{Error, Result};
 
 /// What the values of a view are.
@@ -19,6 +20,8 @@ pub enum Quantity {
     Integrated,
     /// The temperature, K, of a black body with this radiance in the channel.
     Temperature,
+    /// X, Y and Z, W m⁻² sr⁻¹ nm⁻¹: divided by ∫ȳ dλ, so that a constant 1 has Y = 1.
+    Xyz(Observer),
 }
 
 /// Some channels of some pixels of a cube.
@@ -30,6 +33,8 @@ pub struct View<'a> {
     channels: Channels,
     rect: Rect,
     quantity: Quantity,
+    /// Standard errors instead of values.
+    errors: bool,
 }
 
 /// Where values go: that of column x, row y and band b of what is read, all from 0, at `x * pixel + y * row + b * band`.
@@ -50,6 +55,7 @@ impl<'a> View<'a> {
             channels: cube.channels().clone(),
             rect: Rect { x0: 0, y0: 0, x1, y1 },
             quantity: Quantity::Radiance,
+            errors: false,
         }
     }
 
@@ -77,8 +83,28 @@ impl<'a> View<'a> {
         Ok(View { rect, ..self })
     }
 
-    pub fn with_quantity(self, quantity: Quantity) -> View<'a> {
-        View { quantity, ..self }
+    /// As another quantity. X, Y and Z are of all channels, and three bands.
+    pub fn with_quantity(self, quantity: Quantity) -> Result<View<'a>> {
+        let Quantity::Xyz(observer) = quantity else { return Ok(View { quantity, ..self }) };
+        if Projection::as_seen(self.cube.channels(), observer).is_none() {
+            let what = "its channels do not cover the visible, so X, Y and Z cannot be told";
+            return Err(Error::Usage(format!("{}: {what}", self.cube.path().display())));
+        }
+        Ok(View { quantity, bands: vec![0, 1, 2], channels: observer.channels(), ..self })
+    }
+
+    /// The standard errors instead of the values.
+    pub fn of_errors(self) -> Result<View<'a>> {
+        if !self.cube.header().has_uncertainty() {
+            let what = "has no standard errors; render with --uncertainty to have them";
+            return Err(Error::Usage(format!("{} {what}", self.cube.path().display())));
+        }
+        Ok(View { errors: true, ..self })
+    }
+
+    /// Whether these are standard errors.
+    pub fn is_of_errors(&self) -> bool {
+        self.errors
     }
 
     pub fn cube(&self) -> &'a Cube {
@@ -126,9 +152,10 @@ impl<'a> View<'a> {
             Quantity::Integrated => {
                 Convert::Factors((0..self.channels.len()).map(|k| self.channels.integral(k)).collect())
             }
-            Quantity::Temperature => {
-                Convert::Temperatures((0..self.channels.len()).map(|k| BandTemperature::of(&self.channels, k)).collect())
-            }
+            Quantity::Xyz(observer) => Convert::Xyz(xyz_weights(self.cube.channels(), observer)),
+            Quantity::Temperature => Convert::Temperatures(
+                (0..self.channels.len()).map(|k| BandTemperature::of(&self.channels, k)).collect(),
+            ),
         };
         Reader { view: self, convert, chunks: BTreeMap::new() }
     }
@@ -138,6 +165,8 @@ enum Convert {
     None,
     Factors(Vec<f64>),
     Temperatures(Vec<BandTemperature>),
+    /// Per channel of the cube.
+    Xyz(Vec<[f64; 3]>),
 }
 
 /// Reads a view. The tiles of the rows read last stay mapped, so a cube that grows meanwhile is read as it was when a row of
@@ -171,10 +200,22 @@ impl Reader<'_> {
                     };
                     let first = chunk.spectra_from(x0, y);
                     let stride = view.cube.channels().len();
+                    if let Convert::Xyz(weights) = convert {
+                        for x in pixels.clone() {
+                            let spectrum = chunk.spectrum(x, y);
+                            for b in bands.clone() {
+                                let sum: f64 = weights.iter().zip(spectrum).map(|(w, v)| w[b] * f64::from(*v)).sum();
+                                out[at(x, b - bands.start)] = sum as f32;
+                            }
+                        }
+                        continue;
+                    }
                     for (b, &k) in channels.iter().enumerate() {
                         let values = first[k..].iter().step_by(stride);
                         match convert {
-                            Convert::None => pixels.clone().zip(values).for_each(|(x, &v)| out[at(x, b)] = v),
+                            Convert::None | Convert::Xyz(_) => {
+                                pixels.clone().zip(values).for_each(|(x, &v)| out[at(x, b)] = v)
+                            }
                             Convert::Factors(factors) => {
                                 let factor = factors[bands.start + b];
                                 let times = |v: f32| (f64::from(v) * factor) as f32;
@@ -209,7 +250,9 @@ impl Reader<'_> {
         self.chunks.retain(|&tile, _| rows.contains(&grid.position(tile)[1]));
         for tile in grid.tiles_in(rect) {
             if !self.chunks.contains_key(&tile) {
-                self.chunks.insert(tile, self.view.cube.chunk(tile)?);
+                let cube = self.view.cube;
+                let chunk = if self.view.errors { cube.error_chunk(tile) } else { cube.chunk(tile) };
+                self.chunks.insert(tile, chunk?);
             }
             let common = grid.rect(tile).intersection(&rect);
             if let (Some(chunk), Some(common)) = (self.chunks.get(&tile), common) {

@@ -16,7 +16,7 @@ use super::faults::step;
 use super::journal::{Journal, Record};
 use super::lock::TileLock;
 use super::map::Chunk;
-use super::merge::{Fold, check_portion};
+use super::merge::{Fold, check_portion, write_standard_errors};
 use super::metadata::Header;
 use super::recover;
 use super::store::{Cube, Part};
@@ -71,6 +71,8 @@ struct Pending {
     /// Suffix of the record before it in the journal.
     previous: Option<u64>,
     chunk: Chunk,
+    /// In cubes that have them.
+    errors: Option<Chunk>,
 }
 
 impl Writer {
@@ -202,9 +204,13 @@ impl Writer {
         let samples = samples_after(n_before, n_unit, cube.header().epoch)?;
         let aside = Aside::new(cube, tile);
         let record = aside.write(base.as_ref(), samples, n_unit, unit)?;
-        let chunk = Chunk::open(&aside.path(Part::Radiance), grid.rect(tile), grid.tile, cube.channels().len())?;
-        let chunk = chunk.ok_or_else(|| Error::storage(&aside.path(Part::Radiance), "has vanished"))?;
-        self.insert(aside, base, record, chunk);
+        let mapped = |part: Part| {
+            let path = aside.path(part);
+            cube.mapped(&path, tile)?.ok_or_else(|| Error::storage(&path, "has vanished"))
+        };
+        let chunk = mapped(Part::Radiance)?;
+        let errors = cube.header().has_uncertainty().then(|| mapped(Part::StandardError)).transpose()?;
+        self.insert(aside, base, record, chunk, errors);
         Ok(())
     }
 
@@ -222,16 +228,22 @@ impl Writer {
         }
         drop(state);
         let Some(record) = Journal::of(&self.cube, tile).last()? else { return Ok(None) };
-        let path = self.cube.part_path(Part::Radiance, tile);
-        let damaged = |what: &str| Error::storage(&path, format!("{what}; --resume puts it in order"));
-        let chunk = self.cube.chunk(tile)?.ok_or_else(|| damaged("is missing, although the journal has it"))?;
-        if checksums::of(chunk.bytes()) != record.checksums[Part::Radiance as usize] {
-            return Err(damaged("is damaged: it is not what the journal says"));
-        }
-        Ok(Some(Base::Committed { record, chunk }))
+        let sound = |part: Part| {
+            let path = self.cube.part_path(part, tile);
+            let damaged = |what: &str| Error::storage(&path, format!("{what}; --resume puts it in order"));
+            let chunk = self.cube.mapped(&path, tile)?;
+            let chunk = chunk.ok_or_else(|| damaged("is missing, although the journal has it"))?;
+            if checksums::of(chunk.bytes()) != record.checksums[part as usize] {
+                return Err(damaged("is damaged: it is not what the journal says"));
+            }
+            Ok(chunk)
+        };
+        let chunk = sound(Part::Radiance)?;
+        let errors = self.cube.header().has_uncertainty().then(|| sound(Part::StandardError)).transpose()?;
+        Ok(Some(Base::Committed { record, chunk, errors }))
     }
 
-    fn insert(&self, aside: Aside, base: Option<Base>, record: Record, chunk: Chunk) {
+    fn insert(&self, aside: Aside, base: Option<Base>, record: Record, chunk: Chunk, errors: Option<Chunk>) {
         let tile = record.tile;
         let mut state = self.state();
         let replaced = state.open.remove(&tile);
@@ -242,7 +254,7 @@ impl Writer {
             (Some(base), _) => Some(base.record().suffix),
         };
         state.totals.replace(base.as_ref().map(Base::record), &record);
-        state.open.insert(tile, Arc::new(Pending { record, previous, chunk }));
+        state.open.insert(tile, Arc::new(Pending { record, previous, chunk, errors }));
         drop(state);
         aside.keep();
         if let Some(replaced) = replaced {
@@ -322,7 +334,7 @@ impl Writer {
     /// Makes the files aside of a batch durable, and then the records that speak of them.
     fn journal(&self, batch: &BTreeMap<u32, Arc<Pending>>) -> Result<()> {
         for (&tile, pending) in batch {
-            for part in Part::ALL {
+            for &part in self.cube.parts() {
                 let path = self.cube.aside_path(part, tile, pending.record.suffix);
                 let synced =
                     File::open(&path).and_then(|file| file.sync_all()).and_then(|()| step("file aside synced"));
@@ -349,7 +361,7 @@ impl Drop for Writer {
 
 /// What a unit is merged into.
 enum Base {
-    Committed { record: Record, chunk: Chunk },
+    Committed { record: Record, chunk: Chunk, errors: Option<Chunk> },
     Pending(Arc<Pending>),
 }
 
@@ -365,6 +377,13 @@ impl Base {
         match self {
             Base::Committed { chunk, .. } => chunk,
             Base::Pending(pending) => &pending.chunk,
+        }
+    }
+
+    fn errors(&self) -> Option<&Chunk> {
+        match self {
+            Base::Committed { errors, .. } => errors.as_ref(),
+            Base::Pending(pending) => pending.errors.as_ref(),
         }
     }
 }
@@ -404,12 +423,20 @@ impl<'a> Aside<'a> {
         let samples_sum = self.file(Part::Samples, |file| file.write_all(&samples.to_le_bytes()))?;
         let preview = self.file(Part::Preview, |file| file.write_all(bytemuck::cast_slice(&fold.preview)))?;
         let overview = self.file(Part::Overview, |file| file.write_all(bytemuck::cast_slice(&fold.overview)))?;
+        let errors = match cube.header().has_uncertainty() {
+            false => 0,
+            true => self.file(Part::StandardError, |file| {
+                let (grid, epochs) = (cube.grid(), samples / cube.header().epoch);
+                let old = base.and_then(|base| Some((base.chunk(), base.errors()?)));
+                write_standard_errors(grid, grid.rect(tile), cube.channels().len(), epochs, old, unit, file)
+            })?,
+        };
         Ok(Record {
             tile,
             samples,
             epoch: epochs_in(samples, cube.header().epoch).saturating_sub(1),
             suffix: self.suffix,
-            checksums: [radiance, samples_sum, preview, overview],
+            checksums: [radiance, samples_sum, preview, overview, errors],
             spread,
             square,
         })
@@ -439,7 +466,7 @@ impl Drop for Aside<'_> {
 }
 
 fn remove_aside(cube: &Cube, tile: u32, suffix: u64) {
-    for part in Part::ALL {
+    for &part in cube.parts() {
         // Nobody reads such a file; one that cannot be removed now is removed when the tile is resumed.
         let _ = fs::remove_file(cube.aside_path(part, tile, suffix));
     }
@@ -447,7 +474,7 @@ fn remove_aside(cube: &Cube, tile: u32, suffix: u64) {
 
 /// Renames the files aside of a tile to their places, and adds the folders that must be synced then.
 fn take_places(cube: &Cube, tile: u32, suffix: u64, folders: &mut BTreeSet<PathBuf>) -> Result<()> {
-    for part in Part::ALL {
+    for &part in cube.parts() {
         let (aside, target) = (cube.aside_path(part, tile, suffix), cube.part_path(part, tile));
         take_place(&aside, &target, folders)?;
     }

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 
 use super::{Format, Progress, units, write as write_file};
+use crate::Result;
 use crate::cube::{Rect, View};
 use crate::files::{NewFolder, write_atomically};
-use crate::Result;
 
 /// Writes blocks of `side` pixels a side, those at the right and the bottom smaller, and `index.json`, into the folder
 /// `path`, which must not exist yet. `extension` is that of the files.
@@ -33,7 +33,8 @@ pub fn write(
             let mut tell = |of_block: u64, _: u64| progress(done + of_block, rect.pixels());
             let files = write_file(&block, &folder.path().join(name), format, &mut tell)?;
             done += block.rect().pixels();
-            let names: Vec<_> = files.iter().map(|file| file.file_name().unwrap_or_default().to_string_lossy()).collect();
+            let names: Vec<_> =
+                files.iter().map(|file| file.file_name().unwrap_or_default().to_string_lossy()).collect();
             blocks.push(json!({ "files": names, "x": [x, left + x1], "y": [y, top + y1] }));
         }
     }

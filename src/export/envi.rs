@@ -37,7 +37,7 @@ pub fn write(view: &View, path: &Path, interleave: Interleave, progress: &mut Pr
         size: [width, height, channels.len()],
         interleave,
         units: match view.quantity() {
-            Quantity::Radiance => "W m^-2 sr^-1 nm^-1",
+            Quantity::Radiance | Quantity::Xyz(_) => "W m^-2 sr^-1 nm^-1",
             Quantity::Integrated => "W m^-2 sr^-1",
             Quantity::Temperature => "K",
         },
@@ -112,7 +112,8 @@ impl Pieces<'_, '_> {
                 for (band, values) in part.zip(values.chunks_exact(plane)) {
                     let at = 4 * (band * height + (y0 - rect.y0) as usize) as u64 * width as u64;
                     let file = self.file.file();
-                    let written = file.seek(SeekFrom::Start(at)).and_then(|_| file.write_all(bytemuck::cast_slice(values)));
+                    let written =
+                        file.seek(SeekFrom::Start(at)).and_then(|_| file.write_all(bytemuck::cast_slice(values)));
                     written.map_err(|error| self.file.failed(error))?;
                 }
                 self.values = values;

@@ -37,8 +37,8 @@ pub fn write(
     split: Option<usize>,
     progress: &mut Progress,
 ) -> Result<Vec<PathBuf>> {
-    if view.quantity() == Quantity::Temperature {
-        let what = "spectral OpenEXR holds radiance and reflectance only; export temperatures to another format";
+    if matches!(view.quantity(), Quantity::Temperature | Quantity::Xyz(_)) {
+        let what = "spectral OpenEXR holds spectra only; export temperatures and colours to another format";
         return Err(Error::Usage(format!("{}: {what}", path.display())));
     }
     let channels = view.channels();

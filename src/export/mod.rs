@@ -4,6 +4,7 @@
 mod blocks;
 mod envi;
 mod exr;
+mod picture;
 mod table;
 mod zarr;
 
@@ -15,6 +16,7 @@ use crate::spectral::colour::ProjectionKind;
 use crate::{Error, Result, files};
 
 pub use exr::WIDELY_READ;
+pub use picture::{Map, colours, map};
 
 /// Values, in bytes, that a writer holds at a time, about.
 const PIECE_BYTES: usize = 32 << 20;
@@ -69,14 +71,18 @@ fn check_space(path: &Path, bytes: u64) -> Result<()> {
 /// The unit of a view's values, as CF writes it.
 fn units(view: &View) -> &'static str {
     match view.quantity() {
-        Quantity::Radiance => "W m-2 sr-1 nm-1",
+        Quantity::Radiance | Quantity::Xyz(_) => "W m-2 sr-1 nm-1",
         Quantity::Integrated => "W m-2 sr-1",
         Quantity::Temperature => "K",
     }
 }
 
 fn long_name(view: &View) -> &'static str {
+    if view.is_of_errors() {
+        return "standard error of radiance";
+    }
     match view.quantity() {
+        Quantity::Xyz(_) => "CIE XYZ, divided by the integral of ybar",
         Quantity::Radiance => "mean spectral radiance over the channel",
         Quantity::Integrated => "radiance of the channel",
         Quantity::Temperature => "brightness temperature in the channel",

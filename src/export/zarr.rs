@@ -56,7 +56,7 @@ pub fn write(view: &View, path: &Path, shards: bool, progress: &mut Progress) ->
     let folder = NewFolder::create(path)?;
     let failed = |what: &dyn std::fmt::Display| Error::storage(path, format!("cannot be written: {what}"));
     let layout = Layout::new(view, shards);
-    let arrays = arrays(view, &layout);
+    let arrays = arrays(view, &layout)?;
     let store = FilesystemStore::new(folder.path()).map_err(|error| failed(&error))?;
     let store = Arc::new(store);
     for (name, metadata) in &arrays {
@@ -85,7 +85,12 @@ pub fn write(view: &View, path: &Path, shards: bool, progress: &mut Progress) ->
         let bytes: Vec<u8> = bytemuck::cast_slice(&values).to_vec();
         open(name)?.store_chunk(&indices, ArrayBytes::new_flen(bytes)).map_err(|error| failed(&error))?;
     }
-    write_values(view, &layout, &open(variable(view))?, &failed, progress)?;
+    let views = views(view)?;
+    let (count, pixels) = (views.len() as u64, view.rect().pixels());
+    for (i, of) in (0..).zip(&views) {
+        let mut tell = |done: u64, _: u64| progress(i * pixels + done, count * pixels);
+        write_values(of, &layout, &open(variable(of))?, &failed, &mut tell)?;
+    }
     let group = group(view, &arrays);
     fs::write(folder.path().join("zarr.json"), format!("{group:#}\n")).map_err(|error| failed(&error))?;
     folder.finish()?;
@@ -122,11 +127,23 @@ fn write_values(
     Ok(())
 }
 
+/// What is written: values, and their standard errors where the cube has them and they are of the same quantity.
+fn views<'a>(view: &View<'a>) -> Result<Vec<View<'a>>> {
+    let same = matches!(view.quantity(), Quantity::Radiance | Quantity::Integrated);
+    let mut views = vec![view.clone()];
+    if same && !view.is_of_errors() && view.cube().header().has_uncertainty() {
+        views.push(view.clone().of_errors()?);
+    }
+    Ok(views)
+}
+
 /// The name of the array with the values.
 fn variable(view: &View) -> &'static str {
     match view.quantity() {
+        _ if view.is_of_errors() => "standard_error",
         Quantity::Radiance | Quantity::Integrated => "radiance",
         Quantity::Temperature => "brightness_temperature",
+        Quantity::Xyz(_) => "xyz",
     }
 }
 
@@ -151,12 +168,11 @@ fn group(view: &View, arrays: &[(&str, Value)]) -> Value {
     })
 }
 
-fn arrays(view: &View, layout: &Layout) -> Vec<(&'static str, Value)> {
+fn arrays(view: &View, layout: &Layout) -> Result<Vec<(&'static str, Value)>> {
     let bands = view.channels().len() as u64;
     let [width, height] = view.size().map(u64::from);
     let little = json!({ "name": "bytes", "configuration": { "endian": "little" } });
-    let compressed =
-        json!([little, { "name": "zstd", "configuration": { "level": LEVEL, "checksum": false } }]);
+    let compressed = json!([little, { "name": "zstd", "configuration": { "level": LEVEL, "checksum": false } }]);
     let codecs = if layout.chunk == layout.file {
         compressed
     } else {
@@ -186,22 +202,18 @@ fn arrays(view: &View, layout: &Layout) -> Vec<(&'static str, Value)> {
         array("float64", shape, shape, json!([little]), names, attributes)
     };
     let pixel = |side: &str| json!({ "long_name": format!("pixel centre on the full film, from the {side}"), "units": "pixel" });
-    vec![
-        (
-            variable(view),
-            array(
-                "float32",
-                &[bands, height, width],
-                &layout.file,
-                codecs,
-                &["wavelength", "y", "x"],
-                json!({
-                    "long_name": long_name(view),
-                    "units": units(view),
-                    "coordinates": "wavelength_width response_integral",
-                }),
-            ),
-        ),
+    let mut arrays = Vec::new();
+    for of in views(view)? {
+        let attributes = json!({
+            "long_name": long_name(&of),
+            "units": units(&of),
+            "coordinates": "wavelength_width response_integral",
+        });
+        let names = ["wavelength", "y", "x"];
+        let shape = [bands, height, width];
+        arrays.push((variable(&of), array("float32", &shape, &layout.file, codecs.clone(), &names, attributes)));
+    }
+    arrays.extend([
         (
             "wavelength",
             coordinate(
@@ -237,5 +249,6 @@ fn arrays(view: &View, layout: &Layout) -> Vec<(&'static str, Value)> {
         ),
         ("y", coordinate(&[height], &["y"], pixel("top"))),
         ("x", coordinate(&[width], &["x"], pixel("left"))),
-    ]
+    ]);
+    Ok(arrays)
 }

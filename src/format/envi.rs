@@ -334,8 +334,11 @@ mod tests {
         assert_eq!((header.interleave, header.big_endian, header.data_bytes()), (Interleave::Bip, true, Some(64)));
         assert_eq!(header.wavelength_nm, Some(vec![400.0, 500.0]));
         assert_eq!(header.list("spectra names"), Some(vec!["a", "b"]));
-        let library = read("ENVI\r\nfile type = ENVI Spectral Library\nsamples = 3\nlines = 2\nbands = 1\ndata type = 5\n\
-             wavelength = { 400, 500, 600 }").unwrap();
+        let library = read(
+            "ENVI\r\nfile type = ENVI Spectral Library\nsamples = 3\nlines = 2\nbands = 1\ndata type = 5\n\
+             wavelength = { 400, 500, 600 }",
+        )
+        .unwrap();
         assert!(library.is_library() && library.wavelength_nm.is_some_and(|nm| nm == [400.0, 500.0, 600.0]));
         let unsaid = read(&format!("{SMALL}wavelength = {{ 0.4, 2.5 }}")).unwrap();
         assert_eq!(unsaid.wavelength_nm, Some(vec![400.0, 2500.0]));
@@ -359,7 +362,7 @@ mod tests {
         assert_eq!((header.samples, header.lines, header.bands), (2, 3, 2));
         assert_eq!(header.wavelength_nm, Some(image.wavelength_nm.clone()));
         assert_eq!(header.list("band names"), Some(vec!["a  b", "c"]));
-        assert_eq!(header.list("default bands"), Some(vec!["2", "1"]));
+        assert_eq!(header.list("default bands"), Some(vec!["2", "1", "1"]));
         assert_eq!((header.other["x start"].as_str(), header.other["y start"].as_str()), ("11", "21"));
     }
 

@@ -59,7 +59,12 @@ pub fn parse_envi(
     let index = match name {
         None if header.lines == 1 => 0,
         None => {
-            return wrong(data_path, None, format!("has {} spectra", header.lines), &format!("pick one with `column`: {}", list(&names)));
+            return wrong(
+                data_path,
+                None,
+                format!("has {} spectra", header.lines),
+                &format!("pick one with `column`: {}", list(&names)),
+            );
         }
         Some(wanted) => match names.iter().position(|name| *name == wanted) {
             Some(index) => index,
@@ -140,9 +145,12 @@ pub fn parse_ecostress(bytes: &[u8], path: &Path) -> Read<SpectrumTable> {
             continue;
         }
         let Some((key, value)) = line.split_once(':') else {
-            if pairs > 0 && !line.trim().is_empty() {
+            // Values without a partner are in the library's own files, and are nobody's.
+            let all_numbers = line.split_whitespace().all(|word| word.parse::<f64>().is_ok());
+            if pairs > 0 && !all_numbers {
                 return wrong(path, Some(number), "is not a pair of numbers", "");
             }
+            pairs += usize::from(pairs > 0 && !line.trim().is_empty());
             continue;
         };
         let value = value.trim().to_lowercase();
@@ -163,7 +171,12 @@ pub fn parse_ecostress(bytes: &[u8], path: &Path) -> Read<SpectrumTable> {
         }
     }
     if let Some((line, promised)) = promised.filter(|(_, promised)| *promised != pairs) {
-        return wrong(path, Some(line), format!("promises {promised} values, but {pairs} follow"), "the file may be cut");
+        return wrong(
+            path,
+            Some(line),
+            format!("promises {promised} values, but {pairs} follow"),
+            "the file may be cut",
+        );
     }
     ascending(table, path, "")
 }
@@ -246,10 +259,13 @@ pub fn read_usgs(bytes: &[u8], path: &Path) -> Read<SpectrumTable> {
         });
     }
     let count = spectrum.values.len();
-    let help = "the USGS library keeps them in files such as splib07a_Wavelengths_ASD_….txt; put the right one beside it";
+    let help =
+        "the USGS library keeps them in files such as splib07a_Wavelengths_ASD_….txt; put the right one beside it";
     match &candidates[..] {
         [(file, wavelengths)] => pair_usgs(&spectrum, wavelengths, path, file),
-        [] => wrong(path, None, format!("has {count} values, but no file of {count} wavelengths is in its folder"), help),
+        [] => {
+            wrong(path, None, format!("has {count} values, but no file of {count} wavelengths is in its folder"), help)
+        }
         several => {
             let names: Vec<String> = several.iter().map(|(file, _)| name_of(file)).collect();
             wrong(path, None, format!("has {count} values, and so have {}", names.join(", ")), help)
@@ -279,7 +295,9 @@ fn pair_usgs(spectrum: &Column, wavelengths: &Column, path: &Path, of: &Path) ->
 pub fn no_columns(path: &Path, column: Option<&str>) -> Read<()> {
     match column {
         None => Ok(()),
-        Some(column) => wrong(path, None, format!("holds one spectrum, and no column {}", named(column)), "remove `column`"),
+        Some(column) => {
+            wrong(path, None, format!("holds one spectrum, and no column {}", named(column)), "remove `column`")
+        }
     }
 }
 
@@ -311,7 +329,7 @@ mod tests {
             ("(micrometers)", "(furlongs)", Some(5), "furlongs"),
             ("X Units: Wavelength (micrometers)\n", "", Some(9), "before `X Units`"),
             (" 2.5\t20.0\n", " 2.5\ttwenty\n", Some(11), "not a pair"),
-            (" 2.5\t20.0\n", " 25\t20.0\n", Some(11), "follows"),
+            (" 2.5\t20.0\n", " 25\t20.0\n", Some(10), "follows"),
         ] {
             let text = ECOSTRESS.replacen(from, to, 1);
             let problem = parse_ecostress(&latin1(&text), Path::new("c.txt")).unwrap_err();
@@ -338,7 +356,8 @@ mod tests {
         assert_eq!((table.nm, table.value, table.line), (vec![400.0, 600.0], vec![0.5, 0.7], vec![2, 4]));
         put("splib07a_Wavelengths_ASD_x.txt", " splib07a Record=3: Wavelengths (nm)\n 1\n 2\n 3\n");
         assert_eq!(read().unwrap().nm, [400.0, 600.0]);
-        fs::rename(folder.path().join("splib07a_Wavelengths_ASD_x.txt"), folder.path().join("wavelengths.txt")).expect("renamed");
+        fs::rename(folder.path().join("splib07a_Wavelengths_ASD_x.txt"), folder.path().join("wavelengths.txt"))
+            .expect("renamed");
         fs::rename(folder.path().join("splib07a_Wavelengths_BECK_Beckman.txt"), folder.path().join("Wavelengths2.txt"))
             .expect("renamed");
         assert!(read().is_err(), "none of two names the spectrometer");

@@ -1,9 +1,9 @@
 //! Readers and writers of other people's formats; they know no GPU.
 
 pub mod envi;
+pub mod image;
 pub mod library;
 pub mod modtran;
-pub mod image;
 pub mod obj;
 pub mod plot;
 pub mod png;

@@ -12,13 +12,28 @@ pub fn is_tape7(path: &Path, bytes: &[u8]) -> bool {
         return true;
     }
     // MODTRAN's input cards come first; CSV has no line that begins with FREQ.
-    name.starts_with("tape7") && String::from_utf8_lossy(bytes).lines().any(|line| line.trim_start().starts_with("FREQ"))
+    name.starts_with("tape7")
+        && String::from_utf8_lossy(bytes).lines().any(|line| line.trim_start().starts_with("FREQ"))
 }
 
 /// Names of two words.
 const TWO_WORDS: [&str; 16] = [
-    "TOT TRANS", "PTH THRML", "THRML SCT", "SURF EMIS", "SOL SCAT", "SING SCAT", "GRND RFLT", "DRCT RFLT", "TOTAL RAD",
-    "REF SOL", "SOL@OBS TRANS", "H2O CONT", "MOLEC SCAT", "AER+CLD TRANS", "N2 CONT", "LOG TOTAL",
+    "TOT TRANS",
+    "PTH THRML",
+    "THRML SCT",
+    "SURF EMIS",
+    "SOL SCAT",
+    "SING SCAT",
+    "GRND RFLT",
+    "DRCT RFLT",
+    "TOTAL RAD",
+    "REF SOL",
+    "SOL@OBS TRANS",
+    "H2O CONT",
+    "MOLEC SCAT",
+    "AER+CLD TRANS",
+    "N2 CONT",
+    "LOG TOTAL",
 ];
 
 /// A column: its name, and where it ends in the line.
@@ -104,7 +119,8 @@ fn columns(header: &str, second: Option<&str>) -> Vec<Column> {
     let mut columns: Vec<Column> = Vec::new();
     let mut previous: Option<&str> = None;
     for (word, end) in words(header) {
-        let joined = previous.map(|before| format!("{before} {word}")).filter(|name| TWO_WORDS.contains(&name.as_str()));
+        let joined =
+            previous.map(|before| format!("{before} {word}")).filter(|name| TWO_WORDS.contains(&name.as_str()));
         match (joined, columns.last_mut()) {
             (Some(name), Some(last)) => {
                 *last = Column { name, end };

@@ -171,7 +171,10 @@ mod tests {
     fn noise_becomes_zero_and_is_told() {
         let noisy = parse("nm,a,b\n400,-0.009,0\n500,1,2\n600,-0.001,0\n").unwrap();
         let warning = noisy.warning.unwrap();
-        assert!(warning.contains("2 slightly negative") && warning.contains("-0.009") && warning.contains("channels a "), "{warning}");
+        assert!(
+            warning.contains("2 slightly negative") && warning.contains("-0.009") && warning.contains("channels a "),
+            "{warning}"
+        );
         assert_eq!(noisy.named[0].1.integral(), 100.0);
     }
 

@@ -70,12 +70,7 @@ enum Column<'a> {
     OfIndex(&'a str),
 }
 
-fn parse(
-    bytes: &[u8],
-    path: &Path,
-    column: Column,
-    unit: Option<Unit>,
-) -> Result<SpectrumTable, Box<Problem>> {
+fn parse(bytes: &[u8], path: &Path, column: Column, unit: Option<Unit>) -> Result<SpectrumTable, Box<Problem>> {
     // Only comments and names can hold anything but ASCII, so old encodings do no harm.
     let text = String::from_utf8_lossy(bytes);
     let text = text.trim_start_matches('\u{feff}');

@@ -411,8 +411,7 @@ fn file(item: &Item, column: Option<Item>, unit: Option<Item>) -> Option<Data> {
         Some(column) => Some(column.text()?),
         None => None,
     };
-    const UNITS: [(&str, Unit); 3] =
-        [("nm", Unit::Nanometre), ("um", Unit::Micrometre), ("cm-1", Unit::Wavenumber)];
+    const UNITS: [(&str, Unit); 3] = [("nm", Unit::Nanometre), ("um", Unit::Micrometre), ("cm-1", Unit::Wavenumber)];
     let unit_of_x = match &unit {
         Some(unit) => Some(unit.choice(&UNITS)?),
         None => None,

@@ -39,7 +39,11 @@ impl Response {
     /// Through (nm, value), nm ascending; two equal nm make a step. The message says what is wrong.
     pub fn new(nm: Vec<f64>, value: Vec<f64>) -> std::result::Result<Response, String> {
         if nm.len() < 2 || nm.len() != value.len() {
-            return Err(format!("has {} values at {} wavelengths where at least two are needed", value.len(), nm.len()));
+            return Err(format!(
+                "has {} values at {} wavelengths where at least two are needed",
+                value.len(),
+                nm.len()
+            ));
         }
         let ascend = nm[0] > 0.0 && nm.windows(2).all(|w| w[0] <= w[1]) && nm.iter().all(|x| x.is_finite());
         if !ascend {
@@ -206,7 +210,10 @@ mod tests {
         assert_eq!(triangle.integral_over(500.0, 600.0), 0.0);
         // What does not reach zero at its ends has steps there.
         let step = Response::new(vec![500.0, 600.0], vec![1.0, 1.0]).unwrap();
-        assert_eq!((step.support(), step.integral(), step.centroid, step.fwhm()), ([500.0, 600.0], 100.0, 550.0, 100.0));
+        assert_eq!(
+            (step.support(), step.integral(), step.centroid, step.fwhm()),
+            ([500.0, 600.0], 100.0, 550.0, 100.0)
+        );
     }
 
     #[test]

@@ -368,7 +368,10 @@ mod tests {
     #[test]
     fn overlaps_share_and_gaps_count_nothing() {
         let plain = xyz_weights(&channels(&[[400.0, 500.0], [500.0, 600.0], [600.0, 700.0]]), Observer::Cie1931);
-        let twice = xyz_weights(&channels(&[[400.0, 500.0], [500.0, 600.0], [500.0, 600.0], [600.0, 700.0]]), Observer::Cie1931);
+        let twice = xyz_weights(
+            &channels(&[[400.0, 500.0], [500.0, 600.0], [500.0, 600.0], [600.0, 700.0]]),
+            Observer::Cie1931,
+        );
         for i in 0..3 {
             assert!((twice[1][i] - 0.5 * plain[1][i]).abs() < 1e-14 && twice[1] == twice[2]);
         }

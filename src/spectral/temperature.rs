@@ -21,7 +21,15 @@ pub struct BandTemperature {
 impl BandTemperature {
     /// Of channel `k`.
     pub fn of(channels: &Channels, k: usize) -> BandTemperature {
-        let weights = quadrature(channels, k);
+        BandTemperature::of_all(channels, &[k])
+    }
+
+    /// Of several channels together: of their mean radiance, weighted by their widths (the integrals of their responses).
+    pub fn of_all(channels: &Channels, bands: &[usize]) -> BandTemperature {
+        let total: f64 = bands.iter().map(|&k| channels.integral(k)).sum();
+        let share = |k: usize| channels.integral(k) / total;
+        let of = |k: usize| quadrature(channels, k).into_iter().map(move |(nm, weight)| (nm, weight * share(k)));
+        let weights: Vec<(f64, f64)> = bands.iter().flat_map(|&k| of(k)).collect();
         let ratio = (HOTTEST / COLDEST).powf(1.0 / (NODES - 1) as f64);
         let mut table = BandTemperature {
             ln_radiance: Vec::with_capacity(NODES),
@@ -62,7 +70,8 @@ impl BandTemperature {
 /// (nm, weight) whose weighted sum is the channel's mean of a smooth function: Gauss-Legendre on panels of at most 1/64 of
 /// the wavelength, within the linear pieces of a response.
 fn quadrature(channels: &Channels, k: usize) -> Vec<(f64, f64)> {
-    const NODE: [f64; 5] = [-0.906_179_845_938_664, -0.538_469_310_105_683_1, 0.0, 0.538_469_310_105_683_1, 0.906_179_845_938_664];
+    const NODE: [f64; 5] =
+        [-0.906_179_845_938_664, -0.538_469_310_105_683_1, 0.0, 0.538_469_310_105_683_1, 0.906_179_845_938_664];
     const WEIGHT: [f64; 5] = [
         0.236_926_885_056_189_1,
         0.478_628_670_499_366_5,
@@ -148,6 +157,14 @@ mod tests {
         let mean = sum(&|i| value[i] * planck(nm[i])) / sum(&|i| value[i]);
         let got = BandTemperature::of(&channels, 0).kelvin(mean);
         assert!((got - 287.5).abs() < 1e-4, "{got}");
+    }
+
+    #[test]
+    fn channels_together_are_one_wide_one() {
+        let channels = Channels::from_bounds(vec![[8e3, 9e3], [9e3, 12e3]], None);
+        let radiance = Curve::Blackbody { kelvin: 250.0, scale: 1.0 }.mean(8e3, 12e3);
+        let got = BandTemperature::of_all(&channels, &[0, 1]).kelvin(radiance);
+        assert!((got / 250.0 - 1.0).abs() < 1e-6, "{got}");
     }
 
     #[test]
