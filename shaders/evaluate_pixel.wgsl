@@ -5,19 +5,16 @@
 
 @group(1) @binding(0) var<uniform> wave: Wave;
 @group(1) @binding(3) var<storage, read> heads: array<vec2<u32>>;
+#if GENERAL
+@group(1) @binding(4) var<storage, read> records: array<vec4<u32>>;
+#else
 @group(1) @binding(4) var<storage, read> records: array<vec2<u32>>;
+#endif
 @group(1) @binding(5) var<storage, read_write> counters: array<atomic<u32>>;
 // [stratum][spectrum][quad of channels][value, slope]; spectrum 0 is the constant 1.
 @group(1) @binding(8) var<storage, read> spectra: array<vec4<f32>>;
 // [pixel slot of the wave's units][channel].
 @group(1) @binding(9) var<storage, read_write> means: array<f32>;
-#if KNOTS
-// Spectra that no affordable number of strata resolves, exact: first knot of (spectrum, channel), and (mu as it stands in
-// the head, value).
-@group(1) @binding(10) var<storage, read> knot_starts: array<u32>;
-@group(1) @binding(11) var<storage, read> knots: array<vec2<u32>>;
-#endif
-
 // Where the path's wavelength sample stands: its stratum, and the place within.
 struct SpectralSample {
     stratum: u32,
@@ -51,26 +48,6 @@ fn table_value(spectrum: u32, quad: u32, s: SpectralSample) -> vec4<f32> {
 }
 
 #if KNOTS
-// Binary search without a loop: loop iterations are scarce (KERNELS), and its length is known.
-fn knot_value(spectrum: u32, channel: u32, mu: u32) -> f32 {
-    let first = knot_starts[spectrum * CHANNELS_PADDED + channel];
-    var low = first;
-    // Segments still in question, from `low` on.
-    var left = knot_starts[spectrum * CHANNELS_PADDED + channel + 1u] - 1u - first;
-    var half = 0u;
-    var above = false;
-#repeat KNOT_STEPS i
-    half = left / 2u;
-    above = knots[low + half].x <= mu;
-    low = select(low, low + half, above);
-    left = select(half, left - half, above);
-#end
-    let a = knots[low];
-    let b = knots[low + 1u];
-    let place = min(f32(mu - a.x) / max(f32(b.x - a.x), 1.0), 1.0);
-    return bitcast<f32>(a.y) + place * (bitcast<f32>(b.y) - bitcast<f32>(a.y));
-}
-
 fn spectrum_value(spectrum: u32, quad: u32, s: SpectralSample) -> vec4<f32> {
     if (spectrum < SPECTRA) {
         return table_value(spectrum, quad, s);
@@ -205,10 +182,67 @@ fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
 #repeat VECTORS v
         var throughput_$v = vec4<f32>(1.0);
         var radiance_$v = vec4<f32>(0.0);
+#if GENERAL
+        var product_$v = vec4<f32>(0.0);
+        var factor_$v = vec4<f32>(0.0);
+#endif
 #end
         let first_record = path * frame.max_records;
         for (var r = first_record; r < first_record + used; r += 1u) {
             let record = records[r];
+#if GENERAL
+#if RAW_RECORDS
+            var raw = vec4<f32>(0.0);
+            if ((record.x & 0x3fu) >= FIRST_RAW_OP) {
+                r += 1u;
+                raw = bitcast<vec4<f32>>(records[r]);
+            }
+#else
+            let raw = vec4<f32>(0.0);
+#endif
+            let weight = bitcast<f32>(record.z);
+#repeat VECTORS v
+            let value_$v = operation_value(record, raw, quad_$v, s);
+#end
+            if ((record.x & 0x3fu) == OP_PLAIN) {
+#repeat VECTORS v
+                throughput_$v *= value_$v;
+                radiance_$v += weight * throughput_$v * spectrum_value(record.x >> 16u, quad_$v, s);
+#end
+                continue;
+            }
+#repeat VECTORS v
+            let weighted_$v = weight * value_$v;
+            product_$v = select(product_$v, vec4<f32>(1.0), (record.x & MODE_START) != 0u);
+            product_$v = select(product_$v * weighted_$v, product_$v, (record.x & MODE_ON_F) != 0u);
+            factor_$v = select(factor_$v, factor_$v * weighted_$v, (record.x & MODE_ON_F) != 0u);
+            factor_$v = select(factor_$v, factor_$v + product_$v, (record.x & MODE_ADD) != 0u);
+#end
+            if ((record.x & MODE_GATHER) != 0u) {
+#repeat VECTORS v
+                radiance_$v += throughput_$v * factor_$v * spectrum_value(record.x >> 16u, quad_$v, s);
+                factor_$v = vec4<f32>(0.0);
+#end
+            }
+            if ((record.x & MODE_ADVANCE) != 0u) {
+#if OP_ONLY
+                // Most channels of a path that dispersion left to one have nothing to come.
+                var left = false;
+#endif
+#repeat VECTORS v
+                throughput_$v *= factor_$v;
+                factor_$v = vec4<f32>(0.0);
+#if OP_ONLY
+                left = left || any(throughput_$v != vec4<f32>(0.0));
+#endif
+#end
+#if OP_ONLY
+                if (!left) {
+                    break;
+                }
+#endif
+            }
+#else
             let factor_id = record.x & 0xffffu;
             let source_id = record.x >> 16u;
             let weight = bitcast<f32>(record.y);
@@ -229,6 +263,7 @@ fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
             throughput_$v *= factor_$v;
             radiance_$v += weight * throughput_$v * source_$v;
 #end
+#endif
         }
 
         let index = wave.sample_begin + i + 1u;

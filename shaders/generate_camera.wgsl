@@ -44,7 +44,11 @@ fn generate_camera(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     let pixel = unit.xy + vec2<u32>(in_tile % wave.tile_width, in_tile / wave.tile_width);
     if (any(pixel >= unit.zw)) {
         heads[path] = vec2<u32>(0u, wave.sequence << 16u);
+#if GENERAL
+        states[STATE_WORDS * path + 1u].w = ENDED;
+#else
         states[2u * path + 1u].w = ENDED;
+#endif
         return;
     }
     let key = pixel_key(frame.seed_low, frame.seed_high, pixel.x, pixel.y, wave.epoch);
@@ -77,8 +81,16 @@ fn generate_camera(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 
     let mu = random_pair_bits(key, DIMENSION_WAVELENGTH, index, wave.epoch_mask).x;
     heads[path] = vec2<u32>(mu, 0u);
+#if GENERAL
+    states[STATE_WORDS * path] = bitcast<vec4<u32>>(vec4<f32>(origin, -1.0));
+    states[STATE_WORDS * path + 1u] = vec4<u32>(bitcast<vec3<u32>>(direction), 0u);
+#if DISPERSION
+    states[STATE_WORDS * path + 2u] = vec4<u32>(NONE, 0u, 0u, 0u);
+#endif
+#else
     states[2u * path] = bitcast<vec4<u32>>(vec4<f32>(origin, 0.0));
     states[2u * path + 1u] = vec4<u32>(bitcast<vec3<u32>>(direction), 0u);
+#endif
 #if ROULETTE
     throughputs[path] = 1.0;
 #endif

@@ -9,13 +9,15 @@ use scene_builder::*;
 use spectile::gpu::adapter::STORAGE_BUFFERS;
 use spectile::gpu::shader::{Module, Source, compose};
 use spectile::render::prepare::{EvaluateShape, Features, Prepared, WindowList, Windows};
-use spectile::scene::{Filter, Projection, Sampler, Scene, Sides};
+use spectile::scene::{Filter, Projection, Sampler, Scene, Shape, Sides};
 use spectile::spectral::Channels;
 
 /// Bytes of a kernel's code, comments and indentation apart: of a plain scene's, and of one that needs everything and spreads its
 /// geometry over four windows. More is a sign that something is compiled in twice or without need.
 const MAX_PLAIN_BYTES: usize = 18 << 10;
 const MAX_BYTES: usize = 32 << 10;
+/// Of general scenes, by what their materials need.
+const MAX_GENERAL_BYTES: usize = 48 << 10;
 
 fn plain_scene() -> Scene {
     Builder::new()
@@ -56,6 +58,7 @@ fn combinations() -> Vec<Features> {
             strata: bit(i, 8),
             knots: bit(i, 9),
             registers: bit(i, 10),
+            general: None,
         })
         .filter(|f| !(f.thin_lens && f.orthographic || f.knots && f.registers))
         .collect()
@@ -97,11 +100,13 @@ fn validate(what: &str, source: &Source) -> naga::Module {
 fn every_permutation_is_valid() {
     let sources = all_sources();
     assert!(sources.len() > 200, "{} texts", sources.len());
-    for (what, source) in &sources {
+    let general = general_sources();
+    let all = sources.iter().map(|s| (s, MAX_BYTES)).chain(general.iter().map(|s| (s, MAX_GENERAL_BYTES)));
+    for ((what, source), most) in all {
         let module = validate(what, source);
         let names: Vec<&str> = module.entry_points.iter().map(|e| e.name.as_str()).collect();
         assert_eq!(names, [source.label.trim_end_matches(".wgsl")], "{what}");
-        assert!(code_bytes(&source.text) <= MAX_BYTES, "{what}: {} bytes", code_bytes(&source.text));
+        assert!(code_bytes(&source.text) <= most, "{what}: {} bytes", code_bytes(&source.text));
     }
 }
 
@@ -122,7 +127,7 @@ fn pipelines_on_the_noop_backend() {
         ..Default::default()
     }))
     .expect("a noop device");
-    for (what, source) in all_sources().iter().step_by(3) {
+    for (what, source) in all_sources().iter().step_by(3).chain(&general_sources()) {
         let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some(source.label),
@@ -139,6 +144,52 @@ fn pipelines_on_the_noop_backend() {
         let error = pollster::block_on(scope.pop());
         assert!(error.is_none(), "{what}: {error:?}");
     }
+}
+
+/// Scenes of every kind of material, alone and with others, their shapes and options varied.
+fn general_scenes() -> Vec<(String, Scene)> {
+    let glass = || surfaces::glass_curve();
+    type Add = fn(Builder, Shape) -> Builder;
+    let materials: [(&str, Add); 10] = [
+        ("metal", |b, s| b.conductor(s, 0.2, 3.4, [0.0; 2])),
+        ("rough metal", |b, s| b.conductor(s, 0.2, 3.4, [0.3; 2])),
+        ("brushed metal", |b, s| b.conductor(s, 0.2, 3.4, [0.3, 0.1])),
+        ("glass", |b, s| b.dielectric(s, 1.5, 0.0)),
+        ("dispersive glass", |b, s| b.dielectric(s, surfaces::glass_curve(), 0.0)),
+        ("rough glass", |b, s| b.dielectric(s, 1.5, 0.2)),
+        ("rough dispersive glass", |b, s| b.dielectric(s, surfaces::glass_curve(), 0.5)),
+        ("hardly rough dispersive glass", |b, s| b.dielectric(s, surfaces::glass_curve(), 0.01)),
+        ("varnish", |b, s| b.plastic(s, 0.5, 1.5, 0.0)),
+        ("plastic", |b, s| b.plastic(s, 0.5, surfaces::glass_curve(), 0.2)),
+    ];
+    let mut scenes = Vec::new();
+    for (i, (name, add)) in materials.iter().enumerate() {
+        for (j, (other, add_other)) in materials.iter().enumerate().skip(i).take(2) {
+            let mut builder = Builder(plain_scene());
+            builder = if (i + j) % 2 == 0 { builder.roulette(2) } else { builder };
+            builder = if (i + j) % 3 == 0 { builder.sky(glass()) } else { builder };
+            let shape = if i % 2 == 0 { room(-0.5 * DVec3::ONE, 0.5 * DVec3::ONE) } else { disk() };
+            let scene = add_other(add(builder, shape), quad(DVec3::ZERO, DVec3::X, DVec3::Y)).build();
+            scenes.push((format!("{name} and {other}"), scene));
+        }
+    }
+    scenes
+}
+
+fn disk() -> Shape {
+    Shape::Disk { center: DVec3::ZERO, normal: DVec3::Z, radius: 0.5 }
+}
+
+fn general_sources() -> Vec<(String, Source)> {
+    let mut found = std::collections::HashMap::new();
+    for (i, (what, scene)) in general_scenes().into_iter().enumerate() {
+        let prepared = Prepared::new(&scene, 0).unwrap();
+        let windows = windows(1 + i as u32 % 4, 1 + i as u32 / 4 % 4);
+        for source in passes(&prepared, &windows, prepared.evaluate_shape(i % 2 == 0)) {
+            found.entry(source.text.clone()).or_insert_with(|| (format!("{} for {what}", source.label), source));
+        }
+    }
+    found.into_values().collect()
 }
 
 // ---- What a scene does not need

@@ -1,7 +1,10 @@
 // Group 0: the scene, one immutable copy per device. Nodes and primitives may be spread over several windows, since a
 // binding is limited.
 
+#if GENERAL
+#else
 @group(0) @binding(1) var<storage, read> materials: array<Material>;
+#endif
 @group(0) @binding(2) var<storage, read> emitters: array<Emitter>;
 // Upper ends of the emitters' intervals in [0, 1], above the environment's.
 @group(0) @binding(3) var<storage, read> emitter_cdf: array<f32>;

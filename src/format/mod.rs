@@ -3,6 +3,7 @@
 pub mod envi;
 pub mod image;
 pub mod library;
+pub mod maps;
 pub mod modtran;
 pub mod obj;
 pub mod plot;

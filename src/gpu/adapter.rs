@@ -53,9 +53,9 @@ pub(crate) enum Trouble {
     Other(String),
 }
 
-/// Storage buffers that the largest pass binds at once, generate_bounce under roulette: 3 of the scene, 4 windows each of
-/// nodes and primitives, 8 of the wave.
-pub const STORAGE_BUFFERS: u32 = 19;
+/// Storage buffers that the largest pass may bind at once, generate_vertex: what every scene has (3 of the scene, 4 windows
+/// each of nodes and primitives, 8 of the wave), and what materials, lights and media of general scenes add.
+pub const STORAGE_BUFFERS: u32 = 30;
 
 fn instance() -> wgpu::Instance {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();

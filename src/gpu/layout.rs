@@ -75,6 +75,42 @@ pub struct Material {
     pub unused: u32,
 }
 
+/// `SurfaceMaterial` in WGSL: a material of a general scene.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
+pub struct SurfaceMaterial {
+    pub first_part: u32,
+    pub part_count: u32,
+    /// [`MATERIAL_TRANSMITS`].
+    pub flags: u32,
+    pub survival: f32,
+}
+
+/// Bits of [`SurfaceMaterial::flags`].
+pub const MATERIAL_TRANSMITS: u32 = 1;
+pub const MATERIAL_DIFFUSE: u32 = 2;
+
+/// `Part` in WGSL: a lobe of a material.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
+pub struct Part {
+    /// A `KIND_…`, with the `PART_…` bits.
+    pub kind: u32,
+    /// Spectrum ids a | b << 16, c | d << 16.
+    pub ab: u32,
+    pub cd: u32,
+    pub weight: f32,
+    pub alpha: [f32; 2],
+    pub picks: u32,
+    pub decision: u32,
+    pub loss: u32,
+    pub rows: u32,
+    pub mean_loss: f32,
+    pub eta: f32,
+    pub eta_least: f32,
+    pub eta_greatest: f32,
+}
+
 /// `NONE` in WGSL.
 pub const NONE: u32 = u32::MAX;
 
@@ -145,15 +181,19 @@ mod tests {
 
     /// What naga says about the struct `name` in types.wgsl: its size, and its members' names and offsets.
     fn wgsl_struct(name: &str) -> (u32, Vec<(String, u32)>) {
-        let source = include_str!("../../shaders/common/types.wgsl");
-        let module = naga::front::wgsl::parse_str(source).unwrap();
+        let sources = [
+            include_str!("../../shaders/common/types.wgsl"),
+            include_str!("../../shaders/common/tables.wgsl"),
+            include_str!("../../shaders/common/material.wgsl"),
+        ];
+        let module = naga::front::wgsl::parse_str(&sources.concat()).unwrap();
         let found = module.types.iter().find_map(|(_, t)| match &t.inner {
             naga::TypeInner::Struct { members, span } if t.name.as_deref() == Some(name) => {
                 Some((*span, members.iter().map(|m| (m.name.clone().unwrap(), m.offset)).collect()))
             }
             _ => None,
         });
-        found.unwrap_or_else(|| panic!("no struct {name} in types.wgsl"))
+        found.unwrap_or_else(|| panic!("no struct {name} in types.wgsl or material.wgsl"))
     }
 
     macro_rules! same_layout {
@@ -202,6 +242,22 @@ mod tests {
         same_layout!(Step { bounce });
         same_layout!(Emitter { primitive, spectrum, pick, area });
         same_layout!(Material { factor, two_sided, albedo, unused });
+        same_layout!(SurfaceMaterial { first_part, part_count, flags, survival });
+        same_layout!(Part {
+            kind,
+            ab,
+            cd,
+            weight,
+            alpha,
+            picks,
+            decision,
+            loss,
+            rows,
+            mean_loss,
+            eta,
+            eta_least,
+            eta_greatest
+        });
         assert_eq!(size_of::<Primitive>(), 48);
         let constants = [
             ("COUNTER_OVERFLOW", offset_of!(Counters, overflow)),

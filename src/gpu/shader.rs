@@ -32,8 +32,18 @@ modules! {
     SHAPES = "common/shapes.wgsl";
     BVH = "common/bvh.wgsl";
     LIGHT = "common/light.wgsl";
+    RECORD = "common/record.wgsl";
+    TABLES = "common/tables.wgsl";
+    MATERIAL = "common/material.wgsl";
+    GGX = "common/ggx.wgsl";
+    BSDF = "common/bsdf.wgsl";
+    TANGENT = "common/tangent.wgsl";
+    KNOTS = "common/knots.wgsl";
+    CHANNEL = "common/channel.wgsl";
+    PROGRAM = "common/program.wgsl";
     GENERATE_CAMERA = "generate_camera.wgsl";
     GENERATE_BOUNCE = "generate_bounce.wgsl";
+    GENERATE_VERTEX = "generate_vertex.wgsl";
     EVALUATE_PIXEL = "evaluate_pixel.wgsl";
     SELF_TEST = "self_test.wgsl";
 }

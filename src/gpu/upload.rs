@@ -57,11 +57,18 @@ fn check_size(name: &str, bytes: u64, limits: &wgpu::Limits) -> Result<()> {
 fn parts<'a>(prepared: &'a Prepared, windows: &Windows) -> Vec<(String, &'a [u8])> {
     let tables = &prepared.tables;
     let mut parts: Vec<(String, &[u8])> = vec![
-        ("materials".into(), bytemuck::cast_slice(&prepared.materials)),
         ("emitters".into(), bytemuck::cast_slice(&prepared.emitters)),
         ("emitter_cdf".into(), bytemuck::cast_slice(&prepared.picks.cdf)),
         ("spectra".into(), bytemuck::cast_slice(&tables.strata)),
     ];
+    match &prepared.surfaces {
+        None => parts.insert(0, ("materials".into(), bytemuck::cast_slice(&prepared.materials))),
+        Some(surfaces) => parts.extend([
+            ("surface_materials".into(), bytemuck::cast_slice(&surfaces.materials)),
+            ("parts".into(), bytemuck::cast_slice(&surfaces.parts)),
+            ("tables".into(), bytemuck::cast_slice(&surfaces.tables)),
+        ]),
+    }
     let mut add_windows = |name: &str, list: WindowList, bytes: &'a [u8], element: u64| {
         for i in 0..u64::from(list.count) {
             let size = u64::from(list.size) * element;

@@ -1,9 +1,20 @@
-//! Choosing a point on the scene's emitting surfaces.
+//! Choosing what to aim at: a point on an emitting surface, one of the scene's lights, or its environment map.
+
+use std::f64::consts::PI;
 
 use super::primitive::SurfacePoint;
 use super::rng::Rng;
+use super::sky::Sky;
 use super::world::World;
-use crate::scene::{Emission, Scene, Sides};
+use crate::scene::{Emission, Light, Object, Scene, Sides};
+
+/// What was chosen.
+pub enum Target {
+    Surface(LightPoint),
+    /// Index into `Scene::lights`.
+    Light(usize),
+    Sky,
+}
 
 /// A point on a light.
 pub struct LightPoint {
@@ -14,55 +25,81 @@ pub struct LightPoint {
     pub density: f64,
 }
 
-/// Emitting primitives with the probability of each.
+/// Emitting primitives and other lights with the probability of each.
 ///
 /// A light's probability is its share of the emitted power, averaged over the channels in which anything emits: so
-/// whatever emits in any channel can be chosen, and no channel rules the others.
+/// whatever emits in any channel can be chosen, and no channel rules the others. The uniform environment is none.
 pub struct Lights {
-    primitives: Vec<usize>,
-    /// Probability that one of `primitives[..=i]` is chosen; the last is 1.
+    choices: Vec<Choice>,
+    /// Probability that one of `choices[..=i]` is chosen; the last is 1.
     cumulative: Vec<f64>,
     /// Per primitive of the world: probability over area, m⁻²; 0 where nothing is emitted.
     density: Vec<f64>,
+    /// Probability of each of `Scene::lights`.
+    lights: Vec<f64>,
+    /// Probability of the environment map.
+    pub sky: f64,
+}
+
+enum Choice {
+    Primitive(usize),
+    Light(usize),
+    Sky,
 }
 
 impl Lights {
-    pub fn new(scene: &Scene, world: &World) -> Self {
+    pub fn new(scene: &Scene, world: &World, sky: Option<&Sky>) -> Self {
         let mut object_area = vec![0.0; scene.objects.len()];
         for primitive in &world.primitives {
             object_area[primitive.object] += primitive.surface.area();
         }
-        let share = object_shares(scene, &object_area);
+        let Shares { objects, lights, sky } = shares(scene, &object_area, world.radius(), sky);
 
         let density: Vec<f64> = world
             .primitives
             .iter()
-            .map(|p| if share[p.object] > 0.0 { share[p.object] / object_area[p.object] } else { 0.0 })
+            .map(|p| if objects[p.object] > 0.0 { objects[p.object] / object_area[p.object] } else { 0.0 })
             .collect();
-        let (mut primitives, mut cumulative, mut sum) = (Vec::new(), Vec::new(), 0.0);
-        for (i, primitive) in world.primitives.iter().enumerate().filter(|(i, _)| density[*i] > 0.0) {
-            sum += density[i] * primitive.surface.area();
-            primitives.push(i);
+        let primitives = world.primitives.iter().enumerate();
+        let all = primitives
+            .map(|(i, primitive)| (Choice::Primitive(i), density[i] * primitive.surface.area()))
+            .chain(lights.iter().enumerate().map(|(i, share)| (Choice::Light(i), *share)))
+            .chain([(Choice::Sky, sky)]);
+        let (mut choices, mut cumulative, mut sum) = (Vec::new(), Vec::new(), 0.0);
+        for (choice, probability) in all.filter(|(_, probability)| *probability > 0.0) {
+            sum += probability;
+            choices.push(choice);
             cumulative.push(sum);
         }
-        // Shares sum to 1 but for rounding, which the last light takes.
+        // Shares sum to 1 but for rounding, which the last takes.
         if let Some(last) = cumulative.last_mut() {
             *last = 1.0;
         }
-        Lights { primitives, cumulative, density }
+        Lights { choices, cumulative, density, lights, sky }
     }
 
     /// `None` where nothing emits.
-    pub fn sample(&self, world: &World, rng: &mut Rng) -> Option<LightPoint> {
+    pub fn sample(&self, world: &World, rng: &mut Rng) -> Option<Target> {
         let choice = rng.uniform();
-        let primitive = *self.primitives.get(self.cumulative.partition_point(|&c| c <= choice))?;
-        let point = world.primitives[primitive].surface.sample(rng);
-        Some(LightPoint { primitive, point, density: self.density[primitive] })
+        Some(match self.choices.get(self.cumulative.partition_point(|&c| c <= choice))? {
+            Choice::Primitive(primitive) => {
+                let primitive = *primitive;
+                let point = world.primitives[primitive].surface.sample(rng);
+                Target::Surface(LightPoint { primitive, point, density: self.density[primitive] })
+            }
+            Choice::Light(light) => Target::Light(*light),
+            Choice::Sky => Target::Sky,
+        })
     }
 
     /// The density by area, m⁻², with which [`Lights::sample`] chooses a given point of `primitive`.
     pub fn density(&self, primitive: usize) -> f64 {
         self.density[primitive]
+    }
+
+    /// The probability with which [`Lights::sample`] chooses a light of the scene.
+    pub fn probability(&self, light: usize) -> f64 {
+        self.lights[light]
     }
 }
 
@@ -71,30 +108,66 @@ pub fn emits(emission: &Emission, front: bool) -> bool {
     front || emission.sides == Sides::Both
 }
 
-/// Probability of choosing each object; sums to 1 where anything emits.
-fn object_shares(scene: &Scene, area: &[f64]) -> Vec<f64> {
-    let mut share = vec![0.0; scene.objects.len()];
+/// Probabilities, which sum to 1 where anything emits.
+struct Shares {
+    objects: Vec<f64>,
+    lights: Vec<f64>,
+    sky: f64,
+}
+
+/// Powers are taken without the common factor π. What comes from far away has the power that enters a sphere of
+/// `radius` around everything.
+fn shares(scene: &Scene, area: &[f64], radius: f64, sky: Option<&Sky>) -> Shares {
+    let mut shares =
+        Shares { objects: vec![0.0; scene.objects.len()], lights: vec![0.0; scene.lights.len()], sky: 0.0 };
     let mut channels_lit = 0.0;
-    for &[from, to] in &scene.channels.bounds {
-        // Proportional to power; the common factor π does not matter.
-        let power = |(i, object): (usize, &crate::scene::Object)| match &object.emission {
+    for (k, &[from, to]) in scene.channels.bounds.iter().enumerate() {
+        let mean = |spectrum: usize| scene.spectra[spectrum].curve.mean(from, to);
+        let of_object = |(i, object): (usize, &Object)| match &object.emission {
             Some(emission) => {
                 let sides = if emission.sides == Sides::Both { 2.0 } else { 1.0 };
-                sides * area[i] * scene.spectra[emission.radiance].curve.mean(from, to)
+                sides * area[i] * mean(emission.radiance)
             }
             None => 0.0,
         };
-        let powers: Vec<f64> = scene.objects.iter().enumerate().map(power).collect();
-        let total: f64 = powers.iter().sum();
+        let of_light = |light: &Light| {
+            mean(light.spectrum())
+                * match light {
+                    Light::Point { .. } => 4.0,
+                    Light::Directional { .. } | Light::Sun { .. } => radius * radius,
+                }
+        };
+        let objects: Vec<f64> = scene.objects.iter().enumerate().map(of_object).collect();
+        let lights: Vec<f64> = scene.lights.iter().map(of_light).collect();
+        // A sphere of that radius has the area 4 π r²; one by one, 1/4 of the flux from each direction counts.
+        let sky = sky.map_or(0.0, |sky| radius * radius * sky.flux[k]);
+        let total = objects.iter().sum::<f64>() + lights.iter().sum::<f64>() + sky;
         if total > 0.0 {
             channels_lit += 1.0;
-            for (share, power) in share.iter_mut().zip(&powers) {
-                *share += power / total;
-            }
+            let add = |share: &mut f64, power: f64| *share += power / total;
+            shares.objects.iter_mut().zip(objects).for_each(|(share, power)| add(share, power));
+            shares.lights.iter_mut().zip(lights).for_each(|(share, power)| add(share, power));
+            add(&mut shares.sky, sky);
         }
     }
     if channels_lit > 0.0 {
-        share.iter_mut().for_each(|s| *s /= channels_lit);
+        let all = shares.objects.iter_mut().chain(&mut shares.lights).chain([&mut shares.sky]);
+        all.for_each(|share| *share /= channels_lit);
     }
-    share
+    shares
+}
+
+/// Solid angle of a disk of angular `radius`.
+pub fn disk_solid_angle(radius: f64) -> f64 {
+    4.0 * PI * (0.5 * radius).sin().powi(2)
+}
+
+/// A direction uniform over the disk of angular `radius` about `axis`.
+pub fn sample_disk(axis: glam::DVec3, radius: f64, rng: &mut Rng) -> glam::DVec3 {
+    // 1 - cosθ, without cancellation.
+    let versine = rng.uniform() * 2.0 * (0.5 * radius).sin().powi(2);
+    let sine = (versine * (2.0 - versine)).sqrt();
+    let angle = std::f64::consts::TAU * rng.uniform();
+    let (s, t) = axis.any_orthonormal_pair();
+    (sine * (angle.cos() * s + angle.sin() * t) + (1.0 - versine) * axis).normalize()
 }

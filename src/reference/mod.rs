@@ -10,6 +10,7 @@ mod lights;
 mod path;
 mod primitive;
 mod rng;
+mod sky;
 mod world;
 
 use std::num::NonZeroUsize;
@@ -182,7 +183,8 @@ mod tests {
                 material: 0,
                 emission: None,
             }],
-            environment: Some(Environment { radiance: 1 }),
+            lights: vec![],
+            environment: Some(Environment::Uniform(1)),
             warnings: vec![],
             digest: String::new(),
         }

@@ -1,21 +1,25 @@
 //! One path: from the camera, surface to surface, carrying all K channels.
 
+use std::f64::consts::PI;
 use std::ops::Range;
 
 use glam::{DMat3, DVec3};
 
 use super::bsdf::{Bsdf, SpectralValues, Vertex};
 use super::camera;
-use super::lights::{LightPoint, Lights, emits};
+use super::lights::{LightPoint, Lights, Target, disk_solid_angle, emits, sample_disk};
 use super::primitive::Ray;
 use super::rng::Rng;
+use super::sky::Sky;
 use super::world::{Hit, World};
-use crate::scene::{Scene, SpectrumId};
+use crate::scene::{Environment, Light, Scene, SpectrumId};
 
 /// What tracing needs of a scene, prepared once and shared by all threads.
 pub struct Tracer<'a> {
     scene: &'a Scene,
     world: World,
+    /// The environment, where it is a map.
+    sky: Option<Sky<'a>>,
     lights: Lights,
     /// One for each material of the scene.
     materials: Vec<Bsdf>,
@@ -32,6 +36,24 @@ pub struct Path<'a> {
     pub radiance: Vec<f64>,
     /// What one vertex does to each channel.
     factor: Vec<f64>,
+    /// Radiance of what is aimed at or met, or what takes its place.
+    emitted: Vec<f64>,
+}
+
+/// A way to some light, chosen at a vertex.
+struct Aim {
+    direction: DVec3,
+    /// Where the light is; `None` at infinity.
+    target: Option<DVec3>,
+    /// Density by solid angle of the choice; `None` for lights without extent, which are never met.
+    density: Option<f64>,
+    emitted: Emitted,
+}
+
+/// Radiance in all channels; of lights without extent, irradiance over the probability of their choice.
+enum Emitted {
+    Spectrum { spectrum: SpectrumId, scale: f64 },
+    Sky(DVec3),
 }
 
 impl<'a> Path<'a> {
@@ -43,6 +65,7 @@ impl<'a> Path<'a> {
             alive: 0..channels,
             radiance: vec![0.0; channels],
             factor: vec![0.0; channels],
+            emitted: vec![0.0; channels],
         }
     }
 
@@ -61,14 +84,33 @@ impl<'a> Path<'a> {
             self.radiance[k] += self.throughput[k] * values[k] * weight;
         }
     }
+
+    /// Sets `emitted`.
+    fn look_up(&mut self, emitted: &Emitted, sky: Option<&Sky>) {
+        match (emitted, sky) {
+            (Emitted::Spectrum { spectrum, scale }, _) => {
+                let values = self.spectra.get(*spectrum);
+                self.emitted.iter_mut().zip(values).for_each(|(e, value)| *e = scale * value);
+            }
+            (Emitted::Sky(direction), Some(sky)) => {
+                sky.radiance(*direction, self.spectra.wavelengths(), &mut self.emitted);
+                if let Some(daylight) = sky.daylight() {
+                    let values = self.spectra.get(daylight);
+                    self.emitted.iter_mut().zip(values).for_each(|(e, value)| *e *= value);
+                }
+            }
+            (Emitted::Sky(_), None) => self.emitted.fill(0.0),
+        }
+    }
 }
 
 impl<'a> Tracer<'a> {
     pub fn new(scene: &'a Scene) -> Self {
         let world = World::new(&scene.objects);
-        let lights = Lights::new(scene, &world);
+        let sky = scene.environment.as_ref().and_then(|environment| environment.map()).map(|map| Sky::new(scene, map));
+        let lights = Lights::new(scene, &world, sky.as_ref());
         let materials = (0..scene.materials.len()).map(|material| Bsdf::new(scene, material)).collect();
-        Tracer { scene, world, lights, materials }
+        Tracer { scene, world, sky, lights, materials }
     }
 
     /// Traces one path through `pixel` and leaves its radiance in `path`.
@@ -85,9 +127,7 @@ impl<'a> Tracer<'a> {
 
         for event in 0..=integrator.max_bounces {
             let Some(hit) = self.world.closest_hit(&ray) else {
-                if let Some(environment) = &self.scene.environment {
-                    path.gather(environment.radiance, 1.0);
-                }
+                self.gather_from_afar(ray.direction, ray_density, path);
                 return;
             };
             self.gather_emission(&ray, &hit, ray_density, path);
@@ -97,10 +137,11 @@ impl<'a> Tracer<'a> {
 
             let object = &self.scene.objects[self.world.primitives[hit.primitive].object];
             let bsdf = &self.materials[object.material];
-            let light = self.lights.sample(&self.world, rng);
-            let emission = light.as_ref().and_then(|light| self.emitted(light));
+            let aim = self.aim(&hit, rng);
             path.spectra.fill(bsdf.spectra());
-            path.spectra.fill(emission.as_slice());
+            if let Some(aim) = &aim {
+                path.look_up(&aim.emitted, self.sky.as_ref());
+            }
 
             let inside = hit.point.normal.dot(ray.direction) > 0.0;
             let frame = self.frame(&hit, inside);
@@ -109,16 +150,14 @@ impl<'a> Tracer<'a> {
                 // Along the surface to the last bit.
                 return;
             }
-            let Path { spectra, throughput, alive, radiance, factor } = &mut *path;
+            let Path { spectra, throughput, alive, radiance, factor, emitted } = &mut *path;
             let Some(scattering) = bsdf.at(Vertex { o, inside, spectra, alive: alive.clone() }) else { return };
-            if let Some((light, emission)) = light.zip(emission)
-                && let Some((direction, per_area)) = self.aim(&hit, &light)
-            {
-                let scattered = scattering.evaluate(frame.transpose() * direction, factor);
+            if let Some(aim) = aim.filter(|aim| self.is_visible(&hit, aim)) {
+                let scattered = scattering.evaluate(frame.transpose() * aim.direction, factor);
                 // The balance heuristic leaves f cosθ over the sum of both densities by solid angle.
-                let weight = 1.0 / (light.density * per_area + scattered);
+                let weight = aim.density.map_or(1.0, |density| 1.0 / (density + scattered));
                 for k in alive.clone() {
-                    radiance[k] += throughput[k] * factor[k] * spectra.value(emission, k) * weight;
+                    radiance[k] += throughput[k] * factor[k] * emitted[k] * weight;
                 }
             }
 
@@ -168,15 +207,67 @@ impl<'a> Tracer<'a> {
         path.gather(emission.radiance, weight);
     }
 
-    /// The spectrum that a point of a light sends to anywhere.
-    fn emitted(&self, light: &LightPoint) -> Option<SpectrumId> {
-        let object = &self.scene.objects[self.world.primitives[light.primitive].object];
-        object.emission.as_ref().map(|emission| emission.radiance)
+    /// What arrives from beyond all surfaces: the environment and the suns in that direction.
+    fn gather_from_afar(&self, direction: DVec3, ray_density: Option<f64>, path: &mut Path) {
+        // The balance heuristic, for light that could have been aimed at with density `other`.
+        let weight = |other: f64| ray_density.map_or(1.0, |density| density / (density + other));
+        match (&self.scene.environment, &self.sky) {
+            (Some(Environment::Uniform(radiance)), _) => path.gather(*radiance, 1.0),
+            (Some(Environment::Map(_)), Some(sky)) => {
+                path.look_up(&Emitted::Sky(direction), Some(sky));
+                let weight = weight(self.lights.sky * sky.density(direction));
+                for k in path.alive.clone() {
+                    path.radiance[k] += path.throughput[k] * path.emitted[k] * weight;
+                }
+            }
+            _ => {}
+        }
+        for (i, light) in self.scene.lights.iter().enumerate() {
+            if let Light::Sun { direction: travel, angular_radius, irradiance } = light
+                && direction.dot(-*travel) >= angular_radius.cos()
+            {
+                let density = self.lights.probability(i) / disk_solid_angle(*angular_radius);
+                path.gather(*irradiance, weight(density) * radiance_of_disk(*angular_radius));
+            }
+        }
     }
 
-    /// The direction of a point of a light and its area per solid angle, m² sr⁻¹; `None` where it sends nothing there or
-    /// is hidden.
-    fn aim(&self, hit: &Hit, light: &LightPoint) -> Option<(DVec3, f64)> {
+    /// Chooses a light and a way to it; `None` where it sends nothing there.
+    fn aim(&self, hit: &Hit, rng: &mut Rng) -> Option<Aim> {
+        match self.lights.sample(&self.world, rng)? {
+            Target::Surface(light) => self.aim_at_surface(hit, &light),
+            Target::Light(light) => {
+                let probability = self.lights.probability(light);
+                match self.scene.lights[light] {
+                    Light::Point { position, intensity } => {
+                        let towards = position - hit.point.position;
+                        let distance2 = towards.length_squared();
+                        let emitted = Emitted::Spectrum { spectrum: intensity, scale: 1.0 / (distance2 * probability) };
+                        let direction = towards.try_normalize()?;
+                        Some(Aim { direction, target: Some(position), density: None, emitted })
+                    }
+                    Light::Directional { direction, irradiance } => {
+                        let emitted = Emitted::Spectrum { spectrum: irradiance, scale: 1.0 / probability };
+                        Some(Aim { direction: -direction, target: None, density: None, emitted })
+                    }
+                    Light::Sun { direction, angular_radius, irradiance } => {
+                        let density = probability / disk_solid_angle(angular_radius);
+                        let scale = radiance_of_disk(angular_radius);
+                        let emitted = Emitted::Spectrum { spectrum: irradiance, scale };
+                        let direction = sample_disk(-direction, angular_radius, rng);
+                        Some(Aim { direction, target: None, density: Some(density), emitted })
+                    }
+                }
+            }
+            Target::Sky => {
+                let (direction, density) = self.sky.as_ref()?.sample(rng);
+                let density = Some(self.lights.sky * density);
+                Some(Aim { direction, target: None, density, emitted: Emitted::Sky(direction) })
+            }
+        }
+    }
+
+    fn aim_at_surface(&self, hit: &Hit, light: &LightPoint) -> Option<Aim> {
         let towards = light.point.position - hit.point.position;
         let distance = towards.length();
         if distance == 0.0 {
@@ -185,11 +276,28 @@ impl<'a> Tracer<'a> {
         let direction = towards / distance;
         let light_cosine = light.point.normal.dot(direction);
         let object = &self.scene.objects[self.world.primitives[light.primitive].object];
-        if light_cosine == 0.0 || !object.emission.as_ref().is_some_and(|e| emits(e, light_cosine < 0.0)) {
+        let emission = object.emission.as_ref()?;
+        if light_cosine == 0.0 || !emits(emission, light_cosine < 0.0) {
             return None;
         }
-        let from = self.world.leave(hit.primitive, &hit.point, direction);
-        let to = self.world.leave(light.primitive, &light.point, -direction);
-        (!self.world.occluded(from, to)).then(|| (direction, distance * distance / light_cosine.abs()))
+        Some(Aim {
+            direction,
+            target: Some(self.world.leave(light.primitive, &light.point, -direction)),
+            density: Some(light.density * distance * distance / light_cosine.abs()),
+            emitted: Emitted::Spectrum { spectrum: emission.radiance, scale: 1.0 },
+        })
     }
+
+    fn is_visible(&self, hit: &Hit, aim: &Aim) -> bool {
+        let origin = self.world.leave(hit.primitive, &hit.point, aim.direction);
+        match aim.target {
+            Some(target) => !self.world.occluded(origin, target),
+            None => self.world.closest_hit(&Ray { origin, direction: aim.direction }).is_none(),
+        }
+    }
+}
+
+/// Radiance of a disk of angular `radius` that causes a unit irradiance facing it, sr⁻¹: ∫ cosθ over it is π sin².
+fn radiance_of_disk(radius: f64) -> f64 {
+    1.0 / (PI * radius.sin().powi(2))
 }

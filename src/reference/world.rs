@@ -88,6 +88,16 @@ impl World {
         blocked
     }
 
+    /// Half the diagonal of the box around everything, m.
+    pub fn radius(&self) -> f64 {
+        match self.nodes.last() {
+            Some(Node::Inner { bounds: [low, high], .. } | Node::Leaf { bounds: [low, high], .. }) => {
+                0.5 * (*high - *low).length()
+            }
+            None => 0.0,
+        }
+    }
+
     /// A point just off primitive `i`, on the side that `towards` points to.
     pub fn leave(&self, i: usize, point: &SurfacePoint, towards: DVec3) -> DVec3 {
         point.position + self.primitives[i].offset.copysign(point.normal.dot(towards)) * point.normal

@@ -1,7 +1,7 @@
 //! Decision probabilities of next-event estimation (DESIGN section 6), common to all channels.
 
 use crate::accel::Accel;
-use crate::scene::{Scene, Sides};
+use crate::scene::{Environment, Scene, Sides};
 use std::f64::consts::PI;
 
 /// With which probability next-event estimation asks which light.
@@ -17,8 +17,8 @@ pub struct LightPicks {
 
 /// q = ½ mean over channels of a light's share + ½ its normalised largest share over channels, where the share is its
 /// power over the total power in that channel. Channels without power are left out; if none has any, all lights are
-/// equally likely. `accel.emitters` and the environment are the lights.
-pub fn light_picks(scene: &Scene, accel: &Accel) -> LightPicks {
+/// equally likely. `accel.emitters` are the lights and, if `environment` says so, the environment.
+pub fn light_picks(scene: &Scene, accel: &Accel, environment: bool) -> LightPicks {
     // Emitters of one spectrum differ by area only, so shares are worked out per spectrum.
     let mut areas = vec![0.0; scene.spectra.len()];
     let emitted = |object: usize| scene.objects[object].emission.as_ref().expect("emitters come from emitting objects");
@@ -29,14 +29,14 @@ pub fn light_picks(scene: &Scene, accel: &Accel) -> LightPicks {
     }
     let mut groups: Vec<(Option<usize>, f64)> =
         areas.iter().enumerate().filter(|(_, a)| **a > 0.0).map(|(s, a)| (Some(s), *a)).collect();
-    if scene.environment.is_some() {
+    if environment && scene.environment.is_some() {
         // The flux of radiance L into the scene's bounding sphere is that of a surface of the sphere's area.
         groups.push((None, 4.0 * PI * accel.space.radius.powi(2)));
     }
     let spectrum = |group: Option<usize>| match (group, &scene.environment) {
         (Some(s), _) => s,
-        (None, Some(environment)) => environment.radiance,
-        (None, None) => unreachable!("only an environment adds a group without emitters"),
+        (None, Some(Environment::Uniform(radiance))) => *radiance,
+        (None, _) => unreachable!("only an environment adds a group without emitters"),
     };
     let shares = probabilities(
         &groups

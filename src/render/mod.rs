@@ -11,6 +11,7 @@ pub mod prepare;
 pub mod queue;
 pub mod rng;
 pub mod schedule;
+pub mod surfaces;
 pub mod watch;
 pub mod wave;
 pub mod worker;

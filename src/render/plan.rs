@@ -69,7 +69,7 @@ pub fn feature_lines(prepared: &Prepared, waves: &WavePlan) -> Vec<FeatureLine> 
     let line = |name, used, effect: String| FeatureLine { name, used, effect };
     use crate::gpu::shader as s;
     vec![
-        line("area lights", f.emitters, format!("{bounces} records of 8 bytes a path")),
+        line("area lights", f.emitters, format!("{bounces} records of {} bytes a path", prepared.record_bytes())),
         line("environment", f.environment, "one light to choose from".into()),
         line("spheres, disks, cylinders", f.shapes, format!("{}, a test per primitive", module(s::SHAPES))),
         line(
@@ -89,6 +89,12 @@ pub fn feature_lines(prepared: &Prepared, waves: &WavePlan) -> Vec<FeatureLine> 
             f.registers,
             format!("no table lookups per vertex; {} spectra here", prepared.factors + prepared.sources),
         ),
+        line(
+            "materials of several lobes",
+            f.general.is_some(),
+            format!("records of 16 bytes instead of 8; {}", module(s::BSDF)),
+        ),
+        line("dispersion", f.general.is_some_and(|g| g.dispersion), "16 bytes a path".into()),
         line(
             "windowed geometry",
             upload::windows(prepared, waves.limits.binding).is_ok_and(|w| w.nodes.count > 1 || w.primitives.count > 1),
@@ -113,6 +119,9 @@ pub fn host_memory(prepared: &Prepared, header: &Header) -> HostMemory {
     let scene = size_of_val(accel.nodes.as_slice())
         + size_of_val(accel.primitives.as_slice())
         + size_of_val(prepared.materials.as_slice())
+        + prepared.surfaces.as_ref().map_or(0, |s| {
+            size_of_val(s.materials.as_slice()) + size_of_val(s.parts.as_slice()) + size_of_val(s.tables.as_slice())
+        })
         + size_of_val(prepared.emitters.as_slice())
         + size_of_val(prepared.picks.cdf.as_slice())
         + size_of_val(prepared.tables.strata.as_slice())

@@ -2,15 +2,19 @@
 
 use crate::accel::{Accel, MAX_MATERIALS};
 use crate::gpu::layout::{EMITS_BOTH_SIDES, Emitter, Frame, Material, NONE};
+use crate::gpu::self_test::LOOP_LIMIT;
 use crate::gpu::shader::{self, Defines, Module};
 use crate::render::lights::{LightPicks, STEPS, light_picks};
-use crate::scene::{Bsdf, Filter, Projection, Sampler, Scene, Sides};
+use crate::render::surfaces::{Kind, Needed, Surfaces};
+use crate::scene::{Bsdf, Environment, Filter, Light, Projection, Sampler, Scene, Sides};
 use crate::spectral::Curve;
 use crate::spectral::table::SpectralTables;
 use crate::{Error, Result};
 
 /// Spectra that may be held in registers while a pixel is evaluated; with more, each is looked up where it is needed.
 const MAX_REGISTER_SPECTRA: usize = 8;
+/// Evaluation walks the records of a path in one loop (DESIGN section 7).
+const MAX_RECORDS: u32 = LOOP_LIMIT;
 /// Spectrum ids have 16 bits in a record.
 const MAX_SPECTRA: usize = 1 << 16;
 /// Parts of the renderer that a scene needs; what is false is left out of shaders and buffers.
@@ -30,6 +34,39 @@ pub struct Features {
     pub knots: bool,
     /// All spectra held in registers during evaluation.
     pub registers: bool,
+    /// Materials of several lobes, records of 16 bytes; `None` where diffuse surfaces are all there is.
+    pub general: Option<General>,
+}
+
+/// Parts of the renderer that only general scenes have.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct General {
+    /// Bit n for each [`Kind`] n that occurs.
+    pub kinds: u32,
+    /// A rough coat over a diffuse base.
+    pub rough_base: bool,
+    /// Roughness that differs along and across the surface.
+    pub anisotropic: bool,
+    /// Refraction that may leave one channel of a path.
+    pub dispersion: bool,
+    /// Rough refraction that bends each channel by itself.
+    pub spread: bool,
+}
+
+impl General {
+    fn of(surfaces: &Surfaces) -> General {
+        General {
+            kinds: surfaces.kinds,
+            rough_base: surfaces.rough_base,
+            anisotropic: surfaces.anisotropic,
+            dispersion: surfaces.dispersion,
+            spread: surfaces.spread,
+        }
+    }
+
+    fn has(&self, kinds: &[Kind]) -> bool {
+        kinds.iter().any(|&kind| self.kinds >> kind as u32 & 1 == 1)
+    }
 }
 
 /// A scene as every device gets it.
@@ -37,6 +74,8 @@ pub struct Prepared {
     pub features: Features,
     pub frame: Frame,
     pub materials: Vec<Material>,
+    /// In general scenes, instead of `materials`.
+    pub surfaces: Option<Surfaces>,
     pub emitters: Vec<Emitter>,
     pub picks: LightPicks,
     pub accel: Accel,
@@ -53,17 +92,26 @@ impl Prepared {
     /// Flattens `scene`. Errors: materials that no shader knows; more materials, spectra or bounces than ids and
     /// counters have bits for.
     pub fn new(scene: &Scene, seed: u64) -> Result<Prepared> {
-        check_materials(scene)?;
+        check_lights(scene)?;
         let accel = Accel::build(scene);
         if scene.materials.len() > MAX_MATERIALS {
             return Err(Error::input(&scene.file, format!("more than {MAX_MATERIALS} materials")));
         }
-        let picks = light_picks(scene, &accel);
-        let (tables, ids) = spectral_tables(scene)?;
+        let general = scene.materials.iter().any(|m| !matches!(m.bsdf, Bsdf::Diffuse { .. } | Bsdf::Black));
+        let mut surfaces = general.then(|| Surfaces::new(scene));
+        // General scenes meet a uniform environment by sampling the BSDF, and do not aim at it.
+        let picks = light_picks(scene, &accel, !general);
+        let (tables, ids) = spectral_tables(scene, surfaces.as_ref().map_or(&[], |s| &s.spectra))?;
+        if let Some(surfaces) = &mut surfaces {
+            surfaces.name_spectra(|position| tables.ids[ids.needed[position]]);
+        }
 
         let factor = |s: usize| tables.ids[ids.factors[&s]];
         let source = |s: usize| tables.ids[ids.sources[&s]];
-        let materials = scene.materials.iter().map(|m| material(scene, m, factor)).collect();
+        let materials = match surfaces {
+            None => scene.materials.iter().map(|m| material(scene, m, factor)).collect(),
+            Some(_) => Vec::new(),
+        };
         let emitters = accel
             .emitters
             .iter()
@@ -74,12 +122,25 @@ impl Prepared {
                 Emitter { primitive, spectrum: source(emission.radiance) | sides, pick: pick as f32, area: area as f32 }
             })
             .collect();
-        let environment_spectrum = scene.environment.as_ref().map_or(0, |e| source(e.radiance));
-        let features = features(scene, &accel, &tables, ids.factors.len() + ids.sources.len());
+        let environment_spectrum = scene.environment.as_ref().and_then(|e| e.uniform()).map_or(0, source);
+        let mut features = features(scene, &accel, &tables, ids.factors.len() + ids.sources.len());
+        features.general = surfaces.as_ref().map(General::of);
+        features.registers &= !general;
+        let frame = frame(scene, seed, &accel, &picks, environment_spectrum, tables.stratum_bits);
+        let max_records = max_records(&frame, features, surfaces.as_ref());
+        if max_records >= MAX_RECORDS {
+            let message = format!(
+                "a path of {} bounces may take {max_records} records in this scene, at most {MAX_RECORDS} are supported: \
+                 lower integrator.max_bounces",
+                frame.max_bounces
+            );
+            return Err(Error::input(&scene.file, message));
+        }
         Ok(Prepared {
             features,
-            frame: frame(scene, seed, &accel, &picks, environment_spectrum, tables.stratum_bits, features),
+            frame: Frame { max_records, ..frame },
             materials,
+            surfaces,
             emitters,
             picks,
             spectrum_names: ids.names,
@@ -103,6 +164,13 @@ impl Prepared {
         d.constant("STACK_SIZE", self.accel.depth);
         d.set("CAMERA_THIN_LENS", f.thin_lens).set("CAMERA_ORTHOGRAPHIC", f.orthographic).set("GAUSSIAN", f.gaussian);
         d.set("INDEPENDENT", f.independent).set("ROULETTE", f.roulette).set("SHAPES", f.shapes);
+        if let Some(general) = &f.general {
+            self.general_defines(general, &mut d);
+            if general.dispersion {
+                d.set("STRATA", f.strata).set("KNOTS", f.knots).set("KNOT_STEPS", self.tables.knot_steps());
+                self.spectra_defines(&mut d);
+            }
+        }
         d.set("EMITTERS", f.emitters).set("ENVIRONMENT", f.environment).set("LIGHTS", f.emitters || f.environment);
         for (count, many, size_name, list) in [
             ("NODE_WINDOWS", "MANY_NODE_WINDOWS", "NODE_WINDOW", &windows.nodes),
@@ -131,12 +199,93 @@ impl Prepared {
         if self.features.emitters || self.features.environment {
             modules.push(shader::LIGHT);
         }
-        modules.push(shader::GENERATE_BOUNCE);
+        let Some(general) = &self.features.general else {
+            modules.push(shader::GENERATE_BOUNCE);
+            return modules;
+        };
+        modules.extend([shader::RECORD, shader::TABLES, shader::MATERIAL, shader::GGX, shader::BSDF]);
+        if general.anisotropic {
+            modules.push(shader::TANGENT);
+        }
+        if general.dispersion {
+            if self.features.knots {
+                modules.push(shader::KNOTS);
+            }
+            modules.push(shader::CHANNEL);
+        }
+        modules.push(shader::GENERATE_VERTEX);
         modules
     }
 
     pub fn evaluate_modules(&self) -> Vec<Module> {
-        vec![shader::TYPES, shader::FRAME, shader::EVALUATE_PIXEL]
+        let mut modules = vec![shader::TYPES, shader::FRAME];
+        if self.features.knots {
+            modules.push(shader::KNOTS);
+        }
+        if let Some(general) = &self.features.general {
+            modules.push(shader::RECORD);
+            if general.has(&[Kind::BoundaryAgain]) || general.rough_base {
+                modules.push(shader::TABLES);
+            }
+            modules.push(shader::PROGRAM);
+        }
+        modules.push(shader::EVALUATE_PIXEL);
+        modules
+    }
+
+    /// What general scenes compile into every pass.
+    fn general_defines(&self, general: &General, d: &mut Defines) {
+        let has = |kinds: &[Kind]| general.has(kinds);
+        let rough_glass = has(&[Kind::RoughBoundary]);
+        d.set("GENERAL", true).set("ANISOTROPIC", general.anisotropic).set("DISPERSION", general.dispersion);
+        d.constant("STATE_WORDS", self.state_bytes() / 16);
+        for (name, kinds) in [
+            ("MIRRORS", &[Kind::Conductor, Kind::Mirror, Kind::Refraction][..]),
+            ("MICROFACETS", &[Kind::RoughConductor, Kind::RoughCoat, Kind::RoughBoundary]),
+            ("GLASS", &[Kind::Mirror, Kind::RoughBoundary]),
+            ("CONDUCTOR", &[Kind::Conductor]),
+            ("ROUGH_CONDUCTOR", &[Kind::RoughConductor]),
+            ("CONDUCTOR_AGAIN", &[Kind::ConductorAgain]),
+            ("MIRROR", &[Kind::Mirror]),
+            ("REFRACTION", &[Kind::Refraction]),
+            ("ROUGH_GLASS", &[Kind::RoughBoundary]),
+            ("ROUGH_COAT", &[Kind::RoughCoat]),
+            ("BASE", &[Kind::Base]),
+            ("OP_CONDUCTOR", &[Kind::Conductor, Kind::RoughConductor]),
+            ("OP_FRESNEL", &[Kind::Mirror, Kind::Refraction, Kind::RoughBoundary, Kind::RoughCoat, Kind::Base]),
+        ] {
+            d.set(name, has(kinds));
+        }
+        d.set("ROUGH_BASE", general.rough_base).set("OP_ETA_TABLE", rough_glass || general.rough_base);
+        d.set("OP_ONLY", general.dispersion);
+        d.set("OP_ROUGH_TRANSMIT", general.spread).set("RAW_RECORDS", general.spread);
+    }
+
+    /// How spectral tables are laid out.
+    fn spectra_defines(&self, d: &mut Defines) {
+        d.constant("SPECTRA", self.tables.stratified as u32);
+        d.constant("CHANNELS", self.channels as u32);
+        d.constant("CHANNELS_PADDED", self.tables.channels_padded as u32);
+        d.constant("QUADS", self.tables.channels_padded as u32 / 4);
+    }
+
+    /// Workgroups of `evaluate_pixel` on a software device or a GPU.
+    pub fn evaluate_shape(&self, software: bool) -> EvaluateShape {
+        let quads = self.tables.channels_padded as u32 / 4;
+        match self.features.general {
+            None => EvaluateShape::new(quads, software),
+            Some(_) => EvaluateShape::general(quads, software),
+        }
+    }
+
+    /// Bytes of a record.
+    pub fn record_bytes(&self) -> u32 {
+        if self.features.general.is_some() { 16 } else { 8 }
+    }
+
+    /// Bytes of a path's state between two bounces.
+    pub fn state_bytes(&self) -> u32 {
+        if self.features.general.is_some_and(|g| g.dispersion) { 48 } else { 32 }
     }
 
     /// Switches and constants of `evaluate_pixel`, for workgroups as `shape` says.
@@ -144,13 +293,13 @@ impl Prepared {
         let mut d = Defines::default();
         d.set("STRATA", self.features.strata).set("KNOTS", self.features.knots);
         d.set("REGISTERS", self.features.registers).set("KNOT_STEPS", self.tables.knot_steps());
+        if let Some(general) = &self.features.general {
+            self.general_defines(general, &mut d);
+        }
         d.set("FACTORS", self.factors as u32).set("SOURCES", self.sources as u32);
         d.set("WORKGROUP", shape.lanes * shape.pixels);
         d.constant("FIRST_SOURCE", 1 + self.factors as u32);
-        d.constant("SPECTRA", self.tables.stratified as u32);
-        d.constant("CHANNELS", self.channels as u32);
-        d.constant("CHANNELS_PADDED", self.tables.channels_padded as u32);
-        d.constant("QUADS", self.tables.channels_padded as u32 / 4);
+        self.spectra_defines(&mut d);
         d.constant("LANES", shape.lanes);
         d.constant("VECTORS", shape.vectors);
         d.constant("PIXELS_PER_GROUP", shape.pixels);
@@ -189,6 +338,15 @@ impl EvaluateShape {
     /// On software devices loads count most, and more channels a thread share them: measured on lavapipe, a thread's time
     /// goes as 2.2 + vectors. A GPU hides loads behind other threads, and needs the registers for that.
     pub fn new(quads: u32, software: bool) -> EvaluateShape {
+        EvaluateShape::among(quads, software, &[1, 2, 4])
+    }
+
+    /// For general scenes, whose code per quad is long: compiling it, and registers, set the limit.
+    pub fn general(quads: u32, software: bool) -> EvaluateShape {
+        EvaluateShape::among(quads, software, &[1, 2])
+    }
+
+    fn among(quads: u32, software: bool, candidates: &[u32]) -> EvaluateShape {
         let width = if software { 8 } else { 32 };
         let of = |vectors: u32| {
             let threads = quads.div_ceil(vectors);
@@ -200,7 +358,7 @@ impl EvaluateShape {
             EvaluateShape { vectors, lanes: threads.div_ceil(blocks).next_multiple_of(width), pixels: 1, blocks }
         };
         let cost = |s: &EvaluateShape| f64::from(s.lanes * s.blocks) * (2.2 + f64::from(s.vectors));
-        let candidates: &[u32] = if software { &[1, 2, 4] } else { &[1] };
+        let candidates = if software { candidates } else { &[1] };
         let shapes = candidates.iter().map(|&v| of(v));
         shapes.min_by(|a, b| cost(a).total_cmp(&cost(b))).expect("at least one candidate")
     }
@@ -210,36 +368,36 @@ struct SpectrumIds {
     /// Scene spectrum → position among the curves of the tables.
     factors: std::collections::BTreeMap<usize, usize>,
     sources: std::collections::BTreeMap<usize, usize>,
+    /// Of each that materials of general scenes need.
+    needed: Vec<usize>,
     names: Vec<String>,
 }
 
-/// Scenes may have materials that the devices do not render yet.
-fn check_materials(scene: &Scene) -> Result<()> {
-    for material in &scene.materials {
-        let kind = match material.bsdf {
-            Bsdf::Diffuse { .. } | Bsdf::Black => continue,
-            Bsdf::Conductor { .. } => "conductor",
-            Bsdf::Dielectric { .. } => "dielectric",
-            Bsdf::Plastic { .. } => "plastic",
-            Bsdf::Blend { .. } => "blend",
-        };
-        let message = format!(
-            "material \"{}\" is of kind `{kind}`, which cannot be rendered yet: use `diffuse` or `black`",
-            material.name
-        );
-        return Err(Error::input(&scene.file, message));
-    }
-    Ok(())
+/// Scenes may have lights that the devices do not know yet.
+fn check_lights(scene: &Scene) -> Result<()> {
+    let kind = match (scene.lights.first(), &scene.environment) {
+        (Some(Light::Point { .. }), _) => "a point light",
+        (Some(Light::Directional { .. }), _) => "a directional light",
+        (Some(Light::Sun { .. }), _) => "a sun",
+        (None, Some(Environment::Map(_))) => "an environment map",
+        _ => return Ok(()),
+    };
+    Err(Error::input(
+        &scene.file,
+        format!("{kind} cannot be rendered yet: use emitting surfaces or a uniform environment"),
+    ))
 }
 
 /// Tables of the constant 1, of what multiplies throughput, then of what emits.
-fn spectral_tables(scene: &Scene) -> Result<(SpectralTables, SpectrumIds)> {
-    let factors = scene.materials.iter().filter_map(|m| match m.bsdf {
+fn spectral_tables(scene: &Scene, needed: &[Needed]) -> Result<(SpectralTables, SpectrumIds)> {
+    // General scenes have all of theirs among those needed.
+    let plain = if needed.is_empty() { &scene.materials[..] } else { &[] };
+    let factors = plain.iter().filter_map(|m| match m.bsdf {
         Bsdf::Diffuse { reflectance } => Some(reflectance),
         _ => None,
     });
     let sources = scene.objects.iter().filter_map(|o| o.emission.as_ref().map(|e| e.radiance));
-    let sources = sources.chain(scene.environment.as_ref().map(|e| e.radiance));
+    let sources = sources.chain(scene.environment.as_ref().and_then(|e| e.uniform()));
     let mut curves = vec![&Curve::Constant(1.0)];
     let mut names = vec!["1".to_owned()];
     let mut number = |list: std::collections::BTreeSet<usize>| -> std::collections::BTreeMap<usize, usize> {
@@ -252,13 +410,23 @@ fn spectral_tables(scene: &Scene) -> Result<(SpectralTables, SpectrumIds)> {
             .collect()
     };
     let (factors, sources) = (number(factors.collect()), number(sources.collect()));
+    let first = curves.len();
+    for spectrum in needed {
+        let (name, curve) = match spectrum {
+            Needed::Scene(id) => (&scene.spectra[*id].name, &scene.spectra[*id].curve),
+            Needed::Derived(name, curve) => (name, curve),
+        };
+        curves.push(curve);
+        names.push(name.clone());
+    }
+    let needed = (first..curves.len()).collect();
     if curves.len() > MAX_SPECTRA {
         return Err(Error::input(
             &scene.file,
             format!("{} spectra in use, at most {MAX_SPECTRA} are supported", curves.len()),
         ));
     }
-    Ok((SpectralTables::build(&curves, &scene.channels), SpectrumIds { factors, sources, names }))
+    Ok((SpectralTables::build(&curves, &scene.channels), SpectrumIds { factors, sources, needed, names }))
 }
 
 fn material(scene: &Scene, m: &crate::scene::Material, factor: impl Fn(usize) -> u32) -> Material {
@@ -288,7 +456,15 @@ fn features(scene: &Scene, accel: &Accel, tables: &SpectralTables, spectra: usiz
         strata: tables.stratum_bits > 0,
         knots: tables.has_knots(),
         registers: !tables.has_knots() && spectra <= MAX_REGISTER_SPECTRA,
+        general: None,
     }
+}
+
+/// Most records of a path: at every scattering event what materials take, and emission where a surface or the sky emits.
+fn max_records(frame: &Frame, features: Features, surfaces: Option<&Surfaces>) -> u32 {
+    let bounces = frame.max_bounces;
+    let emission = if features.emitters { bounces + 1 } else { 1 };
+    emission.saturating_add(bounces.saturating_mul(surfaces.map_or(1, |s| s.vertex_records)))
 }
 
 fn frame(
@@ -298,7 +474,6 @@ fn frame(
     picks: &LightPicks,
     environment_spectrum: u32,
     stratum_bits: u32,
-    features: Features,
 ) -> Frame {
     let (camera, space) = (&scene.camera, &accel.space);
     let (half_size, aperture_radius, focus_distance) = match camera.projection {
@@ -325,8 +500,7 @@ fn frame(
         emitter_count: accel.emitters.len() as u32,
         environment_pick: picks.environment as f32,
         environment_spectrum,
-        // Next-event estimation at every scattering event, and emission where a surface or the sky emits.
-        max_records: bounces + if features.emitters { bounces + 1 } else { 1 },
+        max_records: 0,
         stratum_bits,
         unused: 0,
     }
@@ -334,33 +508,7 @@ fn frame(
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
-    use super::{EvaluateShape, Prepared};
-    use crate::scene;
-
-    /// What the scene file may have and no shader knows is refused in one sentence that names it.
-    #[test]
-    fn materials_that_no_shader_knows_are_refused() {
-        const SCENE: &str = "camera.perspective = { position = [0, 0, 5], look_at = [0, 0, 0], fov = 60 }
-            film = { width = 1, height = 1 }
-            channels.equal = { from = 400, to = 700, count = 1 }
-            materials.grey.diffuse.reflectance = 0.5
-            objects = [{ sphere = { center = [0, 0, 0], radius = 1 }, material = \"m\" }]\n";
-        for (kind, keys) in [
-            ("conductor", "{ eta = 0.2, k = 3.4 }"),
-            ("dielectric", "{ eta = 1.5 }"),
-            ("plastic", "{ reflectance = 0.5, eta = 1.5 }"),
-            ("blend", "{ a = \"grey\", b = \"grey\", weight = 0.5 }"),
-        ] {
-            let text = format!("{SCENE}materials.m.{kind} = {keys}");
-            let scene = scene::parse(&text, Path::new("t.toml"), &[]).unwrap_or_else(|e| panic!("{e}"));
-            let Err(error) = Prepared::new(&scene, 0) else { panic!("{kind} was accepted") };
-            assert_eq!(error.exit_code(), 2);
-            let message = error.to_string();
-            assert!(message.contains("material \"m\"") && message.contains(&format!("`{kind}`")), "{message}");
-        }
-    }
+    use super::EvaluateShape;
 
     #[test]
     fn evaluation_groups_cover_all_channels_with_few_idle_threads() {

@@ -8,13 +8,11 @@ use crate::gpu::upload;
 use crate::render::prepare::Prepared;
 use crate::{Error, Result};
 
-/// Bytes of a path between the passes: state (32), head (8), its places in the queues (8), throughput under roulette
-/// (4), and 8 a record.
-const STATE_BYTES: u64 = 32;
+/// Bytes of a path between the passes, beside its state and its records: head (8), its places in the queues (8),
+/// throughput under roulette (4).
 const HEAD_BYTES: u64 = 8;
 const QUEUE_BYTES: u64 = 8;
 const THROUGHPUT_BYTES: u64 = 4;
-const RECORD_BYTES: u64 = 8;
 /// Bytes of a unit's rectangle.
 const UNIT_BYTES: u64 = 16;
 
@@ -55,6 +53,9 @@ pub struct WavePlan {
     pub channels: u32,
     pub max_bounces: u32,
     pub max_records: u32,
+    /// Bytes of a path's state and of a record.
+    pub state_size: u32,
+    pub record_size: u32,
     pub roulette: bool,
     pub limits: DeviceLimits,
     /// The scene on the device, bytes.
@@ -78,7 +79,8 @@ impl WavePlan {
                 limits.binding >> 20
             )));
         }
-        let bindable = limits.binding / (RECORD_BYTES * records).max(STATE_BYTES);
+        let bindable =
+            limits.binding / (u64::from(prepared.record_bytes()) * records).max(u64::from(prepared.state_bytes()));
         let most = bindable.min(budget.paths.map_or(u64::MAX, u64::from));
         if most == 0 {
             return Err(Error::Usage(
@@ -94,6 +96,8 @@ impl WavePlan {
             channels: channels as u32,
             max_bounces: prepared.frame.max_bounces,
             max_records: records as u32,
+            state_size: prepared.state_bytes(),
+            record_size: prepared.record_bytes(),
             roulette: prepared.features.roulette,
             limits,
             scene_bytes: upload::scene_bytes(prepared, &windows),
@@ -158,7 +162,7 @@ impl WavePlan {
     }
 
     pub fn state_bytes(&self) -> u64 {
-        u64::from(self.paths) * STATE_BYTES
+        u64::from(self.paths) * u64::from(self.state_size)
     }
 
     pub fn head_bytes(&self) -> u64 {
@@ -175,7 +179,7 @@ impl WavePlan {
     }
 
     pub fn record_bytes(&self) -> u64 {
-        u64::from(self.paths) * u64::from(self.max_records) * RECORD_BYTES
+        u64::from(self.paths) * u64::from(self.max_records) * u64::from(self.record_size)
     }
 
     /// The means of all units of a wave.
@@ -225,10 +229,10 @@ impl WavePlan {
 
     /// Bytes of one saved path, all its records included.
     pub fn path_bytes(&self) -> u64 {
-        STATE_BYTES
+        u64::from(self.state_size)
             + HEAD_BYTES
             + QUEUE_BYTES
-            + RECORD_BYTES * u64::from(self.max_records)
+            + u64::from(self.record_size) * u64::from(self.max_records)
             + self.throughput_bytes().min(THROUGHPUT_BYTES)
     }
 
@@ -304,6 +308,8 @@ mod tests {
             channels: 8,
             max_bounces: 5,
             max_records: 11,
+            state_size: 32,
+            record_size: 8,
             roulette: false,
             limits: LIMITS,
             scene_bytes: 0,

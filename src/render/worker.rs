@@ -162,7 +162,7 @@ impl Worker {
         // Before shaders are compiled in vain.
         gpu.check()?;
 
-        let shape = EvaluateShape::new(prepared.tables.channels_padded as u32 / 4, gpu.is_software);
+        let shape = prepared.evaluate_shape(gpu.is_software);
         let defines = prepared.defines(&windows);
         let stage = |modules: &[shader::Module], defines: &shader::Defines| {
             let pass = Pass::new(&gpu, &shader::compose(modules, defines))?;

@@ -81,6 +81,12 @@ impl ReflectionAlbedo {
     pub fn mean_loss(&self) -> f64 {
         self.mean_loss
     }
+
+    /// The losses themselves, \[azimuth\]\[cosine\]: one azimuth where isotropic, else equal steps of half the sum of the
+    /// azimuth and that in the space in which the distribution is round.
+    pub fn rows(&self) -> &[[f64; COSINES]] {
+        &self.loss
+    }
 }
 
 /// Albedos of single scattering by a rough boundary between two dielectrics, seen from before and from behind it.
@@ -128,6 +134,13 @@ impl DielectricAlbedo {
         let x = ((eta.ln() - self.first) / self.step).clamp(0.0, (self.sides.len() - 1) as f64);
         let i = (x as usize).min(self.sides.len() - 2);
         value(i) + (x - i as f64) * (value(i + 1) - value(i))
+    }
+
+    /// The tables themselves: ln η at the first node, the step, and for each node what is reflected and lost before, and
+    /// behind, by cosine.
+    pub fn columns(&self) -> (f64, f64, Vec<[&[f64; COSINES]; 4]>) {
+        let columns = self.sides.iter().map(|[a, b]| [&a.reflected, &a.loss, &b.reflected, &b.loss]);
+        (self.first, self.step, columns.collect())
     }
 
     /// Flux reflected by one scattering event, for an observer `behind` the boundary or before it at cosine `z`.

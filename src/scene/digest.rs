@@ -3,7 +3,9 @@
 use glam::DVec3;
 use sha2::{Digest, Sha256};
 
-use super::{Bsdf, Filter, Projection, Sampler, Scene, Shape, Sides, Wavelengths};
+use super::{
+    Bsdf, Environment, EnvironmentMap, Filter, Light, Projection, Sampler, Scene, Shape, Sides, Texels, Wavelengths,
+};
 use crate::spectral::{Curve, Outside};
 
 /// Hex SHA-256 over every number's bits and every choice of `scene`, in order; not over paths, names and warnings.
@@ -67,11 +69,17 @@ pub fn digest(scene: &Scene) -> String {
     }
     match &scene.environment {
         None => hash.tag(0),
-        Some(environment) => {
+        Some(Environment::Uniform(radiance)) => {
             hash.tag(1);
-            hash.count(environment.radiance);
+            hash.count(*radiance);
+        }
+        Some(Environment::Map(map)) => {
+            hash.tag(2);
+            hash.map(map);
         }
     }
+    hash.count(scene.lights.len());
+    scene.lights.iter().for_each(|light| hash.light(light));
     hash.0.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
@@ -178,6 +186,48 @@ impl Hash {
                 self.numbers(&[*kelvin, *scale]);
             }
         }
+    }
+
+    fn light(&mut self, light: &Light) {
+        match light {
+            Light::Point { position, .. } => {
+                self.tag(0);
+                self.vector(*position);
+            }
+            Light::Directional { direction, .. } => {
+                self.tag(1);
+                self.vector(*direction);
+            }
+            Light::Sun { direction, angular_radius, .. } => {
+                self.tag(2);
+                self.vector(*direction);
+                self.number(*angular_radius);
+            }
+        }
+        self.count(light.spectrum());
+    }
+
+    fn map(&mut self, map: &EnvironmentMap) {
+        for column in [map.to_map.x_axis, map.to_map.y_axis, map.to_map.z_axis] {
+            self.vector(column);
+        }
+        self.number(map.scale);
+        map.size.iter().for_each(|side| self.count(*side as usize));
+        let values = match &map.texels {
+            Texels::Rgb { rgb, daylight } => {
+                self.tag(0);
+                self.count(*daylight);
+                rgb
+            }
+            Texels::Spectral { nm, radiance } => {
+                self.tag(1);
+                self.count(nm.len());
+                self.numbers(nm);
+                radiance
+            }
+        };
+        self.count(values.len());
+        values.iter().for_each(|value| self.0.update(value.to_bits().to_le_bytes()));
     }
 
     fn shape(&mut self, shape: &Shape) {

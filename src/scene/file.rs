@@ -7,12 +7,14 @@ use super::channels;
 use super::context::{Context, position};
 use super::decode::{Fields, Item, Keys};
 use super::digest::digest;
+use super::environment;
+use super::light;
 use super::material::Materials;
 use super::object::Objects;
-use super::overrides::{self, ENVIRONMENTS, LIGHT_KINDS};
-use super::spectrum::{Handle, Quantity, Spectra};
+use super::overrides;
+use super::spectrum::Spectra;
 use super::tree::{self, Entry, Origin};
-use super::{Environment, Integrator, Sampler, Scene, Wavelengths};
+use super::{Integrator, Sampler, Scene, Wavelengths};
 use crate::error::{Error, Problem, Result};
 
 const TOP: Keys = Keys::new(&[
@@ -29,7 +31,6 @@ const TOP: Keys = Keys::new(&[
 ]);
 const INTEGRATOR: Keys =
     Keys::new(&["max_bounces", "russian_roulette_start", "sampler", "wavelengths", "evaluator", "epoch"]);
-const ENVIRONMENT: Keys = Keys::new(&["radiance", "up", "rotate_degrees", "scale"]).later(&["map"]);
 /// Evaluations walk all records of a path, two a bounce and one more, in one loop of at most 32,768 iterations (DESIGN
 /// section 7).
 const MAX_BOUNCES: u32 = 16_383;
@@ -116,11 +117,8 @@ fn decode<'a>(cx: &'a Context<'a>, root: &'a [Entry]) -> Option<Scene> {
         items.iter().for_each(|item| objects.add(item));
     }
     let objects = objects.finish();
-    let environment = top.get("environment").map(|item| {
-        let radiance = decode_environment(&item, &mut spectra)?;
-        Some(Environment { radiance: spectra.take(radiance) })
-    });
-    refuse_lights(top.get("lights"));
+    let lights = light::decode_lights(top.get("lights"), &mut spectra);
+    let environment = top.get("environment").map(|item| environment::decode(&item, &mut spectra));
     refuse_media(top.get("media"));
 
     Some(Scene {
@@ -132,6 +130,7 @@ fn decode<'a>(cx: &'a Context<'a>, root: &'a [Entry]) -> Option<Scene> {
         materials: materials.finish(),
         spectra: spectra.finish(),
         objects,
+        lights,
         environment: match environment {
             Some(environment) => Some(environment?),
             None => None,
@@ -211,35 +210,6 @@ fn choice_or_later<T: Copy>(item: &Item, now: &[(&str, T)], later: &[&str]) -> O
         return None;
     }
     item.choice(now)
-}
-
-fn decode_environment<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Handle> {
-    let fields = item.table(ENVIRONMENT)?;
-    let radiance = fields.exactly_one(&ENVIRONMENTS, "source of radiance");
-    // A uniform environment looks the same however it is turned; the keys still have to make sense.
-    let up = fields.get("up").map(|item| item.direction());
-    let turn = fields.get("rotate_degrees").map(|item| item.number());
-    let scale = fields.get("scale");
-    let radiance = radiance.filter(|item| item.path == "environment.radiance")?;
-    let radiance = spectra.resolve(&radiance, Quantity::Radiance);
-    if up == Some(None) || turn == Some(None) {
-        return None;
-    }
-    match scale {
-        Some(scale) => spectra.scaled(radiance?, &scale),
-        None => radiance,
-    }
-}
-
-/// `[[lights]]` come with a later version; what is written is still checked to be one of them.
-fn refuse_lights(item: Option<Item>) {
-    for item in item.and_then(|item| item.array()).unwrap_or_default() {
-        let kind =
-            item.table(Keys::new(&LIGHT_KINDS)).and_then(|fields| fields.exactly_one(&LIGHT_KINDS, "kind of light"));
-        if let Some(kind) = kind {
-            kind.not_supported_yet();
-        }
-    }
 }
 
 /// `[media]` come with a later version.

@@ -7,7 +7,9 @@ mod channels;
 mod context;
 mod decode;
 mod digest;
+mod environment;
 mod file;
+mod light;
 mod material;
 mod object;
 mod overrides;
@@ -17,8 +19,9 @@ mod transform;
 mod tree;
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
-use glam::{DVec2, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 pub use file::{load, parse};
@@ -44,6 +47,7 @@ pub struct Scene {
     /// Only materials that some object uses, itself or as a part of a blend.
     pub materials: Vec<Material>,
     pub objects: Vec<Object>,
+    pub lights: Vec<Light>,
     pub environment: Option<Environment>,
     /// Said once to the user: held tables, dropped triangles, …
     pub warnings: Vec<String>,
@@ -245,8 +249,88 @@ pub enum Sides {
     Both,
 }
 
-/// Radiance arriving from every direction that leaves the scene.
+/// Light that comes from no surface.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Environment {
-    pub radiance: SpectrumId,
+pub enum Light {
+    Point {
+        position: DVec3,
+        /// W sr⁻¹ nm⁻¹, the same in all directions.
+        intensity: SpectrumId,
+    },
+    Directional {
+        /// In which the light travels; a unit vector.
+        direction: DVec3,
+        /// W m⁻² nm⁻¹ on a plane facing the light.
+        irradiance: SpectrumId,
+    },
+    /// A disk at infinity, the same radiance all over, visible also to the camera.
+    Sun {
+        /// In which the light of its centre travels; a unit vector.
+        direction: DVec3,
+        /// Between centre and rim, radians, up to π/2.
+        angular_radius: f64,
+        /// W m⁻² nm⁻¹ on a plane facing its centre.
+        irradiance: SpectrumId,
+    },
+}
+
+impl Light {
+    /// Its spectrum: intensity or irradiance.
+    pub fn spectrum(&self) -> SpectrumId {
+        match self {
+            Light::Point { intensity, .. } => *intensity,
+            Light::Directional { irradiance, .. } | Light::Sun { irradiance, .. } => *irradiance,
+        }
+    }
+}
+
+/// Radiance arriving from every direction that leaves the scene, W m⁻² sr⁻¹ nm⁻¹.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Environment {
+    /// The same from everywhere.
+    Uniform(SpectrumId),
+    Map(EnvironmentMap),
+}
+
+impl Environment {
+    /// The spectrum of a uniform environment.
+    pub fn uniform(&self) -> Option<SpectrumId> {
+        match self {
+            Environment::Uniform(radiance) => Some(*radiance),
+            Environment::Map(_) => None,
+        }
+    }
+
+    pub fn map(&self) -> Option<&EnvironmentMap> {
+        match self {
+            Environment::Uniform(_) => None,
+            Environment::Map(map) => Some(map),
+        }
+    }
+}
+
+/// Radiance by direction. Direction d in the world is m = `to_map` d in the map, at u = ½ + atan2(m.x, -m.z) / 2π and
+/// v = acos(m.y) / π. Texel (x, y) is centred at u = (x + ½) / width, v = (y + ½) / height; between centres the
+/// radiance of every wavelength is bilinear, repeated in u, held in v.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EnvironmentMap {
+    /// For messages.
+    pub name: String,
+    /// A rotation.
+    pub to_map: DMat3,
+    /// Multiplies all radiance.
+    pub scale: f64,
+    /// Width and height.
+    pub size: [u32; 2],
+    pub texels: Texels,
+}
+
+/// Rows from the top (v = 0), each from u = 0. Finite and not negative.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Texels {
+    /// Linear sRGB, \[y\]\[x\]\[3\]. A texel's radiance is `daylight` times a smooth spectrum
+    /// ([`crate::spectral::upsample`]).
+    Rgb { rgb: Arc<[f32]>, daylight: SpectrumId },
+    /// \[y\]\[x\]\[band\], linear between the wavelengths `nm`, which ascend, and 0 beyond them.
+    Spectral { nm: Vec<f64>, radiance: Arc<[f32]> },
 }

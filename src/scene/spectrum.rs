@@ -28,6 +28,10 @@ pub enum Quantity {
     Reflectance,
     /// W m⁻² sr⁻¹ nm⁻¹, not negative; zero beyond its table.
     Radiance,
+    /// Of a point light, W sr⁻¹ nm⁻¹; as [`Quantity::Radiance`].
+    Intensity,
+    /// Of a light far away, W m⁻² nm⁻¹ on a plane facing it; as [`Quantity::Radiance`].
+    Irradiance,
     /// Of refraction: dimensionless, above 0; held beyond its table, with a warning.
     Index,
     /// Of a coat: at least 1; otherwise as [`Quantity::Index`].
@@ -37,34 +41,41 @@ pub enum Quantity {
 }
 
 impl Quantity {
+    /// Whether it is light itself rather than what becomes of light.
+    fn is_light(self) -> bool {
+        matches!(self, Quantity::Radiance | Quantity::Intensity | Quantity::Irradiance)
+    }
+
     fn default_outside(self) -> Outside {
-        if self == Quantity::Radiance { Outside::Zero } else { Outside::Hold }
+        if self.is_light() { Outside::Zero } else { Outside::Hold }
     }
 
     fn noun(self) -> &'static str {
         match self {
             Quantity::Reflectance => "a reflectance",
             Quantity::Radiance => "a radiance",
+            Quantity::Intensity => "an intensity",
+            Quantity::Irradiance => "an irradiance",
             Quantity::Index => "an index of refraction",
             Quantity::CoatIndex => "the index of refraction of a coat",
             Quantity::Extinction => "an extinction coefficient k",
         }
     }
 
-    fn allows(self, value: f64) -> bool {
+    pub fn allows(self, value: f64) -> bool {
         match self {
             Quantity::Reflectance => (0.0..=1.0).contains(&value),
-            Quantity::Radiance => (0.0..=BRIGHTEST).contains(&value),
+            Quantity::Radiance | Quantity::Intensity | Quantity::Irradiance => (0.0..=BRIGHTEST).contains(&value),
             Quantity::Index => value > 0.0 && value <= DENSEST,
             Quantity::CoatIndex => (1.0..=DENSEST).contains(&value),
             Quantity::Extinction => (0.0..=DENSEST).contains(&value),
         }
     }
 
-    fn range(self) -> String {
+    pub fn range(self) -> String {
         let range = match self {
             Quantity::Reflectance => "[0, 1]",
-            Quantity::Radiance => "[0, 1e35]",
+            Quantity::Radiance | Quantity::Intensity | Quantity::Irradiance => "[0, 1e35]",
             Quantity::Index => "(0, 1000]",
             Quantity::CoatIndex => "[1, 1000]",
             Quantity::Extinction => "[0, 1000]",
@@ -212,6 +223,12 @@ impl<'a> Spectra<'a> {
         id
     }
 
+    /// The index in the scene of a curve that no spectrum of the file describes. Equal curves share one.
+    pub fn curve(&mut self, name: &str, curve: Curve) -> SpectrumId {
+        self.checked.push(Checked { name: name.to_owned(), curve, warnings: Vec::new(), taken: None });
+        self.take(self.checked.len() - 1)
+    }
+
     /// `handle`, a radiance, times the number of at least 0 that `item` holds.
     pub fn scaled(&mut self, handle: Handle, item: &Item) -> Option<Handle> {
         let factor = item.not_negative()?;
@@ -244,7 +261,7 @@ impl<'a> Spectra<'a> {
             self.cx.error(source.at, &source.path, message, None);
         };
         let mut warnings = Vec::new();
-        let is_index = !matches!(quantity, Quantity::Reflectance | Quantity::Radiance);
+        let is_index = quantity != Quantity::Reflectance && !quantity.is_light();
         if is_index && !quantity.allows(0.0) && source.outside == Some(Outside::Zero) {
             let help = "remove `outside`, or write outside = \"hold\"";
             let message = format!("an index of refraction cannot be 0 outside its table{used_by}");
@@ -316,10 +333,8 @@ impl<'a> Spectra<'a> {
                     ));
                     return None;
                 }
-                let curve = match quantity {
-                    Quantity::Radiance => upsample::emission(colour),
-                    _ => upsample::reflectance(colour),
-                };
+                let curve =
+                    if quantity.is_light() { upsample::emission(colour) } else { upsample::reflectance(colour) };
                 self.rgb_outside(curve, source.outside, name, &mut warnings)
             }
         };
@@ -346,7 +361,7 @@ impl<'a> Spectra<'a> {
     }
 
     /// The parts of the channels below `first` and above `last` nm, in words.
-    fn uncovered(&self, first: f64, last: f64) -> Option<String> {
+    pub fn uncovered(&self, first: f64, last: f64) -> Option<String> {
         let bounds = &self.channels.as_ref()?.bounds;
         let hull = |parts: &mut dyn Iterator<Item = [f64; 2]>| {
             parts.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).map(|[a, b]| format!("{a}-{b} nm"))

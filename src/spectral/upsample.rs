@@ -165,6 +165,11 @@ pub fn emission(rgb: [f64; 3]) -> Curve {
     on_grid((0..NODES).map(|i| scale * smooth.eval(grid_nm(i)) * OBSERVER.d65[i]))
 }
 
+/// D65 with Y = 1: the spectrum of white light.
+pub fn daylight() -> Curve {
+    on_grid(OBSERVER.d65.iter().copied())
+}
+
 fn on_grid(value: impl Iterator<Item = f64>) -> Curve {
     Curve::Linear { nm: (0..NODES).map(grid_nm).collect(), value: value.collect(), outside: Outside::Hold }
 }

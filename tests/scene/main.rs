@@ -1,6 +1,7 @@
 //! The scene loader from outside: what good scenes resolve to, number by number, what is said about wrong ones, and
 //! that nothing makes it panic.
 
+mod lights;
 mod materials;
 mod never_panics;
 mod resolved;
@@ -54,7 +55,7 @@ radiance = 0.25
 const TRIANGLE: &str = "o part\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl white\nf 1 2 3\n";
 
 /// A folder with the scene's files.
-fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
+pub fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
     let dir = tempfile::tempdir().expect("a temporary folder");
     for (name, text) in [("tri.obj", TRIANGLE)].iter().chain(files) {
         std::fs::write(dir.path().join(name), text).expect("a file in it");

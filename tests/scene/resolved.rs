@@ -232,7 +232,7 @@ fn spectra_resolve_from_every_source() {
         &[],
         &[("environment.scale", "4"), ("environment.up", "[0, 0, 1]"), ("environment.rotate_degrees", "30")],
     );
-    assert_eq!(sky.spectra[sky.environment.unwrap().radiance].curve, Curve::Constant(1.0));
+    assert_eq!(sky.spectra[sky.environment.unwrap().uniform().unwrap()].curve, Curve::Constant(1.0));
 }
 
 #[test]

@@ -271,11 +271,10 @@ fn objects() {
         ("sheared sphere", QUAD, "sphere = { center = [0, 0, 0], radius = 1 }\ntransform = { scale = [1, 1, 2] } #!", "objects.0.transform", &["must keep the shape"]),
         ("too far", QUAD, "sphere = { center = [0, 0, 0], radius = 1 }\ntransform = { translate = [1e20, 0, 0] } #!", "objects.0.transform", &["farther than can be represented"]),
         ("up of nothing", "radiance = 0.25", "radiance = 0.25\nup = [0, 0, 0] #!", "environment.up", &["length is 0"]),
-        ("map", "radiance = 0.25", "map = \"sky.exr\" #!", "environment.map", &["not supported yet"]),
+        ("map that is not there", "radiance = 0.25", "map = \"sky.exr\" #!", "environment.map", &["sky.exr", "cannot be read"]),
         ("negative sky", "radiance = 0.25", "radiance = -0.25 #!", "environment.radiance", &["[0, 1e35]"]),
         ("sky scaled too far", "radiance = 0.25", "radiance = 1e30\nscale = 1e10 #!", "environment.scale", &["[0, 1e35]", "after scaling"]),
         ("sky scaled below 0", "radiance = 0.25", "radiance = 1\nscale = -1 #!", "environment.scale", &["0 or greater"]),
-        ("light", "[environment]", "[[lights]]\npoint = { position = [0, 0, 0], intensity = 1 } #!\n[environment]", "lights.0.point", &["not supported yet"]),
         ("medium", "[environment]", "[media.air] #!\nabsorption = 1\n[environment]", "media.air", &["not supported yet"]),
         ("objects no array", "[environment]", "[environment]\nobjects = 3 #!", "environment.objects", &["unknown key"]),
     ]);

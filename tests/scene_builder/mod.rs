@@ -5,12 +5,12 @@
 pub mod closed_forms;
 pub mod surfaces;
 
-use glam::{DVec2, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 use spectile::scene::{
-    Bsdf, Camera, Emission, Environment, Film, Filter, Integrator, Material, Mesh, Object, Projection, Sampler, Scene,
-    Shape, Sides, Spectrum, Wavelengths,
+    Bsdf, Camera, Emission, Environment, EnvironmentMap, Film, Filter, Integrator, Light, Material, Mesh, Object,
+    Projection, Sampler, Scene, Shape, Sides, Spectrum, Texels, Wavelengths,
 };
-use spectile::spectral::{Channels, Curve};
+use spectile::spectral::{Channels, Curve, upsample};
 
 /// A scene under construction. Starts empty and dark: one pixel that looks along -z from (0, 0, 1), one channel
 /// 500-600 nm, one bounce.
@@ -34,6 +34,7 @@ impl Builder {
             spectra: Vec::new(),
             materials: Vec::new(),
             objects: Vec::new(),
+            lights: Vec::new(),
             environment: None,
             warnings: Vec::new(),
             digest: String::new(),
@@ -68,7 +69,39 @@ impl Builder {
 
     pub fn sky(mut self, radiance: impl IntoCurve) -> Self {
         let radiance = self.spectrum(radiance);
-        self.0.environment = Some(Environment { radiance });
+        self.0.environment = Some(Environment::Uniform(radiance));
+        self
+    }
+
+    /// A map around the scene, +y up.
+    pub fn map(mut self, size: [u32; 2], texels: Texels) -> Self {
+        let name = "a map".to_owned();
+        self.0.environment =
+            Some(Environment::Map(EnvironmentMap { name, to_map: DMat3::IDENTITY, scale: 1.0, size, texels }));
+        self
+    }
+
+    /// The map of linear sRGB colours, \[y\]\[x\]\[3\].
+    pub fn rgb_map(mut self, size: [u32; 2], rgb: Vec<f32>) -> Self {
+        let daylight = self.spectrum(upsample::daylight());
+        self.map(size, Texels::Rgb { rgb: rgb.into(), daylight })
+    }
+
+    pub fn point(mut self, position: DVec3, intensity: impl IntoCurve) -> Self {
+        let intensity = self.spectrum(intensity);
+        self.0.lights.push(Light::Point { position, intensity });
+        self
+    }
+
+    pub fn directional(mut self, direction: DVec3, irradiance: impl IntoCurve) -> Self {
+        let (direction, irradiance) = (direction.normalize(), self.spectrum(irradiance));
+        self.0.lights.push(Light::Directional { direction, irradiance });
+        self
+    }
+
+    pub fn sun(mut self, direction: DVec3, angular_radius: f64, irradiance: impl IntoCurve) -> Self {
+        let (direction, irradiance) = (direction.normalize(), self.spectrum(irradiance));
+        self.0.lights.push(Light::Sun { direction, angular_radius, irradiance });
         self
     }
 

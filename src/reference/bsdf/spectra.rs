@@ -27,6 +27,11 @@ impl<'a> SpectralValues<'a> {
         }
     }
 
+    /// λ_k in nm.
+    pub fn wavelengths(&self) -> &[f64] {
+        &self.wavelength
+    }
+
     pub fn fill(&mut self, spectra: &[SpectrumId]) {
         for &spectrum in spectra {
             self.get(spectrum);

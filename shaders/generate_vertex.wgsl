@@ -1,0 +1,382 @@
+// Generate in general scenes, one bounce of every path: the next vertex, what it emits, next-event estimation, the next
+// direction; where materials are lists of parts, and records a small program (common/record.wgsl).
+// No wavelength takes part in any decision but that of the one channel which dispersion left.
+
+@group(1) @binding(0) var<uniform> wave: Wave;
+@group(1) @binding(1) var<storage, read> units: array<vec4<u32>>;
+@group(1) @binding(2) var<storage, read_write> states: array<vec4<u32>>;
+@group(1) @binding(3) var<storage, read_write> heads: array<vec2<u32>>;
+@group(1) @binding(4) var<storage, read_write> records: array<vec4<u32>>;
+@group(1) @binding(5) var<storage, read_write> counters: array<atomic<u32>>;
+@group(1) @binding(6) var<uniform> step: Step;
+#if ROULETTE
+@group(1) @binding(7) var<storage, read_write> throughputs: array<f32>;
+#endif
+// Paths still under way: two lists that take turns, and how long each became.
+@group(1) @binding(12) var<storage, read_write> queue: array<u32>;
+@group(1) @binding(13) var<storage, read_write> queue_lengths: array<atomic<u32>>;
+
+const DIMENSION_LOBE: u32 = 3u;
+const DIMENSIONS_PER_VERTEX: u32 = 4u;
+
+// `count` records so far; evaluation may stop after the last one that adds radiance, `used`. `last`: the last instruction.
+struct RecordList {
+    path: u32,
+    count: u32,
+    used: u32,
+    last: u32,
+}
+
+fn append_raw(list: ptr<function, RecordList>, words: vec4<f32>) {
+    records[(*list).path * frame.max_records + (*list).count] = bitcast<vec4<u32>>(words);
+    (*list).count += 1u;
+}
+
+fn append(list: ptr<function, RecordList>, operation: u32, ab: u32, weight: f32, parameter: f32) {
+    (*list).last = (*list).path * frame.max_records + (*list).count;
+    records[(*list).last] = vec4<u32>(operation, ab, bitcast<u32>(weight), bitcast<u32>(parameter));
+    (*list).count += 1u;
+}
+
+// Lets the instructions since record `begin` add to the radiance what they built, times a source.
+fn gather(list: ptr<function, RecordList>, begin: u32, source: u32) {
+    if ((*list).count > begin) {
+        records[(*list).last].x |= MODE_GATHER | (source << 16u);
+        (*list).used = (*list).count;
+    }
+}
+
+fn end_path(list: RecordList, rays: u32, overflow: bool) {
+    if (overflow) {
+        atomicAdd(&counters[COUNTER_OVERFLOW], 1u);
+    }
+    if (atomicAdd(&counters[COUNTER_RAYS], rays) > 0xffffffffu - rays) {
+        atomicAdd(&counters[COUNTER_RAYS_HIGH], 1u);
+    }
+    heads[list.path].y = list.used | (wave.sequence << 16u);
+}
+
+@compute @workgroup_size(64)
+fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let place = id.x + id.y * groups.x * 64u;
+    var path = place;
+    if (step.bounce == 0u) {
+        if (place >= wave.path_count) {
+            return;
+        }
+    } else {
+        if (place >= atomicLoad(&queue_lengths[step.bounce - 1u])) {
+            return;
+        }
+        path = queue[(step.bounce & 1u) * wave.path_count + place];
+    }
+    let state1 = states[STATE_WORDS * path + 1u];
+    let packed = state1.w;
+    if (packed == ENDED) {
+        return;
+    }
+    let state0 = bitcast<vec4<f32>>(states[STATE_WORDS * path]);
+    let ray = Ray(state0.xyz, bitcast<vec3<f32>>(state1.xyz));
+    // Density of `direction`, for MIS; negative where it competes with nothing: the camera's own rays, mirrors, ideal
+    // refraction.
+    let density = state0.w;
+#if DISPERSION
+    // The one channel that refraction left, or NONE.
+    var live = states[STATE_WORDS * path + 2u].x;
+#endif
+    var list = RecordList(path, packed & 0xffffu, packed >> 16u, 0u);
+    var overflow = false;
+#if ROULETTE
+    var scale = throughputs[path];
+#else
+    let scale = 1.0;
+#endif
+
+    // The next vertex.
+    let hit = traverse(ray, INFINITE, false, &overflow);
+    if (hit.primitive == NONE) {
+#if ENVIRONMENT
+        // A uniform environment is met by sampling the BSDF, which is as good as aiming at it.
+        let begin = list.count;
+        append(&list, OP_ONE | MODE_SINGLE, 0u, scale, 0.0);
+        gather(&list, begin, frame.environment_spectrum);
+#endif
+        end_path(list, 2u * step.bounce + 1u, overflow);
+        return;
+    }
+    let surface = surface_at(ray, hit);
+    let from_front = dot(surface.normal, ray.direction) < 0.0;
+
+    // What it emits.
+#if EMITTERS
+    if (surface.emitter != NONE) {
+        let spectrum = emitters[surface.emitter].spectrum;
+        if (from_front || (spectrum & EMITS_BOTH_SIDES) != 0u) {
+            var weight = 1.0;
+            if (density >= 0.0) {
+                weight = power_heuristic(density, light_density(surface.emitter, ray.origin, ray.direction, hit.distance, surface.normal));
+            }
+            let begin = list.count;
+            append(&list, OP_ONE | MODE_SINGLE, 0u, scale * weight, 0.0);
+            gather(&list, begin, spectrum & SPECTRUM_MASK);
+        }
+    }
+#endif
+
+    let material = surface_materials[surface.material];
+    var v: Vertex;
+    v.normal = select(-surface.normal, surface.normal, from_front);
+    v.inside = !from_front;
+#if ANISOTROPIC
+    v.s = surface_tangent(hit, surface, v.normal);
+    v.t = cross(v.normal, v.s);
+#else
+    let around = tangents(v.normal);
+    v.s = around.s;
+    v.t = around.t;
+#endif
+    v.o = to_local(v, -ray.direction);
+    if (step.bounce == frame.max_bounces || material.part_count == 0u || !(v.o.z > 0.0) || overflow) {
+        end_path(list, 2u * step.bounce + 1u, overflow);
+        return;
+    }
+
+    // Random numbers of this bounce.
+    let slot = wave.pixel_begin + path / wave.samples;
+    let index = wave.sample_begin + path % wave.samples;
+    let in_tile = slot % wave.tile_pixels;
+    let pixel = units[slot / wave.tile_pixels].xy + vec2<u32>(in_tile % wave.tile_width, in_tile / wave.tile_width);
+    let key = pixel_key(frame.seed_low, frame.seed_high, pixel.x, pixel.y, wave.epoch);
+    let dimension = DIMENSION_BOUNCE + step.bounce * DIMENSIONS_PER_VERTEX;
+    let u_bsdf = random_pair(key, dimension + DIMENSION_BSDF, index, wave.epoch_mask);
+    let u_choice = random_pair(key, dimension + DIMENSION_CHOICE, index, wave.epoch_mask);
+    let u_lobe = random_pair(key, dimension + DIMENSION_LOBE, index, wave.epoch_mask);
+
+    // The part that goes on.
+    var chosen = NONE;
+    var chosen_pick = 0.0;
+    var below = 0.0;
+    for (var p = material.first_part; p < material.first_part + material.part_count; p += 1u) {
+        let pick = part_pick(parts[p], v);
+        if (pick > 0.0 && (chosen == NONE || u_lobe.x >= below)) {
+            chosen = p;
+            chosen_pick = pick;
+        }
+        below += pick;
+    }
+    if (chosen == NONE) {
+        end_path(list, 2u * step.bounce + 1u, overflow);
+        return;
+    }
+    let part = parts[chosen];
+    // The next direction, and its density; negative where it is the only one.
+    var i = cosine_hemisphere(vec3<f32>(0.0, 0.0, 1.0), u_bsdf);
+    var next_density = 0.0;
+    // What the only direction of a part does to every channel, as an instruction.
+    var only = OP_ONE;
+    var only_weight = part.weight / chosen_pick;
+    var only_parameter = v.o.z;
+    let behind = part_behind(part, v);
+    let mode_behind = select(0u, MODE_BEHIND, behind);
+    var goes_on = true;
+#if DISPERSION
+    var only_channel = NONE;
+#endif
+    switch (part.kind & 0xffu) {
+#if CONDUCTOR
+        case KIND_CONDUCTOR: {
+            i = vec3<f32>(-v.o.xy, v.o.z);
+            next_density = -1.0;
+            only = OP_CONDUCTOR | MODE_SINGLE;
+        }
+#endif
+#if MIRROR
+        case KIND_MIRROR: {
+            i = vec3<f32>(-v.o.xy, v.o.z);
+            next_density = -1.0;
+            only = reflecting(part, v.o.z, relative_index(part.eta, behind)) | mode_behind;
+        }
+#endif
+#if REFRACTION
+        case KIND_REFRACTION: {
+            next_density = -1.0;
+            only = OP_TRANSMIT | MODE_SINGLE | MODE_SQUARE | mode_behind;
+            var eta = part.eta;
+#if DISPERSION
+            if ((part.kind & PART_DISPERSES) != 0u) {
+                let channel = select(live, min(u32(u_lobe.y * f32(CHANNELS)), CHANNELS - 1u), live == NONE);
+                only_channel = select(NONE, channel, live == NONE);
+                eta = channel_value(part.ab & 0xffffu, channel, heads[path].x);
+            }
+#endif
+            eta = relative_index(eta, behind);
+            if ((part.kind & PART_DISPERSES) == 0u) {
+                only = OP_TRANSMIT | MODE_SINGLE | mode_behind;
+                only_weight /= eta * eta;
+            }
+            goes_on = beyond_square(v.o.z, eta) > 0.0;
+            if (goes_on) {
+                i = refracted(v.o, vec3<f32>(0.0, 0.0, 1.0), eta);
+            }
+        }
+#endif
+#if MICROFACETS
+        case KIND_ROUGH_CONDUCTOR, KIND_ROUGH_COAT: {
+            let h = ggx_visible_normal(part.alpha, v.o, u_bsdf);
+            i = 2.0 * dot(v.o, h) * h - v.o;
+            goes_on = i.z > 0.0;
+        }
+#endif
+#if ROUGH_GLASS
+        case KIND_ROUGH_BOUNDARY: {
+            let h = ggx_visible_normal(part.alpha, v.o, u_bsdf);
+            let cosine = min(dot(v.o, h), 1.0);
+            let reflects = cosine_table(part.decision, v.inside, cosine);
+            if (u_lobe.y < reflects) {
+                i = 2.0 * cosine * h - v.o;
+                goes_on = i.z > 0.0;
+            } else {
+                var eta = part.eta;
+#if DISPERSION
+                let u_channel = (u_lobe.y - reflects) / (1.0 - reflects);
+                if ((part.kind & PART_NARROW) != 0u) {
+                    let channel = select(live, min(u32(u_channel * f32(CHANNELS)), CHANNELS - 1u), live == NONE);
+                    only_channel = select(NONE, channel, live == NONE);
+                    eta = channel_value(part.ab & 0xffffu, channel, heads[path].x);
+                } else if ((part.kind & PART_DISPERSES) != 0u) {
+                    eta = spread_index(part, min(u32(3.0 * u_channel), 2u));
+                }
+#endif
+                eta = relative_index(eta, behind);
+                goes_on = beyond_square(cosine, eta) > 0.0;
+                if (goes_on) {
+                    i = refracted(v.o, h, eta);
+                    goes_on = i.z < 0.0;
+                }
+#if DISPERSION
+                if ((part.kind & PART_NARROW) != 0u) {
+                    next_density = -1.0;
+                    only = OP_TRANSMIT | MODE_SINGLE | MODE_SQUARE | mode_behind;
+                    only_weight *= ggx_visible(part.alpha, i) / (1.0 - reflects);
+                    only_parameter = cosine;
+                }
+#endif
+            }
+        }
+        case KIND_BEYOND_AGAIN: {
+            i.z = -i.z;
+        }
+#endif
+        default: {
+        }
+    }
+
+    // A light, and the direction to it.
+    var light_direction = vec3<f32>(0.0);
+    var light_weight = 0.0;
+    var light_pdf = 0.0;
+    var source = 0u;
+    var shadow = Ray(surface.position, vec3<f32>(0.0, 0.0, 1.0));
+#if EMITTERS
+    {
+        let u_light = random_pair(key, dimension + DIMENSION_LIGHT_POINT, index, wave.epoch_mask);
+        let transmits = (material.flags & MATERIAL_TRANSMITS) != 0u;
+        let seen_from = select(offset_origin(surface.position, v.normal), surface.position, transmits);
+        let emitter = emitters[choose_emitter(u_choice.x)];
+        let point = sample_emitter(emitter, seen_from, u_light);
+        let towards = point.position - seen_from;
+        let side = dot(v.normal, towards);
+        if (point.density > 0.0 && side != 0.0 && (side > 0.0 || transmits)) {
+            light_direction = normalize(to_local(v, towards));
+            light_pdf = point.density;
+            source = emitter.spectrum & SPECTRUM_MASK;
+            shadow.origin = offset_origin(surface.position, select(-v.normal, v.normal, side > 0.0));
+            let facing = select(point.normal, -point.normal, dot(point.normal, towards) > 0.0);
+            shadow.direction = offset_origin(point.position, facing) - shadow.origin;
+        }
+    }
+#endif
+
+    // Both directions in turn: the light's, if it is seen, adds its radiance; the other goes on.
+    var advanced = false;
+    for (var turn = select(1u, 0u, light_pdf > 0.0); turn < 2u; turn += 1u) {
+        let to_light = turn == 0u;
+        if (!to_light && (!goes_on || next_density < 0.0)) {
+            break;
+        }
+        let direction = select(i, light_direction, to_light);
+        let chance = bsdf_density(material, v, direction);
+        var weight = 1.0 / chance;
+        if (to_light) {
+            weight = scale * power_heuristic(light_pdf, chance) / light_pdf;
+            if (traverse(shadow, 1.0, true, &overflow).primitive != NONE) {
+                continue;
+            }
+        } else {
+            next_density = chance;
+            if (!(chance > 0.0)) {
+                goes_on = false;
+                break;
+            }
+        }
+        let begin = list.count;
+        if ((material.flags & MATERIAL_DIFFUSE) != 0u) {
+            // One record for both: next-event estimation adds its radiance behind the surface's reflectance.
+            if (to_light) {
+                append(&list, OP_PLAIN | (source << 16u), part.ab, weight * max(direction.z, 0.0) * INV_PI, 0.0);
+                list.used = list.count;
+                advanced = true;
+            } else if (!advanced) {
+                append(&list, OP_PLAIN, part.ab, 0.0, 0.0);
+            }
+            continue;
+        }
+        for (var p = material.first_part; p < material.first_part + material.part_count; p += 1u) {
+            let other = parts[p];
+            if (part_pick(other, v) > 0.0) {
+                append_part(&list, other, v, direction, weight);
+            }
+        }
+        if (to_light) {
+            gather(&list, begin, source);
+        } else if (list.count > begin) {
+            records[list.last].x |= MODE_ADVANCE;
+        } else {
+            goes_on = false;
+        }
+    }
+    if (goes_on && next_density < 0.0) {
+        append(&list, only | MODE_ADVANCE, part.ab, only_weight, only_parameter);
+#if DISPERSION
+        if (only_channel != NONE) {
+            live = only_channel;
+            append(&list, OP_ONLY | MODE_SINGLE | MODE_ADVANCE, live, f32(CHANNELS), 0.0);
+        }
+#endif
+    }
+
+#if ROULETTE
+    if (goes_on && step.bounce + 1u >= frame.roulette_start) {
+        goes_on = u_choice.y < material.survival;
+        scale /= material.survival;
+    }
+    throughputs[path] = scale;
+#endif
+    if (!goes_on) {
+        end_path(list, 2u * step.bounce + 2u, overflow);
+        return;
+    }
+    if (overflow) {
+        atomicAdd(&counters[COUNTER_OVERFLOW], 1u);
+    }
+    let direction = to_world(v, i);
+    let origin = offset_origin(surface.position, select(-v.normal, v.normal, i.z > 0.0));
+    heads[path].y = list.used;
+    states[STATE_WORDS * path] = bitcast<vec4<u32>>(vec4<f32>(origin, next_density));
+    states[STATE_WORDS * path + 1u] = vec4<u32>(bitcast<vec3<u32>>(direction), list.count | (list.used << 16u));
+#if DISPERSION
+    states[STATE_WORDS * path + 2u] = vec4<u32>(live, 0u, 0u, 0u);
+#endif
+    let next = atomicAdd(&queue_lengths[step.bounce], 1u);
+    queue[((step.bounce + 1u) & 1u) * wave.path_count + next] = path;
+}

@@ -1,0 +1,122 @@
+//! OpenEXR: RGB, and the spectral layout of Fichet, Pacanowski and Wilkie, *An OpenEXR Layout for Spectral Images*
+//! (Journal of Computer Graphics Techniques 10(3), 2021).
+
+use std::path::Path;
+
+use exr::meta::MetaData;
+use exr::meta::attribute::{AttributeValue, Text};
+
+use super::{Content, Map, checked_size, spectral, with_help};
+use crate::error::Problem;
+use crate::format::image;
+
+/// The file at `path` as spectra where it has emissive spectral channels, else as R, G and B.
+pub fn read_map(path: &Path) -> Result<Map, Box<Problem>> {
+    let picture = image::read(path)?;
+    let size = checked_size(path, picture.size[0].into(), picture.size[1].into())?;
+    let planes = &picture.planes;
+    let mut warnings = Vec::new();
+    let bands: Vec<(f64, &[f32])> =
+        planes.iter().filter_map(|plane| Some((emissive_band(&plane.name)?, plane.samples.as_slice()))).collect();
+    if !bands.is_empty() {
+        // The layout's own label; its authors store W m-2 sr-1 nm-1 under it, as everybody does.
+        const KNOWN: [&str; 3] = ["W.m^-2.sr^-1", "W.m^-2.sr^-1.nm^-1", "W m^-2 sr^-1 nm^-1"];
+        if let Some(units) = units(path).filter(|units| !KNOWN.contains(&units.as_str())) {
+            warnings.push(format!("gives its unit as \"{units}\": its values are taken as W m-2 sr-1 nm-1"));
+        }
+        let (nm, planes): (Vec<f64>, Vec<&[f32]>) = bands.into_iter().unzip();
+        return Ok(Map { size, content: spectral(path, &nm, &planes)?, warnings });
+    }
+    let plane = |wanted: &str| planes.iter().find(|plane| plane.name == wanted).map(|plane| &plane.samples);
+    let (Some(r), Some(g), Some(b)) = (plane("R"), plane("G"), plane("B")) else {
+        let names: Vec<&str> = planes.iter().take(8).map(|plane| plane.name.as_str()).collect();
+        let more = if planes.len() > 8 { ", …" } else { "" };
+        let message = format!("has the channels {}{more}: neither R, G, B nor spectral radiance", names.join(", "));
+        return Err(with_help(path, message, "name channels R, G, B, or by wavelength as in S0.550,0nm"));
+    };
+    let rgb = r.iter().zip(g).zip(b).flat_map(|((r, g), b)| [*r, *g, *b]).collect();
+    Ok(Map { size, content: Content::Rgb(rgb), warnings })
+}
+
+/// `emissiveUnits` of the spectral layout.
+fn units(path: &Path) -> Option<String> {
+    let meta = MetaData::read_from_file(path, false).ok()?;
+    let (header, key) = (meta.headers.first()?, Text::from("emissiveUnits"));
+    let found = header.own_attributes.other.get(&key).or(header.shared_attributes.other.get(&key));
+    match found {
+        Some(AttributeValue::Text(text)) => Some(text.to_string()),
+        _ => None,
+    }
+}
+
+/// The wavelength, in nm, of an unpolarised emissive channel: `S0.` and a number with a decimal comma, an SI prefix, and
+/// m or Hz.
+fn emissive_band(name: &str) -> Option<f64> {
+    const LIGHT_SPEED: f64 = 299_792_458.0;
+    let text = name.strip_prefix("S0.")?;
+    // The number ends before the unit; an exponent is part of it.
+    let digits = |c: char| c.is_ascii_digit() || matches!(c, ',' | '+' | '-');
+    let end = text
+        .char_indices()
+        .find(|&(i, c)| {
+            let exponent = matches!(c, 'e' | 'E')
+                && text[i + 1..].starts_with(|next: char| next.is_ascii_digit() || matches!(next, '+' | '-'));
+            !digits(c) && !exponent
+        })
+        .map(|(i, _)| i)?;
+    let number: f64 = text[..end].replace(',', ".").parse().ok()?;
+    let (prefix, hertz) = match text[end..].strip_suffix("Hz") {
+        Some(prefix) => (prefix, true),
+        None => (text[end..].strip_suffix('m')?, false),
+    };
+    let power = match prefix {
+        "" => 0,
+        "Y" => 24,
+        "Z" => 21,
+        "E" => 18,
+        "P" => 15,
+        "T" => 12,
+        "G" => 9,
+        "M" => 6,
+        "k" => 3,
+        "h" => 2,
+        "da" => 1,
+        "d" => -1,
+        "c" => -2,
+        "m" => -3,
+        "u" => -6,
+        "n" => -9,
+        "p" => -12,
+        _ => return None,
+    };
+    // Exact for nanometres.
+    Some(if hertz { LIGHT_SPEED * 1e9 / (number * 10f64.powi(power)) } else { number * 10f64.powi(power + 9) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::emissive_band;
+
+    #[test]
+    fn names_of_spectral_channels() {
+        for (name, nm) in [
+            ("S0.550,000000nm", Some(550.0)),
+            ("S0.0,55um", Some(550.0)),
+            ("S0.5,5E-7m", Some(550.0)),
+            ("S0.1e3nm", Some(1000.0)),
+            ("S0.10,25um", Some(10_250.0)),
+            ("S1.550,0nm", None),
+            ("T.550,0nm", None),
+            ("S0.nm", None),
+            ("S0.550", None),
+            ("S0.550,0kg", None),
+            ("R", None),
+        ] {
+            let got = emissive_band(name);
+            let close = |a: f64, b: f64| (a - b).abs() <= 4.0 * f64::EPSILON * b;
+            assert!(got.is_some() == nm.is_some() && got.zip(nm).is_none_or(|(a, b)| close(a, b)), "{name}: {got:?}");
+        }
+        // 299,792,458 m/s over 600 THz.
+        assert!((emissive_band("S0.600,0THz").unwrap() - 499.654_096_666_666_7).abs() < 1e-9);
+    }
+}
