@@ -182,7 +182,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         Format::Csv | Format::Png => export::Format::Csv,
     };
     let files = write(args, &view, format)?;
-    report(args, &view, &files, output)
+    report(args, &view, format, &files, output)
 }
 
 /// Options that mean nothing for the format are mistakes.
@@ -264,15 +264,7 @@ fn write(args: &Args, view: &View, format: export::Format) -> Result<Vec<PathBuf
     };
     let result = match args.blocks {
         None => export::write(view, &args.output, format, &mut progress),
-        Some(side) => {
-            let extension = match format {
-                export::Format::Envi { .. } => "img",
-                export::Format::Exr { .. } => "exr",
-                export::Format::Zarr { .. } => "zarr",
-                export::Format::Csv => "csv",
-            };
-            export::write_blocks(view, &args.output, format, extension, side, &mut progress)
-        }
+        Some(side) => export::write_blocks(view, &args.output, format, side, &mut progress),
     };
     if let Some(bar) = &bar {
         bar.finish_and_clear();
@@ -280,7 +272,7 @@ fn write(args: &Args, view: &View, format: export::Format) -> Result<Vec<PathBuf
     result
 }
 
-fn report(args: &Args, view: &View, written: &[PathBuf], output: &Output) -> Result<()> {
+fn report(args: &Args, view: &View, format: export::Format, written: &[PathBuf], output: &Output) -> Result<()> {
     let progress = view.cube().progress()?;
     let missing = progress.tiles - progress.tiles_started;
     let ([width, height], channels) = (view.size(), view.channels().len());
@@ -289,6 +281,7 @@ fn report(args: &Args, view: &View, written: &[PathBuf], output: &Output) -> Res
         "done",
         json!({
             "file": args.output,
+            "format": format.name(),
             "files": written,
             "size": [width, height],
             "bands": channels,

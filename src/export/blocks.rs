@@ -10,15 +10,8 @@ use crate::cube::{Rect, View};
 use crate::files::{NewFolder, write_atomically};
 
 /// Writes blocks of `side` pixels a side, those at the right and the bottom smaller, and `index.json`, into the folder
-/// `path`, which must not exist yet. `extension` is that of the files.
-pub fn write(
-    view: &View,
-    path: &Path,
-    format: Format,
-    extension: &str,
-    side: u32,
-    progress: &mut Progress,
-) -> Result<Vec<PathBuf>> {
+/// `path`, which must not exist yet.
+pub fn write(view: &View, path: &Path, format: Format, side: u32, progress: &mut Progress) -> Result<Vec<PathBuf>> {
     let folder = NewFolder::create(path)?;
     let (rect, channels) = (view.rect(), view.channels());
     let [left, top] = view.cube().header().origin;
@@ -29,7 +22,7 @@ pub fn write(
             let (x1, y1) = (x0.saturating_add(side).min(rect.x1), y0.saturating_add(side).min(rect.y1));
             let block = view.clone().with_rect(Rect { x0, y0, x1, y1 })?;
             let (x, y) = (left + x0, top + y0);
-            let name = format!("x{x:06}_y{y:06}.{extension}");
+            let name = format!("x{x:06}_y{y:06}.{}", format.extension());
             let mut tell = |of_block: u64, _: u64| progress(done + of_block, rect.pixels());
             let files = write_file(&block, &folder.path().join(name), format, &mut tell)?;
             done += block.rect().pixels();

@@ -40,6 +40,22 @@ pub enum Format {
     Csv,
 }
 
+impl Format {
+    pub fn name(self) -> &'static str {
+        match self {
+            Format::Envi { .. } => "envi",
+            Format::Exr { .. } => "exr",
+            Format::Zarr { .. } => "zarr",
+            Format::Csv => "csv",
+        }
+    }
+
+    /// Of files in this format.
+    fn extension(self) -> &'static str {
+        if let Format::Envi { .. } = self { "img" } else { self.name() }
+    }
+}
+
 /// Called with the pixels done so far, of all; an error ends the export.
 pub type Progress<'a> = dyn FnMut(u64, u64) -> Result<()> + 'a;
 

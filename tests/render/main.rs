@@ -11,6 +11,7 @@ mod resume;
 mod running;
 mod several;
 mod sizes;
+mod uncertainty;
 mod wrong;
 
 use std::fs;
