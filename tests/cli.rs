@@ -65,7 +65,7 @@ fn help_teaches_and_version_is_printed() {
     for word in ["render", "Exit codes", "W m-2 sr-1 nm-1", "spectile export cube.zarr"] {
         assert!(top.contains(word), "{word}");
     }
-    for name in ["render", "plan", "devices", "info", "spectrum", "compare", "export"] {
+    for name in ["render", "plan", "devices", "info", "spectrum", "compare", "export", "sensor"] {
         let (long, short) = (success(folder.path(), &[name, "--help"]), success(folder.path(), &[name, "-h"]));
         assert!(long.len() > short.len(), "{name}: --help says more than -h");
         assert!(long.contains("Usage: spectile"), "{name}");

@@ -71,7 +71,10 @@ fn every_kind_of_file_is_told_apart() {
     for name in ["soils.sli", "soils.hdr"] {
         let (nm, value) = read(name, Some("second"), None);
         let expected = [0.3f32, 0.35, 0.4, 0.45];
-        assert!(nm == [400.0, 500.0, 600.0, 700.0] && value.iter().zip(expected).all(|(a, b)| *a as f32 == b), "{value:?}");
+        assert!(
+            nm == [400.0, 500.0, 600.0, 700.0] && value.iter().zip(expected).all(|(a, b)| *a as f32 == b),
+            "{value:?}"
+        );
     }
 }
 
@@ -164,7 +167,8 @@ fn spectral_reads_the_same() {
         let numbers = |part: &str| -> Vec<f64> {
             theirs[&key][part].as_array().expect(&key).iter().map(|v| v.as_f64().expect("a number")).collect()
         };
-        let close = |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-12 * b.abs());
+        let close =
+            |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-12 * b.abs());
         assert!(close(&ours.nm, &numbers("nm")), "{key}: {:?} {:?}", ours.nm, numbers("nm"));
         assert!(close(&ours.value, &numbers("value")), "{key}: {:?} {:?}", ours.value, numbers("value"));
     }

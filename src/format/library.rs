@@ -89,7 +89,7 @@ pub fn parse_envi(
     let mut table = SpectrumTable { nm: Vec::new(), value: Vec::new(), line: Vec::new() };
     for (i, nm) in nm.into_iter().enumerate() {
         let value = header.data_type.decode(&data[first + i * size..][..size], header.big_endian);
-        if Some(value) == ignored {
+        if ignored.is_some_and(|ignored| value == ignored || (value.is_nan() && ignored.is_nan())) {
             continue;
         }
         if !value.is_finite() {

@@ -72,7 +72,9 @@ impl<'a> Path<'a> {
     /// Starts a path with wavelength coordinate `mu` (Eq. 4 of the method: one for all channels).
     fn begin(&mut self, mu: f64) {
         self.spectra.begin(mu);
-        self.throughput.fill(1.0);
+        for (k, throughput) in self.throughput.iter_mut().enumerate() {
+            *throughput = self.spectra.response(k);
+        }
         self.radiance.fill(0.0);
         self.alive = 0..self.throughput.len();
     }

@@ -2,6 +2,7 @@
 
 #[cfg(test)]
 mod fault_tests;
+pub mod integration;
 pub mod job;
 pub mod lights;
 pub mod patience;

@@ -4,11 +4,12 @@ use crate::accel::{Accel, MAX_MATERIALS};
 use crate::gpu::layout::{EMITS_BOTH_SIDES, Emitter, Frame, Material, NONE};
 use crate::gpu::self_test::LOOP_LIMIT;
 use crate::gpu::shader::{self, Defines, Module};
+use crate::render::integration::Integration;
 use crate::render::lights::{LightPicks, STEPS, light_picks};
 use crate::render::surfaces::{Kind, Needed, Surfaces};
 use crate::scene::{Bsdf, Environment, Filter, Light, Projection, Sampler, Scene, Sides};
 use crate::spectral::Curve;
-use crate::spectral::table::SpectralTables;
+use crate::spectral::table::{SpectralTables, Tabulated};
 use crate::{Error, Result};
 
 /// Spectra that may be held in registers while a pixel is evaluated; with more, each is looked up where it is needed.
@@ -85,13 +86,27 @@ pub struct Prepared {
     /// Spectra that multiply throughput, and spectra that emit; the constant 1 apart.
     pub factors: usize,
     pub sources: usize,
+    /// That the device renders: with responses these are not the scene's.
     pub channels: usize,
+    /// How the scene's channels are made of those, and the device id of the weights; `None` where they are the same.
+    pub integration: Option<(Integration, u32)>,
 }
 
 impl Prepared {
     /// Flattens `scene`. Errors: materials that no shader knows; more materials, spectra or bounces than ids and
     /// counters have bits for.
     pub fn new(scene: &Scene, seed: u64) -> Result<Prepared> {
+        match Integration::of(&scene.channels) {
+            None => Prepared::flatten(scene, seed, None),
+            Some(integration) => {
+                let inner = Scene { channels: integration.inner.clone(), ..scene.clone() };
+                Prepared::flatten(&inner, seed, Some(integration))
+            }
+        }
+    }
+
+    /// `scene` in the channels that the device renders.
+    fn flatten(scene: &Scene, seed: u64, integration: Option<Integration>) -> Result<Prepared> {
         check_lights(scene)?;
         let accel = Accel::build(scene);
         if scene.materials.len() > MAX_MATERIALS {
@@ -101,7 +116,8 @@ impl Prepared {
         let mut surfaces = general.then(|| Surfaces::new(scene));
         // General scenes meet a uniform environment by sampling the BSDF, and do not aim at it.
         let picks = light_picks(scene, &accel, !general);
-        let (tables, ids) = spectral_tables(scene, surfaces.as_ref().map_or(&[], |s| &s.spectra))?;
+        let weights = integration.as_ref().map(|integration| integration.weights.as_slice());
+        let (tables, ids) = spectral_tables(scene, surfaces.as_ref().map_or(&[], |s| &s.spectra), weights)?;
         if let Some(surfaces) = &mut surfaces {
             surfaces.name_spectra(|position| tables.ids[ids.needed[position]]);
         }
@@ -125,7 +141,7 @@ impl Prepared {
         let environment_spectrum = scene.environment.as_ref().and_then(|e| e.uniform()).map_or(0, source);
         let mut features = features(scene, &accel, &tables, ids.factors.len() + ids.sources.len());
         features.general = surfaces.as_ref().map(General::of);
-        features.registers &= !general;
+        features.registers &= !general && integration.is_none();
         let frame = frame(scene, seed, &accel, &picks, environment_spectrum, tables.stratum_bits);
         let max_records = max_records(&frame, features, surfaces.as_ref());
         if max_records >= MAX_RECORDS {
@@ -147,6 +163,7 @@ impl Prepared {
             factors: ids.factors.len(),
             sources: ids.sources.len(),
             channels: scene.channels.len(),
+            integration: integration.map(|integration| (integration, tables.ids[ids.response])),
             accel,
             tables,
         })
@@ -299,6 +316,9 @@ impl Prepared {
         d.set("FACTORS", self.factors as u32).set("SOURCES", self.sources as u32);
         d.set("WORKGROUP", shape.lanes * shape.pixels);
         d.constant("FIRST_SOURCE", 1 + self.factors as u32);
+        if let Some((_, weights)) = &self.integration {
+            d.set("RESPONSES", true).constant("RESPONSE", *weights);
+        }
         self.spectra_defines(&mut d);
         d.constant("LANES", shape.lanes);
         d.constant("VECTORS", shape.vectors);
@@ -370,6 +390,8 @@ struct SpectrumIds {
     sources: std::collections::BTreeMap<usize, usize>,
     /// Of each that materials of general scenes need.
     needed: Vec<usize>,
+    /// That of the weights of responses, where there are any.
+    response: usize,
     names: Vec<String>,
 }
 
@@ -388,8 +410,12 @@ fn check_lights(scene: &Scene) -> Result<()> {
     ))
 }
 
-/// Tables of the constant 1, of what multiplies throughput, then of what emits.
-fn spectral_tables(scene: &Scene, needed: &[Needed]) -> Result<(SpectralTables, SpectrumIds)> {
+/// Tables of the constant 1, of what multiplies throughput, then of what emits; the weights of responses, per channel, last.
+fn spectral_tables(
+    scene: &Scene,
+    needed: &[Needed],
+    weights: Option<&[Curve]>,
+) -> Result<(SpectralTables, SpectrumIds)> {
     // General scenes have all of theirs among those needed.
     let plain = if needed.is_empty() { &scene.materials[..] } else { &[] };
     let factors = plain.iter().filter_map(|m| match m.bsdf {
@@ -420,13 +446,19 @@ fn spectral_tables(scene: &Scene, needed: &[Needed]) -> Result<(SpectralTables, 
         names.push(name.clone());
     }
     let needed = (first..curves.len()).collect();
+    let mut curves: Vec<Tabulated> = curves.into_iter().map(Tabulated::Same).collect();
+    let response = curves.len();
+    if let Some(weights) = weights {
+        curves.push(Tabulated::PerChannel(weights));
+        names.push("responses".to_owned());
+    }
     if curves.len() > MAX_SPECTRA {
         return Err(Error::input(
             &scene.file,
             format!("{} spectra in use, at most {MAX_SPECTRA} are supported", curves.len()),
         ));
     }
-    Ok((SpectralTables::build(&curves, &scene.channels), SpectrumIds { factors, sources, needed, names }))
+    Ok((SpectralTables::build(&curves, &scene.channels), SpectrumIds { factors, sources, needed, response, names }))
 }
 
 fn material(scene: &Scene, m: &crate::scene::Material, factor: impl Fn(usize) -> u32) -> Material {

@@ -7,6 +7,7 @@ mod json;
 mod memory;
 mod out_of_core;
 mod outcome;
+mod responses;
 mod resume;
 mod running;
 mod several;

@@ -16,12 +16,12 @@ fn pixels(cube: &Cube) -> impl Iterator<Item = (u32, u32)> + use<> {
 }
 
 /// 95 % intervals by Student's t from B epochs hold the truth in 93 to 97 %, over all pixels. The truth is a render of
-/// 8,192 other samples, whose own error is part of the interval.
+/// 4,096 other samples, whose own error is part of the interval.
 #[test]
 fn intervals_hold_the_truth() {
     let place = Place::new();
-    let scene = ["--size", "48x40", "--tile", "16", "--uncertainty"];
-    let truth = place.render("truth.zarr", &[&scene[..], &["--seed", "1", "--spp", "8192"]].concat());
+    let scene = ["--size", "32x24", "--tile", "16", "--uncertainty"];
+    let truth = place.render("truth.zarr", &[&scene[..], &["--seed", "1", "--spp", "4096"]].concat());
     let mut all = (0u32, 0u32);
     for (epochs, seed) in [("1024", "2"), ("1024", "3"), ("2048", "4")] {
         let cube = place.render("cube.zarr", &[&scene[..], &["--seed", seed, "--spp", epochs, "--overwrite"]].concat());
@@ -81,9 +81,8 @@ fn errors_are_there_only_when_asked_for() {
     let with = place.render("with.zarr", &["--spp", "128", "--uncertainty"]);
     assert_eq!(plain.standard_error(3, 3).expect("read"), None);
     // Nothing else changes by it.
-    let radiance = |cube: &Cube| {
-        arrays(cube).into_iter().filter(|(name, _)| name.starts_with("radiance/c")).collect::<Vec<_>>()
-    };
+    let radiance =
+        |cube: &Cube| arrays(cube).into_iter().filter(|(name, _)| name.starts_with("radiance/c")).collect::<Vec<_>>();
     assert!(radiance(&plain) == radiance(&with));
     assert!(!arrays(&plain).keys().any(|name| name.starts_with("standard_error")));
     // Below two epochs nothing is known.
