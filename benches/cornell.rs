@@ -118,6 +118,7 @@ fn render(scene: &Scene, samples: u32, seed: u64, output: &Path) -> Result<(Cube
         profile: false,
         devices: Selection::Count(1),
         memory: None,
+        feed: None,
     };
     let (mut began, mut peak) = (None, 0);
     let summary = schedule::run(&job, &Arc::default(), &mut |event| {

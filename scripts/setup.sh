@@ -92,3 +92,21 @@ need_python() {
   fi
   export SPECTILE_PYTHON=$venv/bin/python
 }
+
+# A browser and what drives it, for the tests of the page; sets SPECTILE_CHROMIUM for them.
+need_browser() {
+  local folder=$root/tests/page
+  if [ "$(uname -s)" != Linux ]; then
+    say "the page is tested on Linux only: its tests will say that they are skipped"
+    return
+  fi
+  command -v chromium >/dev/null || install "a browser to test the page with" chromium fonts-dejavu-core
+  command -v npm >/dev/null || install "Node, which drives the browser" nodejs npm
+  if ! cmp -s "$folder/package.json" "$folder/node_modules/.package.json"; then
+    say "installing playwright-core into tests/page"
+    (cd "$folder" && npm install --no-package-lock --no-audit --no-fund --silent)
+    cp "$folder/package.json" "$folder/node_modules/.package.json"
+  fi
+  SPECTILE_CHROMIUM=$(command -v chromium)
+  export SPECTILE_CHROMIUM
+}

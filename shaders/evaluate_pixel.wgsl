@@ -191,6 +191,9 @@ fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
         var product_$v = vec4<f32>(0.0);
         var factor_$v = vec4<f32>(0.0);
 #endif
+#if KEPT
+        var kept_$v = vec4<f32>(0.0);
+#endif
 #end
         let first_record = path * frame.max_records;
         for (var r = first_record; r < first_record + used; r += 1u) {
@@ -207,8 +210,22 @@ fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
 #endif
             let weight = bitcast<f32>(record.z);
 #repeat VECTORS v
-            let value_$v = operation_value(record, raw, quad_$v, s);
+            var value_$v = operation_value(record, raw, quad_$v, s);
 #end
+#if KEPT
+            if ((record.x & MODE_KEEP) != 0u) {
+#repeat VECTORS v
+                kept_$v += weight * value_$v;
+#end
+                continue;
+            }
+            if ((record.x & 0x3fu) == OP_INNER) {
+#repeat VECTORS v
+                value_$v = kept_$v / (1.0 - kept_$v * value_$v);
+                kept_$v = vec4<f32>(0.0);
+#end
+            }
+#endif
             if ((record.x & 0x3fu) == OP_PLAIN) {
 #repeat VECTORS v
                 throughput_$v *= value_$v;

@@ -38,6 +38,16 @@ fn append(list: ptr<function, RecordList>, operation: u32, ab: u32, weight: f32,
     (*list).count += 1u;
 }
 
+#if MAP
+// The instruction that looks the map up: X = its value there over the source spectrum.
+fn append_map(list: ptr<function, RecordList>, mode: u32, place: MapPlace, weight: f32) {
+    let fraction = vec2<u32>(place.fraction * 65535.0 + 0.5);
+    (*list).last = (*list).path * frame.max_records + (*list).count;
+    records[(*list).last] = vec4<u32>(OP_MAP | mode, place.column | (place.row << 16u), bitcast<u32>(weight), fraction.x | (fraction.y << 16u));
+    (*list).count += 1u;
+}
+#endif
+
 // Lets the instructions since record `begin` add to the radiance what they built, times a source.
 fn gather(list: ptr<function, RecordList>, begin: u32, source: u32) {
     if ((*list).count > begin) {
@@ -101,6 +111,23 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
         append(&list, OP_ONE | MODE_SINGLE, 0u, scale, 0.0);
         gather(&list, begin, frame.environment_spectrum);
 #endif
+#if MAP
+        let found = find_in_map(ray.direction);
+        let map_begin = list.count;
+        append_map(&list, MODE_SINGLE, found.place, scale * select(power_heuristic(density, frame.environment_pick * found.density), 1.0, density < 0.0));
+        gather(&list, map_begin, MAP_SOURCE);
+#endif
+#if SUNS
+        for (var s = frame.emitter_count - SUNS; s < frame.emitter_count; s += 1u) {
+            let sun = emitters[s];
+            let other = sun_density(sun, ray.direction);
+            if (other >= 0.0) {
+                let sun_begin = list.count;
+                append(&list, OP_ONE | MODE_SINGLE, 0u, scale * sun.area * select(power_heuristic(density, other), 1.0, density < 0.0), 0.0);
+                gather(&list, sun_begin, sun.spectrum & SPECTRUM_MASK);
+            }
+        }
+#endif
         end_path(list, 2u * step.bounce + 1u, overflow);
         return;
     }
@@ -125,10 +152,25 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 
     let material = surface_materials[surface.material];
     var v: Vertex;
-    v.normal = select(-surface.normal, surface.normal, from_front);
+    // The geometric normal on the side of the ray.
+    let face = select(-surface.normal, surface.normal, from_front);
+    v.normal = face;
     v.inside = !from_front;
+#if ATTRIBUTES
+    let carried = carried_at(hit, surface);
+#if SMOOTH
+    v.normal = shading_normal(select(-carried.normal, carried.normal, from_front), -ray.direction);
+#endif
+#if TEXTURES
+    v.uv = carried.uv;
+#endif
+#endif
 #if ANISOTROPIC
-    v.s = surface_tangent(hit, surface, v.normal);
+#if ATTRIBUTES
+    v.s = surface_tangent(hit, surface, v.normal, carried.tangent);
+#else
+    v.s = surface_tangent(hit, surface, v.normal, vec3<f32>(0.0));
+#endif
     v.t = cross(v.normal, v.s);
 #else
     let around = tangents(v.normal);
@@ -152,12 +194,20 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     let u_choice = random_pair(key, dimension + DIMENSION_CHOICE, index, wave.epoch_mask);
     let u_lobe = random_pair(key, dimension + DIMENSION_LOBE, index, wave.epoch_mask);
 
+#if SHARES
+    v.pick_scale = 1.0;
+    var picks = 0.0;
+    for (var p = material.first_part; p < material.first_part + material.part_count; p += 1u) {
+        picks += part_pick(p, v);
+    }
+    v.pick_scale = select(1.0 / picks, 0.0, picks == 0.0);
+#endif
     // The part that goes on.
     var chosen = NONE;
     var chosen_pick = 0.0;
     var below = 0.0;
     for (var p = material.first_part; p < material.first_part + material.part_count; p += 1u) {
-        let pick = part_pick(parts[p], v);
+        let pick = part_pick(p, v);
         if (pick > 0.0 && (chosen == NONE || u_lobe.x >= below)) {
             chosen = p;
             chosen_pick = pick;
@@ -168,7 +218,7 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
         end_path(list, 2u * step.bounce + 1u, overflow);
         return;
     }
-    let part = parts[chosen];
+    let part = part_at(chosen, v);
     // The next direction, and its density; negative where it is the only one.
     var i = cosine_hemisphere(vec3<f32>(0.0, 0.0, 1.0), u_bsdf);
     var next_density = 0.0;
@@ -271,28 +321,89 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
         }
     }
 
+#if SMOOTH
+    // No light is reflected into a surface, or passes to where it came from.
+    goes_on = goes_on && dot(to_world(v, i), face) * i.z > 0.0;
+#endif
+
     // A light, and the direction to it.
     var light_direction = vec3<f32>(0.0);
     var light_weight = 0.0;
     var light_pdf = 0.0;
     var source = 0u;
     var shadow = Ray(surface.position, vec3<f32>(0.0, 0.0, 1.0));
-#if EMITTERS
+    var shadow_limit = 1.0;
+#if LAMPS
+    var light_strength = 1.0;
+    var is_met = true;
+#endif
+#if MAP
+    var map_place: MapPlace;
+    var from_map = false;
+#endif
+#if AIMS
     {
         let u_light = random_pair(key, dimension + DIMENSION_LIGHT_POINT, index, wave.epoch_mask);
         let transmits = (material.flags & MATERIAL_TRANSMITS) != 0u;
-        let seen_from = select(offset_origin(surface.position, v.normal), surface.position, transmits);
-        let emitter = emitters[choose_emitter(u_choice.x)];
-        let point = sample_emitter(emitter, seen_from, u_light);
-        let towards = point.position - seen_from;
-        let side = dot(v.normal, towards);
-        if (point.density > 0.0 && side != 0.0 && (side > 0.0 || transmits)) {
-            light_direction = normalize(to_local(v, towards));
-            light_pdf = point.density;
+        let seen_from = select(offset_origin(surface.position, face), surface.position, transmits);
+        var towards = vec3<f32>(0.0);
+        // Where the way to the light ends, if it does.
+        var end = vec3<f32>(0.0);
+#if MAP
+        from_map = u_choice.x < frame.environment_pick;
+        if (from_map) {
+            let sampled = sample_map(u_light);
+            towards = sampled.direction;
+            light_pdf = frame.environment_pick * sampled.density;
+            map_place = sampled.place;
+            source = MAP_SOURCE;
+            shadow_limit = INFINITE;
+        }
+#endif
+#if CHOOSES
+#if MAP
+        else
+#endif
+        {
+            let emitter = emitters[choose_emitter(u_choice.x)];
             source = emitter.spectrum & SPECTRUM_MASK;
-            shadow.origin = offset_origin(surface.position, select(-v.normal, v.normal, side > 0.0));
-            let facing = select(point.normal, -point.normal, dot(point.normal, towards) > 0.0);
-            shadow.direction = offset_origin(point.position, facing) - shadow.origin;
+#if LAMPS
+            if ((emitter.spectrum & EMITTER_IS_LAMP) != 0u) {
+                let aim = aim_at_lamp(emitter, seen_from, u_light);
+                towards = aim.towards;
+                light_pdf = aim.density;
+                light_strength = aim.strength;
+                is_met = aim.kind == LAMP_SUN;
+                end = seen_from + towards;
+                shadow_limit = select(INFINITE, 1.0, aim.kind == LAMP_POINT);
+            }
+#if EMITTERS
+            else
+#endif
+#endif
+#if EMITTERS
+            {
+                let point = sample_emitter(emitter, seen_from, u_light);
+                towards = point.position - seen_from;
+                light_pdf = point.density;
+                let facing = select(point.normal, -point.normal, dot(point.normal, towards) > 0.0);
+                end = offset_origin(point.position, facing);
+            }
+#endif
+        }
+#endif
+        let side = dot(face, towards);
+#if SMOOTH
+        let keeps_side = side * dot(v.normal, towards) > 0.0;
+#else
+        let keeps_side = true;
+#endif
+        if (light_pdf > 0.0 && side != 0.0 && (side > 0.0 || transmits) && keeps_side) {
+            light_direction = normalize(to_local(v, towards));
+            shadow.origin = offset_origin(surface.position, select(-face, face, side > 0.0));
+            shadow.direction = select(end - shadow.origin, towards, shadow_limit == INFINITE);
+        } else {
+            light_pdf = 0.0;
         }
     }
 #endif
@@ -309,7 +420,10 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
         var weight = 1.0 / chance;
         if (to_light) {
             weight = scale * power_heuristic(light_pdf, chance) / light_pdf;
-            if (traverse(shadow, 1.0, true, &overflow).primitive != NONE) {
+#if LAMPS
+            weight = light_strength * select(scale / light_pdf, weight, is_met);
+#endif
+            if (traverse(shadow, shadow_limit, true, &overflow).primitive != NONE) {
                 continue;
             }
         } else {
@@ -322,6 +436,14 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
         let begin = list.count;
         if ((material.flags & MATERIAL_DIFFUSE) != 0u) {
             // One record for both: next-event estimation adds its radiance behind the surface's reflectance.
+#if MAP
+            if (to_light && from_map) {
+                append(&list, OP_SPECTRUM | MODE_SINGLE, part.ab, weight * max(direction.z, 0.0) * INV_PI, 0.0);
+                append_map(&list, MODE_ON_F, map_place, 1.0);
+                gather(&list, begin, source);
+                continue;
+            }
+#endif
             if (to_light) {
                 append(&list, OP_PLAIN | (source << 16u), part.ab, weight * max(direction.z, 0.0) * INV_PI, 0.0);
                 list.used = list.count;
@@ -332,12 +454,16 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
             continue;
         }
         for (var p = material.first_part; p < material.first_part + material.part_count; p += 1u) {
-            let other = parts[p];
-            if (part_pick(other, v) > 0.0) {
-                append_part(&list, other, v, direction, weight);
+            if (part_pick(p, v) > 0.0) {
+                append_part(&list, part_at(p, v), v, direction, weight);
             }
         }
         if (to_light) {
+#if MAP
+            if (from_map && list.count > begin) {
+                append_map(&list, MODE_ON_F, map_place, 1.0);
+            }
+#endif
             gather(&list, begin, source);
         } else if (list.count > begin) {
             records[list.last].x |= MODE_ADVANCE;
@@ -370,7 +496,7 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
         atomicAdd(&counters[COUNTER_OVERFLOW], 1u);
     }
     let direction = to_world(v, i);
-    let origin = offset_origin(surface.position, select(-v.normal, v.normal, i.z > 0.0));
+    let origin = offset_origin(surface.position, select(-face, face, i.z > 0.0));
     heads[path].y = list.used;
     states[STATE_WORDS * path] = bitcast<vec4<u32>>(vec4<f32>(origin, next_density));
     states[STATE_WORDS * path + 1u] = vec4<u32>(bitcast<vec3<u32>>(direction), list.count | (list.used << 16u));

@@ -12,8 +12,8 @@ use obvhs::cwbvh::builder::build_cwbvh;
 use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
 use obvhs::{Boundable, BvhBuildParams};
 
-use crate::gpu::layout::{NONE, Primitive};
-use crate::scene::{Scene, Shape};
+use crate::gpu::layout::{HAS_COORDINATES, HAS_NORMALS, NONE, Primitive};
+use crate::scene::{Attributes, Scene, Shape};
 
 /// Kinds of primitives in the high byte of [`Primitive::tag`]; 0 is a triangle.
 const KIND_SPHERE: u32 = 1;
@@ -52,6 +52,8 @@ pub struct Accel {
     pub depth: u32,
     /// In the order of the BVH's leaves.
     pub primitives: Vec<Primitive>,
+    /// Texture coordinates, normals and axes of those that carry some, found by [`Primitive::attributes`].
+    pub attributes: Vec<f32>,
     /// The emitting primitives: (index into `primitives`, object, area in device units).
     pub emitters: Vec<(u32, usize, f64)>,
     /// Whether anything but triangles occurs.
@@ -65,9 +67,16 @@ impl Accel {
     pub fn build(scene: &Scene) -> Accel {
         let space = device_space(scene);
         let mut loose = Vec::new();
-        let mut degenerate = 0;
+        let (mut degenerate, mut attributes) = (0, Vec::new());
         for (index, object) in scene.objects.iter().enumerate() {
-            collect(&object.shape, object.material as u32, index as u32, &space, &mut loose, &mut degenerate);
+            let first = loose.len();
+            let triangles =
+                collect(&object.shape, object.material.map_or(NONE, |m| m as u32), index as u32, &space, &mut loose);
+            for (primitive, triangle) in loose[first..].iter_mut().zip(&triangles) {
+                primitive.attributes = attach(&object.attributes, *triangle, &mut attributes);
+            }
+            let all = if let Shape::Mesh(mesh) = &object.shape { mesh.triangles.len() } else { 1 };
+            degenerate += all - triangles.len();
         }
         let has_shapes = loose.iter().any(|p| p.tag >> 24 != 0);
         let (nodes, order, depth) = build_nodes(&loose);
@@ -82,7 +91,7 @@ impl Accel {
                 emitters.push((index as u32, object, area(primitive)));
             }
         }
-        Accel { space, nodes, depth, primitives, emitters, has_shapes, degenerate }
+        Accel { space, nodes, depth, primitives, attributes, emitters, has_shapes, degenerate }
     }
 }
 
@@ -114,28 +123,45 @@ fn device_space(scene: &Scene) -> DeviceSpace {
     DeviceSpace { center: 0.5 * (min + max), scale, radius: radius.max(f64::from(f32::MIN_POSITIVE)) }
 }
 
-/// Appends a shape's primitives, the object's index standing in for the emitter.
-fn collect(
-    shape: &Shape,
-    material: u32,
-    object: u32,
-    space: &DeviceSpace,
-    out: &mut Vec<Primitive>,
-    degenerate: &mut usize,
-) {
+/// Appends what a primitive carries, as `shaders/common/attributes.wgsl` reads it, and gives the word that finds it.
+fn attach(attributes: &Attributes, triangle: usize, out: &mut Vec<f32>) -> u32 {
+    let first = out.len() as u32;
+    let mut flags = 0;
+    if let Some(axes) = &attributes.axes {
+        flags |= HAS_COORDINATES;
+        out.extend(axes.to_cols_array().map(|v| v as f32));
+    }
+    if let Some(uv) = &attributes.uv {
+        flags |= HAS_COORDINATES;
+        let corners = uv[triangle];
+        // Textures repeat: small numbers have more digits.
+        let whole = corners[0].min(corners[1]).min(corners[2]).floor();
+        out.extend(corners.iter().flat_map(|uv| (*uv - whole).as_vec2().to_array()));
+    }
+    if let Some(normals) = &attributes.normals {
+        flags |= HAS_NORMALS;
+        out.extend(normals[triangle].iter().flat_map(|normal| normal.as_vec3().to_array()));
+    }
+    if flags == 0 { 0 } else { first | flags }
+}
+
+/// Appends a shape's primitives, the object's index standing in for the emitter, and gives the triangle that each is; those
+/// without area as f32 are left out.
+fn collect(shape: &Shape, material: u32, object: u32, space: &DeviceSpace, out: &mut Vec<Primitive>) -> Vec<usize> {
     let base = Primitive { tag: material, emitter: object, ..Primitive::default() };
     match shape {
         Shape::Mesh(mesh) => {
             let positions: Vec<[f32; 3]> = mesh.positions.iter().map(|&p| space.point(p)).collect();
-            for t in &mesh.triangles {
+            let mut kept = Vec::with_capacity(mesh.triangles.len());
+            for (triangle, t) in mesh.triangles.iter().enumerate() {
                 let [a, b, c] = t.map(|i| positions[i as usize]);
                 let primitive = Primitive { a, b, c, ..base };
                 if triangle_area(&primitive) > 0.0 {
                     out.push(primitive);
-                } else {
-                    *degenerate += 1;
+                    kept.push(triangle);
                 }
             }
+            return kept;
         }
         Shape::Sphere { center, radius } => out.push(Primitive {
             a: space.point(*center),
@@ -158,6 +184,7 @@ fn collect(
             ..base
         }),
     }
+    vec![0]
 }
 
 fn vector(p: [f32; 3]) -> DVec3 {

@@ -11,10 +11,12 @@ pub mod export;
 pub mod files;
 pub mod format;
 pub mod gpu;
+pub mod preview;
 pub mod reference;
 pub mod render;
 pub mod scattering;
 pub mod scene;
+pub mod slurm;
 pub mod spectral;
 
 // The unit tests that need a scene build it as the integration tests do, and compare cubes as they do.

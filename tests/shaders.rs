@@ -3,14 +3,14 @@
 
 mod scene_builder;
 
-use glam::{DVec2, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use scene_builder::*;
 use spectile::gpu::adapter::STORAGE_BUFFERS;
 use spectile::gpu::shader::{Module, Source, compose};
 use spectile::render::prepare::{EvaluateShape, Features, Prepared, WindowList, Windows};
-use spectile::scene::{Filter, Projection, Sampler, Scene, Shape, Sides};
-use spectile::spectral::Channels;
+use spectile::scene::{Attributes, Filter, Projection, Sampler, Scene, Shape, Sides, Texels, TextureKind};
+use spectile::spectral::{Channels, Curve};
 
 /// Bytes of a kernel's code, comments and indentation apart: of a plain scene's, and of one that needs everything and spreads its
 /// geometry over four windows. More is a sign that something is compiled in twice or without need.
@@ -173,7 +173,69 @@ fn general_scenes() -> Vec<(String, Scene)> {
             scenes.push((format!("{name} and {other}"), scene));
         }
     }
+    scenes.extend(textured_scenes());
+    scenes.extend(light_scenes());
     scenes
+}
+
+/// Every subset of what may light a scene beside a uniform sky, maps of both kinds, before matt and glass.
+fn light_scenes() -> Vec<(String, Scene)> {
+    let mut scenes = Vec::new();
+    for i in 1..24u32 {
+        let mut builder = Builder::new().diffuse(room(-DVec3::ONE, DVec3::ONE), 0.5);
+        builder = if i & 1 != 0 { builder.point(DVec3::ZERO, 1.0).directional(DVec3::X, 1.0) } else { builder };
+        builder = if i & 2 != 0 { builder.sun(DVec3::Y, 0.1, 1.0) } else { builder };
+        builder = if i & 4 != 0 { builder.lamp(disk(), surfaces::glass_curve(), Sides::Both) } else { builder };
+        builder = match i / 8 {
+            0 => builder,
+            1 => builder.rgb_map([3, 2], vec![0.5; 18]),
+            _ => builder.map([2, 1], Texels::Spectral { nm: vec![500.0, 600.0, 700.0], radiance: vec![1.0; 6].into() }),
+        };
+        builder = if i % 3 == 0 { builder.dielectric(disk(), surfaces::glass_curve(), 0.5) } else { builder };
+        scenes.push((format!("lights {i}"), builder.build()));
+    }
+    scenes
+}
+
+/// Every kind of texture by itself and with others, what surfaces carry by itself, and all at once.
+fn textured_scenes() -> Vec<(String, Scene)> {
+    let plate = || quad(DVec3::ZERO, DVec3::X, DVec3::Y);
+    let uv = || Attributes { uv: Some(vec![[DVec2::ZERO, DVec2::X, DVec2::ONE]; 2]), ..Attributes::default() };
+    let normals = || Attributes { normals: Some(vec![[DVec3::Z, DVec3::Z, DVec3::X]; 2]), ..Attributes::default() };
+    let axes = || Attributes { axes: Some(DMat3::IDENTITY), ..Attributes::default() };
+    let ball = || Shape::Sphere { center: DVec3::ZERO, radius: 0.2 };
+    let colours = |mut b: Builder| {
+        let texture = b.texture([1, 1], &[0.5; 3], TextureKind::Colour);
+        b.textured(plate(), texture).attributes(uv())
+    };
+    let mixture = |mut b: Builder| {
+        let texture = b.mixture([1, 1], &[0.5; 2], &[Curve::Constant(0.5), surfaces::glass_curve()]);
+        b.textured(ball(), texture).attributes(axes())
+    };
+    let masked = |mut b: Builder| {
+        let mask = b.texture([1, 1], &[0.5], TextureKind::Number);
+        let b = b.conductor(plate(), 0.2, 3.4, [0.3, 0.1]).dielectric(plate(), surfaces::glass_curve(), 0.2);
+        b.masked_last_two(plate(), mask).attributes(uv())
+    };
+    let coated = |mut b: Builder, roughness: f64| {
+        let texture = b.texture([1, 1], &[0.5; 3], TextureKind::Colour);
+        b.coated(plate(), texture, 1.5, roughness).attributes(uv())
+    };
+    let smooth = |b: Builder| b.diffuse(plate(), 0.5).attributes(normals());
+    let brushed = |b: Builder| b.conductor(ball(), 0.2, 3.4, [0.3, 0.1]).attributes(axes());
+    let plain = || Builder(plain_scene());
+    [
+        ("colours", colours(plain())),
+        ("mixture", mixture(plain().sky(1.0))),
+        ("masked", masked(plain().roulette(1))),
+        ("coated", coated(plain(), 0.0)),
+        ("roughly coated", coated(mixture(plain()), 0.2)),
+        ("smooth", smooth(plain())),
+        ("brushed ball", brushed(plain())),
+        ("all that textures are", smooth(brushed(coated(masked(mixture(colours(plain()))), 0.2))).sky(1.0).roulette(1)),
+    ]
+    .map(|(name, builder)| (name.to_owned(), builder.build()))
+    .into()
 }
 
 fn disk() -> Shape {

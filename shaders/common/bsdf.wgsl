@@ -9,6 +9,13 @@ struct Vertex {
     o: vec3<f32>,
     // Whether the path comes from behind, against the geometric normal.
     inside: bool,
+#if TEXTURES
+    uv: vec2<f32>,
+#endif
+#if SHARES
+    // Makes the probabilities of choosing parts sum to 1.
+    pick_scale: f32,
+#endif
 }
 
 fn to_local(v: Vertex, d: vec3<f32>) -> vec3<f32> {
@@ -24,9 +31,24 @@ fn part_behind(part: Part, v: Vertex) -> bool {
     return v.inside && (part.kind & PART_OPAQUE) == 0u;
 }
 
-// The probability of choosing a part; 0 for those that do not scatter here.
-fn part_pick(part: Part, v: Vertex) -> f32 {
-    return cosine_table(part.picks, v.inside, v.o.z);
+// Part `p` as it is at a vertex.
+fn part_at(p: u32, v: Vertex) -> Part {
+#if SHARES
+    var part = parts[p];
+    part.weight *= part_share(p, v.uv);
+    return part;
+#else
+    return parts[p];
+#endif
+}
+
+// The probability of choosing part `p`; 0 for those that do not scatter here.
+fn part_pick(p: u32, v: Vertex) -> f32 {
+#if SHARES
+    return cosine_table(parts[p].picks, v.inside, v.o.z) * part_share(p, v.uv) * v.pick_scale;
+#else
+    return cosine_table(parts[p].picks, v.inside, v.o.z);
+#endif
 }
 
 // The index by which a path bends, beyond over before.
@@ -130,10 +152,9 @@ fn part_density(part: Part, v: Vertex, i: vec3<f32>) -> f32 {
 fn bsdf_density(material: SurfaceMaterial, v: Vertex, i: vec3<f32>) -> f32 {
     var density = 0.0;
     for (var p = material.first_part; p < material.first_part + material.part_count; p += 1u) {
-        let part = parts[p];
-        let pick = part_pick(part, v);
+        let pick = part_pick(p, v);
         if (pick > 0.0) {
-            density += pick * part_density(part, v, i);
+            density += pick * part_density(parts[p], v, i);
         }
     }
     return density;
@@ -170,6 +191,14 @@ fn append_part(list: ptr<function, RecordList>, part: Part, v: Vertex, i: vec3<f
     let cosine = max(i.z, 0.0) * INV_PI;
     switch (part.kind & 0xffu) {
         case KIND_LAMBERT: {
+#if TEXTURED
+            if ((part.kind & PART_TEXTURED) != 0u) {
+                if (i.z > 0.0) {
+                    append_reflectance(list, part.loss, v.uv, weight * cosine, MODE_SINGLE);
+                }
+                return;
+            }
+#endif
             append(list, OP_SPECTRUM | MODE_SINGLE, a, weight * cosine, 0.0);
         }
 #if ROUGH_CONDUCTOR
@@ -199,7 +228,17 @@ fn append_part(list: ptr<function, RecordList>, part: Part, v: Vertex, i: vec3<f
 #if BASE
         case KIND_BASE: {
             if (i.z > 0.0) {
+#if KEPT
+                if ((part.kind & PART_TEXTURED) != 0u) {
+                    append_reflectance(list, part.loss, v.uv, 1.0, MODE_KEEP);
+                    append(list, OP_INNER | MODE_START, part.cd & 0xffffu, weight * cosine, 0.0);
+                    append(list, OP_SPECTRUM, part.cd >> 16u, 1.0, 0.0);
+                } else {
+                    append(list, OP_SPECTRUM | MODE_START, part.cd & 0xffffu, weight * cosine, 0.0);
+                }
+#else
                 append(list, OP_SPECTRUM | MODE_START, part.cd & 0xffffu, weight * cosine, 0.0);
+#endif
 #if ROUGH_BASE
                 if (part.alpha.x > 0.0) {
                     let enters = OP_ETA_TABLE | MODE_SQUARE;

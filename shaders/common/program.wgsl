@@ -91,6 +91,18 @@ fn rough_transmit(eta_in: vec4<f32>, alpha: f32, cos_o: f32, i: vec3<f32>) -> ve
 }
 #endif
 
+#if COLOURS
+@group(0) @binding(51) var<storage, read> texels: array<f32>;
+
+fn smooth_spectrum(at: u32, t: vec4<f32>) -> vec4<f32> {
+    let x = (texels[at] * t + texels[at + 1u]) * t + texels[at + 2u];
+    // S(x) = 1/2 + x / (2 sqrt(1 + x^2)), without cancellation where it is small.
+    let root = sqrt(1.0 + x * x);
+    let tail = 0.5 / (root * (root + abs(x)));
+    return select(1.0 - tail, tail, x < vec4<f32>(0.0));
+}
+#endif
+
 // The value of an instruction for the channels of `quad`; `raw` is the record after it.
 fn operation_value(record: vec4<u32>, raw: vec4<f32>, quad: u32, s: SpectralSample) -> vec4<f32> {
     let operation = record.x & 0x3fu;
@@ -100,6 +112,16 @@ fn operation_value(record: vec4<u32>, raw: vec4<f32>, quad: u32, s: SpectralSamp
 #if OP_ONLY
     if (operation == OP_ONLY) {
         return select(vec4<f32>(0.0), vec4<f32>(1.0), vec4<u32>(4u * quad, 4u * quad + 1u, 4u * quad + 2u, 4u * quad + 3u) == vec4<u32>(record.y));
+    }
+#endif
+#if COLOURS
+    if (operation == OP_SMOOTH) {
+        return smooth_spectrum(record.y, spectrum_value(VISIBLE_PLACE, quad, s));
+    }
+#endif
+#if OP_MAP
+    if (operation == OP_MAP) {
+        return map_value(record.y, record.w, spectrum_value(MAP_AXIS, quad, s));
     }
 #endif
     let a = spectrum_value(record.y & 0xffffu, quad, s);

@@ -15,6 +15,10 @@ const MODE_ADVANCE: u32 = 0x400u;
 const MODE_BEHIND: u32 = 0x800u;
 const MODE_SQUARE: u32 = 0x1000u;
 const MODE_SINGLE: u32 = MODE_START | MODE_ADD;
+#if KEPT
+// The fifth register Q += weight X, instead of all of the above.
+const MODE_KEEP: u32 = 0x8000u;
+#endif
 
 // T *= S_a, R += weight T S_source: a diffuse vertex in one record. No mode.
 const OP_PLAIN: u32 = 0u;
@@ -32,6 +36,17 @@ const OP_EMITTANCE: u32 = 6u;
 const OP_ETA_TABLE: u32 = 7u;
 // X = 1 in channel y, 0 elsewhere.
 const OP_ONLY: u32 = 8u;
+#if COLOURS
+// X = S(c0 t^2 + c1 t + c2), a smooth spectrum (Jakob and Hanika 2019): coefficients from texels[y] on, t the place of the
+// wavelength in the visible.
+const OP_SMOOTH: u32 = 20u;
+#endif
+#if KEPT
+// X = Q / (1 - Q S_a), Q = 0: what comes out of a base of reflectance Q under a coat that reflects S_a back to it.
+const OP_INNER: u32 = 21u;
+#endif
+// X = the environment map over its source spectrum, in cell y (column | row << 16), at the fractions w (16 bits each).
+const OP_MAP: u32 = 9u;
 // X = D(h) |o h| |i h| / (o h + n i h)^2 (1 - F), each channel with its own half vector h; parameter: roughness; the next
 // record holds cos o, and i.
 const OP_ROUGH_TRANSMIT: u32 = 48u;

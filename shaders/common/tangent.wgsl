@@ -1,7 +1,7 @@
 // The direction by which anisotropic materials are turned, of either sign: along a triangle's first edge, around the axis of a
-// disk or cylinder.
+// disk or cylinder; or as what the surface carries (`given`, not 0) says.
 
-fn surface_tangent(hit: Hit, surface: Surface, normal: vec3<f32>) -> vec3<f32> {
+fn surface_tangent(hit: Hit, surface: Surface, normal: vec3<f32>, given: vec3<f32>) -> vec3<f32> {
     let p = load_primitive(hit.primitive);
     var along = p.b - p.a;
 #if SHAPES
@@ -14,6 +14,7 @@ fn surface_tangent(hit: Hit, surface: Surface, normal: vec3<f32>) -> vec3<f32> {
         along = vec3<f32>(0.0);
     }
 #endif
+    along = select(along, given, any(given != vec3<f32>(0.0)));
     let tangent = scaled_to_one(along) - dot(scaled_to_one(along), normal) * normal;
     let length2 = dot(tangent, tangent);
     if (!(length2 > 1.0e-12)) {

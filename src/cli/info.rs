@@ -1,12 +1,15 @@
 //! `spectile info`: what a cube is and how far it got.
 
 use std::fmt::Write;
+use std::io::IsTerminal;
 use std::ops::Range;
 use std::path::PathBuf;
+use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
 use super::Output;
+use super::standing::{Standing, list};
 use crate::cube::{Cube, Progress, Verification};
 use crate::spectral::Channels;
 use crate::spectral::colour::ProjectionKind;
@@ -18,6 +21,9 @@ use crate::{Error, Result};
 /// pixels, root mean square over the picture, relative to their root mean square radiance. It comes from the spread of
 /// the epochs (of integrator.epoch samples each, 64 by default), so it needs two of them and is rough below eight.
 ///
+/// Where several processes or the tasks of an array job work on it, it says which tiles are done, being rendered, failed or still
+/// waiting, and by whom; with --watch again and again, until all are done.
+///
 /// With --verify every file is read and compared with its checksum; the exit code is 1 if one is damaged. Rendering the same
 /// scene into the cube with --resume puts it in order.
 #[derive(Debug, clap::Args)]
@@ -25,6 +31,7 @@ use crate::{Error, Result};
 Examples:
   spectile info cube.zarr
   spectile info cube.zarr --verify
+  spectile info cube.zarr --watch       who renders what, until all is done; Ctrl-C ends it
   spectile info cube.zarr --json        all channels, with bounds and error estimates; null where unknown")]
 pub struct Args {
     /// The cube, a folder
@@ -33,6 +40,13 @@ pub struct Args {
     /// Compare every file with its checksum
     #[arg(long)]
     pub verify: bool,
+
+    /// Say again how the tiles stand whenever that changes, until all are done
+    ///
+    /// On a terminal the picture is drawn anew, otherwise a line is added. Every 2 seconds, or less often where the cube has so
+    /// many tiles that looking at them takes longer.
+    #[arg(long, conflicts_with = "verify")]
+    pub watch: bool,
 
     /// One JSON object on stdout, instead of text
     #[arg(long)]
@@ -43,6 +57,9 @@ pub struct Args {
 const ROUGH_BELOW: u32 = 8;
 
 pub fn run(args: &Args, output: &Output) -> Result<()> {
+    if args.watch {
+        watch(args, output)?;
+    }
     let cube = Cube::open(&args.cube)?;
     let verified = if args.verify { Some(cube.verify()?) } else { None };
     let damaged = |damage: &[String]| {
@@ -53,8 +70,8 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
             damage.len()
         ))
     };
-    let (progress, estimate) = match (cube.progress(), cube.error_estimate(), &verified) {
-        (Ok(progress), Ok(estimate), _) => (progress, estimate),
+    let (samples, estimate) = match (cube.all_samples(), cube.error_estimate(), &verified) {
+        (Ok(samples), Ok(estimate), _) => (samples, estimate),
         // So damaged that nothing else can be told of it.
         (.., Some(Verification { damage, .. })) if !damage.is_empty() => {
             damage.iter().try_for_each(|what| output.text(&format!("damage           {what}\n")))?;
@@ -62,7 +79,8 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         }
         (Err(error), ..) | (_, Err(error), _) => return Err(error),
     };
-    let found = Found { progress, estimate, in_use: cube.in_use(), verified, cube };
+    let work = Standing::of(&cube, &samples)?;
+    let found = Found { progress: Progress::of(&samples), estimate, work, verified, cube };
     output.event("done", found.facts())?;
     output.text(&found.describe())?;
     match &found.verified {
@@ -76,19 +94,40 @@ struct Found {
     cube: Cube,
     progress: Progress,
     estimate: Vec<f64>,
-    /// Tiles that a process works on.
-    in_use: Option<Range<u32>>,
+    work: Standing,
     verified: Option<Verification>,
 }
 
-/// Ranges of tiles as people write them, the first few.
-fn list(tiles: &[Range<u32>]) -> String {
-    const SHOWN: usize = 8;
-    let mut each: Vec<String> = tiles.iter().take(SHOWN).map(|t| format!("{}..{}", t.start, t.end)).collect();
-    if tiles.len() > SHOWN {
-        each.push(format!("and {} more ranges (--json lists all)", tiles.len() - SHOWN));
+/// Says how the tiles stand, again and again until all are done.
+fn watch(args: &Args, output: &Output) -> Result<()> {
+    const EVERY: Duration = Duration::from_secs(2);
+    /// Looking takes this share of the time at most.
+    const SHARE: u32 = 10;
+    let draws = std::io::stdout().is_terminal() && !args.json;
+    let mut last = None;
+    loop {
+        let began = Instant::now();
+        let cube = Cube::open(&args.cube)?;
+        let standing = Standing::of(&cube, &cube.all_samples()?)?;
+        if last.as_ref() != Some(&standing) {
+            output.event("progress", standing.facts())?;
+            if draws {
+                let mut text = format!("\x1b[H\x1b[2J{}\n", args.cube.display());
+                for (name, value) in standing.rows() {
+                    // Writing to a string cannot fail.
+                    let _ = writeln!(text, "{name:<16} {value}");
+                }
+                output.text(&text)?;
+            } else if !args.json {
+                output.text(&format!("{}\n", standing.line()))?;
+            }
+        }
+        if standing.is_done() {
+            return Ok(());
+        }
+        last = Some(standing);
+        std::thread::sleep(EVERY.max(began.elapsed() * SHARE));
     }
-    each.join(", ")
 }
 
 fn pairs(tiles: &[Range<u32>]) -> Vec<[u32; 2]> {
@@ -121,9 +160,10 @@ impl Found {
             "tiles_started": progress.tiles_started,
             "tiles_missing": pairs(&progress.missing),
             "tiles_behind": pairs(&progress.behind),
-            "tiles_in_use": self.in_use.as_ref().map(|tiles| [tiles.start, tiles.end]),
+            "tiles_in_use": self.work.first_in_use().map(|tiles| [tiles.start, tiles.end]),
             "verified_files": self.verified.as_ref().map(|verified| verified.files),
             "damage": self.verified.as_ref().map(|verified| &verified.damage),
+            "work": self.work.facts(),
             "samples": { "least": progress.samples[0], "most": progress.samples[1] },
             "epoch": header.epoch,
             "epochs": epochs(cube, progress),
@@ -159,9 +199,7 @@ impl Found {
         if !progress.behind.is_empty() {
             row("tiles behind", list(&progress.behind));
         }
-        if let Some(tiles) = &self.in_use {
-            row("in use", format!("a process works on the tiles {}..{}", tiles.start, tiles.end));
-        }
+        self.work.rows().into_iter().for_each(|(name, value)| row(name, value));
         row("error estimate", describe_estimate(cube, progress, estimate));
         if header.has_uncertainty() {
             let epochs = epochs(cube, progress);

@@ -1,5 +1,6 @@
 //! Arguments → job → exit code; one file per subcommand.
 
+mod array;
 mod bands;
 mod compare;
 mod devices;
@@ -12,7 +13,11 @@ mod progress;
 mod render;
 mod scene;
 mod sensor;
+mod sinks;
 mod spectrum;
+mod standing;
+mod submit;
+mod view;
 
 use clap::{Parser, Subcommand};
 
@@ -34,10 +39,12 @@ pub use output::Output;
     after_long_help = "\
 Examples:
   spectile render scene.toml -o cube.zarr --spp 256     render 256 samples per pixel
+  spectile submit scene.toml -o cube.zarr --spp 256     the same on a Slurm cluster
   spectile info cube.zarr                               how far it got, how large the error is
   spectile spectrum cube.zarr 120 80                    the spectrum of one pixel, as CSV
   spectile export cube.zarr -o picture.png              a picture of it
   spectile sensor cube.zarr --responses s.csv -o s.zarr what a sensor would see of it
+  spectile view cube.zarr                               a page to look at it
   spectile compare cube.zarr reference.zarr             how it differs from another cube
 
 Radiance is in W m-2 sr-1 nm-1, wavelengths are in nm (vacuum), pixels are counted from 0 at the top left.
@@ -55,6 +62,7 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Render(render::Args),
+    Submit(submit::Args),
     Plan(plan::Args),
     Devices(devices::Args),
     Info(info::Args),
@@ -62,6 +70,16 @@ enum Command {
     Compare(compare::Args),
     Export(export::Args),
     Sensor(sensor::Args),
+    View(view::Args),
+    /// A task of an array job (written into the batch script by `submit`)
+    #[command(hide = true)]
+    ArrayTask(array::Args),
+    /// The finaliser of an array job (submitted by `submit`)
+    #[command(hide = true)]
+    ArrayEnd(array::Args),
+    /// Whether a node sees cube and scene (run there by `submit`)
+    #[command(hide = true)]
+    ArrayProbe(array::Args),
 }
 
 impl Cli {
@@ -75,7 +93,9 @@ impl Cli {
             Command::Compare(args) => args.json,
             Command::Export(args) => args.json,
             Command::Sensor(args) => args.json,
-            Command::Spectrum(_) => false,
+            Command::View(args) => args.json,
+            Command::Submit(args) => args.json,
+            Command::Spectrum(_) | Command::ArrayTask(_) | Command::ArrayEnd(_) | Command::ArrayProbe(_) => false,
         }
     }
 
@@ -90,6 +110,11 @@ impl Cli {
             Command::Compare(args) => compare::run(args, output),
             Command::Export(args) => export::run(args, output),
             Command::Sensor(args) => sensor::run(args, output),
+            Command::View(args) => view::run(args, output),
+            Command::Submit(args) => submit::run(args, output),
+            Command::ArrayTask(args) => array::task(args, output),
+            Command::ArrayEnd(args) => array::end(args),
+            Command::ArrayProbe(args) => array::probe(args),
         }
     }
 }

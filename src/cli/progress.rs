@@ -8,7 +8,6 @@ use serde_json::{Value, json};
 
 use super::Output;
 use super::output::say;
-use super::render::Args;
 use crate::cube::{Cube, Existing, Progress, reduction};
 use crate::files::format_bytes;
 use crate::render::job::Job;
@@ -43,13 +42,13 @@ pub struct Reporter<'a> {
 }
 
 impl<'a> Reporter<'a> {
-    pub fn new(args: &Args, output: &'a Output) -> Self {
-        let bar = (!args.quiet && !args.json && std::io::stderr().is_terminal()).then(|| {
+    pub fn new(quiet: bool, output: &'a Output) -> Self {
+        let bar = (!quiet && !output.json() && std::io::stderr().is_terminal()).then(|| {
             let bar = ProgressBar::with_draw_target(Some(1), ProgressDrawTarget::stderr_with_hz(5));
             let style = ProgressStyle::with_template("{bar:30} {pos}/{len} units  {msg}").expect("a valid template");
             bar.with_style(style)
         });
-        Reporter { output, quiet: args.quiet, epoch: 64, started: Instant::now(), last_line: None, merged: false, bar }
+        Reporter { output, quiet, epoch: 64, started: Instant::now(), last_line: None, merged: false, bar }
     }
 
     /// A line on stderr that neither breaks the bar nor appears under --quiet.
@@ -81,6 +80,12 @@ impl<'a> Reporter<'a> {
     pub fn warn(&self, text: &str) -> Result<()> {
         self.say_always(&format!("warning: {text}"));
         self.emit("warning", json!({ "message": text }))
+    }
+
+    /// Where the page is; always said, since nobody else knows.
+    pub fn listening(&self, text: &str, fields: Value) -> Result<()> {
+        self.say_always(text);
+        self.emit("listening", fields)
     }
 
     pub fn start(&mut self, job: &Job) -> Result<()> {
@@ -136,6 +141,10 @@ impl<'a> Reporter<'a> {
                     self.line(&self.describe_epoch(status));
                 }
                 self.emit("progress", fields(status))
+            }
+            Event::Rests(rests) => {
+                self.line(if rests { "paused, as was asked on the page" } else { "goes on, as was asked on the page" });
+                self.emit(if rests { "paused" } else { "resumed" }, json!({}))
             }
             Event::Asked(status) => {
                 self.say_always(&self.describe_epoch(status));

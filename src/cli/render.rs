@@ -1,16 +1,18 @@
 //! `spectile render`: from a scene to a cube.
 
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Duration;
 
 use super::Output;
 use super::progress::Reporter;
 use super::scene::SceneArgs;
-use crate::Result;
+use super::sinks::Sinks;
 use crate::cube::Existing;
 use crate::gpu::adapter::Selection;
 use crate::render::job::{Job, Preview, StopRule};
 use crate::render::schedule;
+use crate::{Error, Result};
 
 /// Render a scene into a cube
 ///
@@ -31,6 +33,7 @@ use crate::render::schedule;
 Examples:
   spectile render scene.toml -o cube.zarr --spp 256
   spectile render scene.toml -o cube.zarr --time 10m --preview now.png
+  spectile render scene.toml -o cube.zarr --time 1h --listen 127.0.0.1:8090       watch it in a browser
   spectile render scene.toml -o cube.zarr --spp 1024 --resume             go on, after an end or to more samples
   spectile render scene.toml -o cube.zarr --spp 256 --tiles 0..500        one of several processes on one cube
   spectile render scene.toml -o quick.zarr --size 128x128 --set channels.equal.count=30")]
@@ -114,13 +117,26 @@ pub struct Args {
     #[arg(long, value_name = "FILE.png")]
     pub preview: Option<PathBuf>,
 
-    /// Exposure of the preview in EV: every step up is twice as bright
+    /// Exposure of --preview and --listen in EV: every step up is twice as bright
     ///
     /// At 0 a radiance of 1 W m-2 sr-1 nm-1 in all channels is white. Without it the 99th percentile of the lit pixels
-    /// is, and the exposure chosen is printed.
+    /// is, and the exposure chosen is printed. The page can change its own.
     #[arg(long, value_name = "EV", value_parser = super::parse_exposure, allow_hyphen_values = true)]
-    #[arg(requires = "preview")]
     pub exposure: Option<f64>,
+
+    /// Serve a page that shows the render while it goes on, at IP:PORT (port 0: any that is free)
+    ///
+    /// The picture fills in after every unit; a click shows the spectrum of a pixel; the render can be paused, stopped and saved.
+    /// On an address of this machine alone, such as 127.0.0.1:8090, whoever works on it may look. Where others can connect,
+    /// the address that is printed holds a token, without which nothing is answered. docs/http.md is for scripts.
+    #[arg(long, value_name = "IP:PORT", value_parser = super::view::parse_address)]
+    pub listen: Option<SocketAddr>,
+
+    /// Stream the picture to tev, an image viewer, usually at 127.0.0.1:14158
+    ///
+    /// tev may be started later, and again: it is looked for once a second and gets all tiles that are there.
+    #[arg(long, value_name = "HOST:PORT", value_parser = parse_tev)]
+    pub tev: Option<String>,
 
     /// Say where the time went, stage by stage
     #[arg(long)]
@@ -136,12 +152,16 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, output: &Output) -> Result<()> {
+    if args.exposure.is_some() && args.preview.is_none() && args.listen.is_none() {
+        return Err(Error::Usage("--exposure is that of --preview or --listen, and neither is there".into()));
+    }
     let interrupt = super::interrupt::watch()?;
     let scene = args.scene.load()?;
-    let mut reporter = Reporter::new(args, output);
+    let mut reporter = Reporter::new(args.quiet, output);
     for warning in &scene.warnings {
         reporter.warn(warning)?;
     }
+    let sinks = Sinks::start(args, &interrupt, &mut reporter)?;
     let job = Job {
         output: args.output.clone(),
         existing: match (args.resume, args.overwrite, &args.tiles) {
@@ -159,15 +179,17 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         profile: args.profile,
         devices: args.devices.clone(),
         memory: args.memory,
+        feed: sinks.feed.clone(),
         scene,
     };
     reporter.start(&job)?;
     let summary = schedule::run(&job, &interrupt, &mut |event| reporter.event(event));
+    sinks.finish(&job.output, &summary);
     reporter.finish(&job, summary)
 }
 
 /// A duration as a number of seconds, or with a unit s, m or h.
-fn parse_time(text: &str) -> std::result::Result<Duration, String> {
+pub(super) fn parse_time(text: &str) -> std::result::Result<Duration, String> {
     let explain = || "a time is a positive number with s, m or h, such as 90s, 10m or 1.5h".to_owned();
     let (number, unit) = match text.char_indices().next_back() {
         Some((last, 's')) => (&text[..last], 1.0),
@@ -177,6 +199,13 @@ fn parse_time(text: &str) -> std::result::Result<Duration, String> {
     };
     let seconds = number.trim_end().parse::<f64>().map_err(|_| explain())? * unit;
     if seconds > 0.0 { Duration::try_from_secs_f64(seconds).map_err(|_| explain()) } else { Err(explain()) }
+}
+
+/// A host and a port, which may be there later.
+fn parse_tev(text: &str) -> std::result::Result<String, String> {
+    let parts =
+        text.rsplit_once(':').filter(|(host, port)| !host.is_empty() && port.parse::<u16>().is_ok_and(|p| p > 0));
+    parts.map(|_| text.to_owned()).ok_or_else(|| "tev is at HOST:PORT, such as 127.0.0.1:14158".into())
 }
 
 /// A half-open range of tiles.
@@ -196,6 +225,16 @@ mod tests {
         assert_eq!(parse_tiles("7 .. 8"), Ok(7..8));
         for bad in ["", "5", "5..5", "6..5", "-1..5", "0...5", "0..x", "0..=5", "..5"] {
             assert!(parse_tiles(bad).unwrap_err().contains("0..100"), "{bad}");
+        }
+    }
+
+    #[test]
+    fn tev_is_a_host_and_a_port() {
+        for good in ["127.0.0.1:14158", "viewer.local:1", "[::1]:14158"] {
+            assert_eq!(parse_tev(good), Ok(good.to_owned()));
+        }
+        for bad in ["", "14158", ":14158", "host:", "host:0", "host:99999", "host"] {
+            assert!(parse_tev(bad).unwrap_err().contains("14158"), "{bad}");
         }
     }
 

@@ -1,12 +1,11 @@
 //! `spectile spectrum`: one pixel of a cube.
 
-use std::fmt::Write;
 use std::path::PathBuf;
 
 use super::Output;
 use crate::cube::Cube;
 use crate::files::write_atomically;
-use crate::format::plot;
+use crate::format::{plot, text};
 use crate::{Error, Result};
 
 /// Print the spectrum of one pixel as CSV
@@ -50,16 +49,5 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         let plot = plot::spectrum(cube.channels(), &spectrum, errors.as_deref(), &title)?;
         write_atomically(path, plot.as_bytes())?;
     }
-    // The header stands first: many readers of CSV know no comments.
-    let mut csv = "wavelength_nm,radiance".to_owned();
-    csv.push_str(if errors.is_some() { ",standard_error\n" } else { "\n" });
-    for (k, radiance) in spectrum.iter().enumerate() {
-        // Debug, not Display: 1e-30 instead of thirty zeros. Writing to a string cannot fail.
-        let _ = write!(csv, "{},{radiance:?}", cube.channels().centre(k));
-        if let Some(errors) = &errors {
-            let _ = write!(csv, ",{:?}", errors[k]);
-        }
-        csv.push('\n');
-    }
-    output.text(&csv)
+    output.text(&text::spectrum_csv(cube.channels(), &spectrum, errors.as_deref()))
 }

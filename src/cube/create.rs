@@ -44,6 +44,14 @@ pub fn check_target(path: &Path, header: &Header, existing: Existing, tiles: &Ra
     }
 }
 
+/// Makes a cube without any samples, or opens the one that `existing` allows, and changes nothing of it. Whether this
+/// process made it is told, too.
+pub fn make(path: &Path, header: &Header, existing: Existing) -> Result<(Cube, bool)> {
+    let tiles = 0..header.validate().map_or(0, |()| header.grid().count());
+    let is_new = matches!(find_way(path, header, existing, &tiles)?, Way::Create(_));
+    open_or_create(path, header, existing, &tiles).map(|cube| (cube, is_new))
+}
+
 /// Those of any cube.
 const ALL_TILES: Range<u32> = 0..u32::MAX;
 

@@ -47,6 +47,11 @@ impl Grid {
         [self.size[0].div_ceil(self.tile[0]), self.size[1].div_ceil(self.tile[1])]
     }
 
+    /// All pixels of the picture.
+    pub fn whole(&self) -> Rect {
+        Rect { x0: 0, y0: 0, x1: self.size[0], y1: self.size[1] }
+    }
+
     /// The number of tiles. [`super::Header`] sees to it that it fits.
     pub fn count(&self) -> u32 {
         let [columns, rows] = self.tiles();

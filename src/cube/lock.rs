@@ -25,13 +25,7 @@ impl TileLock {
         match try_lock(&file, &tiles) {
             Ok(None) => Ok(TileLock { file }),
             Ok(Some(held)) => Err(in_use(path, &held)),
-            Err(error) => {
-                let what = format!(
-                    "this file system cannot lock files ({error}), so nothing would keep two renders of one cube apart; \
-                     put the cube on another file system"
-                );
-                Err(Error::storage(&lock, what))
-            }
+            Err(error) => Err(no_locks(&lock, &error)),
         }
     }
 
@@ -59,6 +53,56 @@ impl TileLock {
         let file = File::open(private.join(LOCK)).ok()?;
         holder(&file, &tiles).ok()?
     }
+
+    /// All ranges among `tiles` that somebody works on, in order, as far as can be told.
+    pub fn all_held(private: &Path, tiles: Range<u32>) -> Vec<Range<u32>> {
+        let Ok(file) = File::open(private.join(LOCK)) else { return Vec::new() };
+        let (mut open, mut found) = (vec![tiles], Vec::new());
+        // The system names any of several locks, not the first: what lies before and behind it is asked for again.
+        while let Some(tiles) = open.pop() {
+            if tiles.is_empty() {
+                continue;
+            }
+            if let Ok(Some(held)) = holder(&file, &tiles) {
+                open.extend([tiles.start..held.start, held.end..tiles.end]);
+                found.push(held);
+            }
+        }
+        found.sort_by_key(|held| held.start);
+        found
+    }
+}
+
+/// A byte of the lock file that stands for no tile: what one process holds, another must not get, however far away it is.
+const PROBE: Range<u32> = u32::MAX - 1..u32::MAX;
+
+/// Held by who wants to know whether locks reach another machine.
+pub struct Probe {
+    _lock: TileLock,
+}
+
+impl Probe {
+    pub(super) fn hold(path: &Path, private: &Path) -> Result<Probe> {
+        TileLock::take(path, private, PROBE).map(|lock| Probe { _lock: lock })
+    }
+
+    /// Whether somebody's probe keeps this process from it, as it should. An error where files cannot be locked here.
+    pub(super) fn is_felt(path: &Path, private: &Path) -> Result<bool> {
+        let file = OpenOptions::new().read(true).write(true).open(private.join(LOCK));
+        let file = file.map_err(|error| Error::storage(&private.join(LOCK), format!("cannot be opened: {error}")))?;
+        match try_lock(&file, &PROBE) {
+            Ok(held) => Ok(held.is_some()),
+            Err(error) => Err(no_locks(path, &error)),
+        }
+    }
+}
+
+fn no_locks(path: &Path, error: &std::io::Error) -> Error {
+    let what = format!(
+        "this file system cannot lock files ({error}), so nothing would keep two renders of one cube apart; put the cube \
+         on another file system"
+    );
+    Error::storage(path, what)
 }
 
 /// The error of who comes second on a tile.
@@ -160,6 +204,15 @@ mod tests {
         assert!(message(3..9).contains("tile 3 is in use by another process"), "{}", message(3..9));
         assert!(message(0..2).contains("tiles 0..2 are in use"), "{}", message(0..2));
         assert_eq!(TileLock::held(folder.path(), 5..9), Some(5..6));
+        let _third = take(8..9).expect("free");
+        assert_eq!(TileLock::all_held(folder.path(), 0..20), [0..4, 4..6, 8..9]);
+        assert_eq!(TileLock::all_held(folder.path(), 1..5), [1..4, 4..5]);
+        let felt = || Probe::is_felt(Path::new("a.zarr"), folder.path()).expect("lockable");
+        assert!(!felt());
+        let probe = Probe::hold(Path::new("a.zarr"), folder.path()).expect("free");
+        assert!(felt());
+        drop(probe);
+        assert!(!felt());
         drop(first);
         take(0..4).expect("free again");
         assert_eq!(TileLock::held(folder.path(), 0..4), None);

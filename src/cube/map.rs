@@ -29,14 +29,19 @@ impl Chunk {
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
             Err(error) => return Err(Error::storage(path, format!("cannot be opened: {error}"))),
         };
+        Chunk::map(&file, path, rect, tile, channels).map(Some)
+    }
+
+    /// Maps a chunk that is open; `path` is what errors name.
+    pub(super) fn map(file: &File, path: &Path, rect: Rect, tile: [u32; 2], channels: usize) -> Result<Chunk> {
         // SAFETY: a mapped file must not change or shrink underneath. Spectile never writes to a chunk that bears its
         // name: a new one is written aside and renamed over it, and the old one lives on for as long as it is mapped.
-        let map = unsafe { Mmap::map(&file) }.map_err(|error| Error::storage(path, format!("cannot map: {error}")))?;
+        let map = unsafe { Mmap::map(file) }.map_err(|error| Error::storage(path, format!("cannot map: {error}")))?;
         let (bytes, expected) = (map.len(), tile[0] as usize * tile[1] as usize * channels * 4);
         if bytes != expected {
             return Err(Error::storage(path, format!("is damaged: {bytes} bytes long, not {expected}")));
         }
-        Ok(Some(Chunk { map, rect, tile_width: tile[0] as usize, channels }))
+        Ok(Chunk { map, rect, tile_width: tile[0] as usize, channels })
     }
 
     /// All values, [tile_h][tile_w][K].

@@ -1,7 +1,7 @@
 //! The cube as a folder: opening and reading it.
 
-use std::fs::{self, File};
-use std::io::{ErrorKind, Read, Seek, SeekFrom};
+use std::fs;
+use std::io::ErrorKind;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -10,12 +10,12 @@ use serde_json::Value;
 use super::estimate;
 use super::grid::Grid;
 use super::journal::Journal;
-use super::lock::TileLock;
+use super::lock::{Probe, TileLock};
 use super::map::Chunk;
 use super::metadata::{FORMAT, Header};
 use crate::spectral::Channels;
 use crate::spectral::colour::Projection;
-use crate::{Error, Result};
+use crate::{Error, Result, files};
 
 /// Folder of everything that is not plain Zarr.
 pub(super) const PRIVATE: &str = ".spectile";
@@ -72,6 +72,18 @@ pub struct Progress {
     pub behind: Vec<Range<u32>>,
 }
 
+impl Progress {
+    /// What the samples per pixel of every tile say.
+    pub fn of(samples: &[u32]) -> Progress {
+        let most = samples.iter().copied().max().unwrap_or(0);
+        let least = samples.iter().copied().filter(|&n| n > 0).min().unwrap_or(0);
+        let missing = ranges(samples, |n| n == 0);
+        let behind = ranges(samples, |n| n > 0 && n < most);
+        let tiles_started = samples.iter().filter(|&&n| n > 0).count() as u32;
+        Progress { tiles: samples.len() as u32, tiles_started, samples: [least, most], missing, behind }
+    }
+}
+
 impl Cube {
     /// Opens a cube that another process may be rendering at this moment.
     pub fn open(path: &Path) -> Result<Cube> {
@@ -126,16 +138,14 @@ impl Cube {
         }
     }
 
+    /// Samples per pixel of every tile.
+    pub fn all_samples(&self) -> Result<Vec<u32>> {
+        (0..self.grid().count()).map(|tile| self.samples(tile)).collect()
+    }
+
     /// How far the whole cube has got.
     pub fn progress(&self) -> Result<Progress> {
-        let tiles = self.grid().count();
-        let samples = (0..tiles).map(|tile| self.samples(tile)).collect::<Result<Vec<u32>>>()?;
-        let most = samples.iter().copied().max().unwrap_or(0);
-        let least = samples.iter().copied().filter(|&n| n > 0).min().unwrap_or(0);
-        let missing = ranges(&samples, |n| n == 0);
-        let tiles_started = tiles - missing.iter().map(|range| range.end - range.start).sum::<u32>();
-        let behind = ranges(&samples, |n| n > 0 && n < most);
-        Ok(Progress { tiles, tiles_started, samples: [least, most], missing, behind })
+        Ok(Progress::of(&self.all_samples()?))
     }
 
     /// The radiance of a tile, mapped into memory; `None` before its first unit.
@@ -164,36 +174,24 @@ impl Cube {
     /// The K channels of the pixel in column `x` and row `y` from the top left, in one contiguous read; `None` before
     /// the first unit of its tile.
     pub fn spectrum(&self, x: u32, y: u32) -> Result<Option<Vec<f32>>> {
-        self.pixel(Part::Radiance, x, y)
+        self.check_pixel(x, y)?;
+        self.look().spectrum(x, y)
     }
 
     /// The standard errors of the pixel's channels, as [`Cube::spectrum`] gives their values; `None` also in cubes without
     /// them. NaN below two epochs.
     pub fn standard_error(&self, x: u32, y: u32) -> Result<Option<Vec<f32>>> {
-        if self.header.has_uncertainty() { self.pixel(Part::StandardError, x, y) } else { Ok(None) }
+        self.check_pixel(x, y)?;
+        self.look().standard_error(x, y)
     }
 
-    fn pixel(&self, part: Part, x: u32, y: u32) -> Result<Option<Vec<f32>>> {
+    fn check_pixel(&self, x: u32, y: u32) -> Result<()> {
         let [width, height] = self.header.size;
-        if x >= width || y >= height {
-            let what = format!("pixel {x} {y} is outside the picture; columns are 0..{width}, rows 0..{height}");
-            return Err(Error::Usage(format!("{}: {what}", self.path.display())));
+        if x < width && y < height {
+            return Ok(());
         }
-        let grid = self.grid();
-        let tile = grid.tile_at(x, y);
-        let path = self.part_path(part, tile);
-        let mut file = match File::open(&path) {
-            Ok(file) => file,
-            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
-            Err(error) => return Err(Error::storage(&path, error)),
-        };
-        let rect = grid.rect(tile);
-        let pixel = u64::from(y - rect.y0) * u64::from(grid.tile[0]) + u64::from(x - rect.x0);
-        let mut spectrum = vec![0.0f32; self.channels().len()];
-        file.seek(SeekFrom::Start(pixel * spectrum.len() as u64 * 4))
-            .and_then(|_| file.read_exact(bytemuck::cast_slice_mut(&mut spectrum)))
-            .map_err(|error| Error::storage(&path, format!("is damaged: {error}")))?;
-        Ok(Some(spectrum))
+        let what = format!("pixel {x} {y} is outside the picture; columns are 0..{width}, rows 0..{height}");
+        Err(Error::Usage(format!("{}: {what}", self.path.display())))
     }
 
     /// The error estimate of every channel (DESIGN section 8), from the spread of the epochs: sqrt(Σ variance of the
@@ -215,6 +213,24 @@ impl Cube {
     /// Tiles that some process works on at this moment: those of the first range found.
     pub fn in_use(&self) -> Option<Range<u32>> {
         TileLock::held(&self.private(), 0..self.grid().count())
+    }
+
+    /// All tiles that some process works on at this moment.
+    pub fn all_in_use(&self) -> Vec<Range<u32>> {
+        TileLock::all_held(&self.private(), 0..self.grid().count())
+    }
+
+    /// Holds what [`Cube::probe_from_here`] must feel on every other machine.
+    pub fn hold_probe(&self) -> Result<Probe> {
+        Probe::hold(&self.path, &self.private())
+    }
+
+    /// Whether this machine can write to the cube and lock its tiles; and if so, whether somebody's probe is felt.
+    pub fn probe_from_here(&self) -> Result<bool> {
+        let file = self.private().join(format!("probe-{}", files::random_suffix()));
+        let written = files::write_durably(&file, b"").and_then(|()| fs::remove_file(&file));
+        written.map_err(|error| Error::storage(&self.path, format!("cannot be written: {error}")))?;
+        Probe::is_felt(&self.path, &self.private())
     }
 
     pub(super) fn private(&self) -> PathBuf {

@@ -1,5 +1,6 @@
 //! Whether a cube is what its journals say: bit rot, and files that somebody else changed.
 
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::thread;
 use std::time::Duration;
 
@@ -17,11 +18,14 @@ pub struct Verification {
     pub files: u64,
     /// What is wrong, a sentence each.
     pub damage: Vec<String>,
+    /// Tiles with damage, in order.
+    pub tiles: Vec<u32>,
 }
 
 /// A tile that somebody works on is looked at again, so often at most.
 const ATTEMPTS: u32 = 20;
 const PAUSE: Duration = Duration::from_millis(100);
+const MAX_THREADS: usize = 8;
 
 impl Cube {
     /// Compares every file with its checksum. The cube may be being rendered.
@@ -32,8 +36,37 @@ impl Cube {
         let (wrong, count) = wrong.map_err(|error| Error::storage(&list, format!("cannot be read: {error}")))?;
         found.files += count;
         found.damage.extend(wrong.into_iter().map(|name| format!("{name} is not what was written")));
-        for tile in 0..self.grid().count() {
-            self.verify_tile(tile, &mut found)?;
+        // Reading is what takes the time, and disks of many machines want several readers.
+        let (next, count) = (AtomicU32::new(0), self.grid().count());
+        let threads = thread::available_parallelism().map_or(1, usize::from).min(MAX_THREADS);
+        let work = || -> Result<Vec<(u32, Verification)>> {
+            let mut tiles: Vec<(u32, Verification)> = Vec::new();
+            loop {
+                let tile = next.fetch_add(1, Ordering::Relaxed);
+                if tile >= count {
+                    return Ok(tiles);
+                }
+                let mut of_tile = Verification::default();
+                self.verify_tile(tile, &mut of_tile)?;
+                match tiles.last_mut() {
+                    // Sound tiles are only counted.
+                    Some((_, last)) if of_tile.damage.is_empty() => last.files += of_tile.files,
+                    _ => tiles.push((tile, of_tile)),
+                }
+            }
+        };
+        let parts: Vec<_> = thread::scope(|scope| {
+            let threads: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
+            threads.into_iter().map(|t| t.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
+        });
+        let mut tiles = parts.into_iter().collect::<Result<Vec<_>>>()?.concat();
+        tiles.sort_by_key(|(tile, _)| *tile);
+        for (tile, of_tile) in tiles {
+            found.files += of_tile.files;
+            if !of_tile.damage.is_empty() {
+                found.tiles.push(tile);
+                found.damage.extend(of_tile.damage);
+            }
         }
         Ok(found)
     }

@@ -15,6 +15,7 @@ use super::estimate::Totals;
 use super::faults::step;
 use super::journal::{Journal, Record};
 use super::lock::TileLock;
+use super::look::Window;
 use super::map::Chunk;
 use super::merge::{Fold, check_portion, write_standard_errors};
 use super::metadata::Header;
@@ -144,16 +145,13 @@ impl Writer {
 
     /// The preview with every unit merged so far; means of `factor` x `factor` pixels.
     pub fn preview(&self, factor: u32) -> Result<Picture> {
+        self.look().colour(self.cube.grid().whole(), factor).map(Window::into_picture)
+    }
+
+    /// The suffix under which the files of a tile lie aside, if any do.
+    pub(super) fn pending(&self, tile: u32) -> Option<u64> {
         let state = self.state();
-        let pending = state.committing.iter().chain(&state.open);
-        let suffixes: BTreeMap<u32, u64> = pending.map(|(&tile, pending)| (tile, pending.record.suffix)).collect();
-        drop(state);
-        self.cube.preview_of(factor, |tile| {
-            let aside = suffixes.get(&tile).map(|&suffix| self.cube.aside_path(Part::Preview, tile, suffix));
-            // By now it may have taken its place, or a newer one is about to.
-            let opened = aside.and_then(|aside| File::open(aside).ok());
-            opened.map_or_else(|| File::open(self.cube.part_path(Part::Preview, tile)), Ok)
-        })
+        state.open.get(&tile).or_else(|| state.committing.get(&tile)).map(|pending| pending.record.suffix)
     }
 
     fn state(&self) -> MutexGuard<'_, State> {

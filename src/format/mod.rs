@@ -11,3 +11,4 @@ pub mod png;
 pub mod refractive;
 pub mod response;
 pub mod text;
+pub mod volume;

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use crate::error::Problem;
 
-/// The triangles of one run of faces under the same `o`, `g` and `usemtl`.
+/// The triangles of one run of faces under the same `o`, `g` and `usemtl` whose corners are given alike.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Part {
     pub labels: Labels,
@@ -17,6 +17,10 @@ pub struct Part {
     pub positions: Vec<[f64; 3]>,
     /// Indices into `positions`; counter-clockwise seen from the front.
     pub triangles: Vec<[u32; 3]>,
+    /// (u, v) at the corners of each triangle, where its faces have `vt` at every corner.
+    pub uv: Option<Vec<[[f64; 2]; 3]>>,
+    /// Normals at the corners of each triangle, as written, where its faces have `vn` at every corner.
+    pub normals: Option<Vec<[[f64; 3]; 3]>>,
 }
 
 /// What a face stands under.
@@ -40,7 +44,6 @@ impl Labels {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Obj {
     pub parts: Vec<Part>,
-    pub has_normals: bool,
     /// Point and line elements, which have no surface.
     pub without_surface: usize,
 }
@@ -64,10 +67,16 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Obj, Box<Problem>> {
     let no_materials = |_: &Path| Err(tobj::LoadError::GenericFailure);
     let models = match tobj::load_obj_buf(&mut feeder, &options, no_materials) {
         Ok((models, _)) => models,
-        Err(tobj::LoadError::FaceVertexOutOfBounds) => return Err(bad_index(bytes, problem)),
+        Err(
+            tobj::LoadError::FaceVertexOutOfBounds
+            | tobj::LoadError::FaceTexCoordOutOfBounds
+            | tobj::LoadError::FaceNormalOutOfBounds,
+        ) => return Err(bad_index(bytes, problem)),
         Err(error) => {
             let message = feeder.refusal.take().unwrap_or_else(|| match error {
                 tobj::LoadError::PositionParseError => "a vertex needs three numbers".to_owned(),
+                tobj::LoadError::NormalParseError => "a normal needs three numbers".to_owned(),
+                tobj::LoadError::TexcoordParseError => "texture coordinates are one to three numbers".to_owned(),
                 tobj::LoadError::FaceParseError => {
                     "a face needs whole numbers such as `f 1 2 3` or `f 1/1 2/2 3/3`".to_owned()
                 }
@@ -80,42 +89,64 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Obj, Box<Problem>> {
     let mut parts = Vec::with_capacity(models.len());
     for model in models.into_iter().filter(|model| !model.mesh.indices.is_empty()) {
         // The feeder names every model by the index of its labels.
-        let (labels, line) =
+        let (labels, line, given) =
             model.name.parse::<usize>().ok().and_then(|i| feeder.parts.get(i)).cloned().unwrap_or_default();
         let positions: Vec<[f64; 3]> = model.mesh.positions.as_chunks::<3>().0.to_vec();
-        if positions.iter().flatten().any(|x| !x.is_finite()) {
+        let mesh = &model.mesh;
+        if mesh.positions.iter().chain(&mesh.texcoords).chain(&mesh.normals).any(|x| !x.is_finite()) {
             return Err(not_finite(bytes, problem));
         }
-        parts.push(Part { labels, line, positions, triangles: model.mesh.indices.as_chunks::<3>().0.to_vec() });
+        let triangles = mesh.indices.as_chunks::<3>().0.to_vec();
+        // tobj has no indices where the file has no such coordinates at all.
+        let missing = |indices: &[u32]| indices.len() != mesh.indices.len();
+        if given.uv && missing(&mesh.texcoord_indices) || given.normals && missing(&mesh.normal_indices) {
+            return Err(bad_index(bytes, problem));
+        }
+        let (texcoords, normals) = (mesh.texcoords.as_chunks::<2>().0, mesh.normals.as_chunks::<3>().0);
+        let uv = given.uv.then(|| corners(&mesh.texcoord_indices, texcoords));
+        let normals = given.normals.then(|| corners(&mesh.normal_indices, normals));
+        parts.push(Part { labels, line, positions, triangles, uv, normals });
     }
     if parts.is_empty() {
         return Err(problem(None, "has no faces"));
     }
-    Ok(Obj { parts, has_normals: feeder.has_normals, without_surface: feeder.without_surface })
+    Ok(Obj { parts, without_surface: feeder.without_surface })
 }
 
-/// Finds the first face that names a vertex the file does not have (tobj notices it only at the end of a part).
+/// The values that three indices each pick.
+fn corners<T: Copy>(indices: &[u32], values: &[T]) -> Vec<[T; 3]> {
+    indices.as_chunks::<3>().0.iter().map(|triangle| triangle.map(|i| values[i as usize])).collect()
+}
+
+/// Finds the first face that names what the file does not have (tobj notices it only at the end of a part).
 fn bad_index(bytes: &[u8], problem: impl Fn(Option<usize>, &str) -> Box<Problem>) -> Box<Problem> {
-    let vertices = Lines::new(bytes).filter(|(_, line)| keyword(line).0 == "v").count() as i128;
-    let mut before = 0;
+    const KINDS: [(&str, &str, &str); 3] =
+        [("v", "vertex", "vertices"), ("vt", "texture coordinate", "texture coordinates"), ("vn", "normal", "normals")];
+    let kind_of = |word: &str| KINDS.iter().position(|kind| kind.0 == word);
+    let mut all = [0i128; 3];
+    Lines::new(bytes).filter_map(|(_, line)| kind_of(keyword(&line).0)).for_each(|kind| all[kind] += 1);
+    let mut before = [0i128; 3];
     for (number, line) in Lines::new(bytes) {
-        match keyword(&line) {
-            ("v", _) => before += 1,
-            ("f", rest) => {
-                for corner in without_comment(rest).split_whitespace() {
-                    let written = corner.split('/').next().unwrap_or("");
-                    let Ok(index) = written.parse::<i128>() else {
-                        return problem(Some(number), &format!("`{corner}` names no vertex"));
-                    };
-                    let resolved = if index < 0 { before + index } else { index - 1 };
-                    if !(0..vertices).contains(&resolved) {
-                        let message =
-                            format!("vertex {index} does not exist: the file has {vertices} vertices, counted from 1");
-                        return problem(Some(number), &message);
-                    }
+        let (word, rest) = keyword(&line);
+        if let Some(kind) = kind_of(word) {
+            before[kind] += 1;
+        }
+        if word != "f" {
+            continue;
+        }
+        for corner in without_comment(rest).split_whitespace() {
+            for (kind, written) in corner.split('/').take(3).enumerate().filter(|(k, w)| *k == 0 || !w.is_empty()) {
+                let (_, one, many) = KINDS[kind];
+                let Ok(index) = written.parse::<i128>() else {
+                    return problem(Some(number), &format!("`{corner}` names no {one}"));
+                };
+                let resolved = if index < 0 { before[kind] + index } else { index - 1 };
+                if !(0..all[kind]).contains(&resolved) {
+                    let count = all[kind];
+                    let message = format!("{one} {index} does not exist: the file has {count} {many}, counted from 1");
+                    return problem(Some(number), &message);
                 }
             }
-            _ => {}
         }
     }
     problem(None, "a face names a vertex that does not exist")
@@ -130,9 +161,14 @@ fn not_finite(bytes: &[u8], problem: impl Fn(Option<usize>, &str) -> Box<Problem
     };
     let line = Lines::new(bytes).find_map(|(number, line)| {
         let (word, rest) = keyword(&line);
-        (word == "v" && is_bad(without_comment(rest))).then_some(number)
+        let bad = match word {
+            "v" => is_bad(without_comment(rest)),
+            "vt" | "vn" => rest.split_whitespace().any(|word| word.parse().is_ok_and(|x: f64| !x.is_finite())),
+            _ => false,
+        };
+        bad.then_some(number)
     });
-    problem(line, "a vertex is not finite")
+    problem(line, "a vertex, normal or texture coordinate is not finite")
 }
 
 /// First word and the rest of a line.
@@ -195,9 +231,7 @@ impl<'a> Iterator for Lines<'a> {
 }
 
 /// Statements without influence on where a surface is.
-const HARMLESS: [&str; 20] = [
-    "vt",
-    "vn",
+const HARMLESS: [&str; 18] = [
     "vp",
     "s",
     "mg",
@@ -218,6 +252,13 @@ const HARMLESS: [&str; 20] = [
     "end",
 ];
 
+/// What every corner of a face has beside its vertex.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct Given {
+    uv: bool,
+    normals: bool,
+}
+
 /// Hands tobj the vertices and faces line by line, and a numbered `o` before the first face of every part.
 struct Feeder<'a> {
     lines: Lines<'a>,
@@ -227,8 +268,8 @@ struct Feeder<'a> {
     offset: usize,
     labels: Labels,
     labels_changed: bool,
-    parts: Vec<(Labels, usize)>,
-    has_normals: bool,
+    given: Given,
+    parts: Vec<(Labels, usize, Given)>,
     without_surface: usize,
     /// What the feeder itself found wrong with `line`.
     refusal: Option<String>,
@@ -243,8 +284,8 @@ impl<'a> Feeder<'a> {
             offset: 0,
             labels: Labels::default(),
             labels_changed: true,
+            given: Given::default(),
             parts: Vec::new(),
-            has_normals: false,
             without_surface: 0,
             refusal: None,
         }
@@ -261,6 +302,8 @@ impl<'a> Feeder<'a> {
             let name = || (!rest.is_empty()).then(|| rest.to_owned());
             match word {
                 "v" => self.vertex(without_comment(rest)),
+                "vt" => self.texture_coordinates(without_comment(rest)),
+                "vn" => self.current = format!("vn {}\n", without_comment(rest)),
                 "f" => self.face(without_comment(rest))?,
                 "o" => self.relabel(|labels| labels.object = name()),
                 "g" => self.relabel(|labels| labels.group = name()),
@@ -271,7 +314,7 @@ impl<'a> Feeder<'a> {
                     return Err(format!("free-form geometry (`{word}`) is not supported: export polygons"));
                 }
                 _ if word.is_empty() || word.starts_with('#') => {}
-                _ if HARMLESS.contains(&word) => self.has_normals |= word == "vn",
+                _ if HARMLESS.contains(&word) => {}
                 _ => {
                     return Err(format!(
                         "`{}` is not an OBJ statement",
@@ -294,18 +337,36 @@ impl<'a> Feeder<'a> {
         self.current.push('\n');
     }
 
+    /// Those of a curve have no v, those of a solid a third number.
+    fn texture_coordinates(&mut self, rest: &str) {
+        let mut words = rest.split_whitespace();
+        let (u, v) = (words.next().unwrap_or(""), words.next().unwrap_or("0"));
+        self.current = format!("vt {u} {v}\n");
+    }
+
+    /// A face goes on with what all its corners have.
     fn face(&mut self, rest: &str) -> Result<(), String> {
         let corners = rest.split_whitespace().count();
         if corners < 3 {
             return Err(format!("a face needs at least 3 vertices, but has {corners}"));
         }
-        if self.labels_changed {
-            self.labels_changed = false;
+        let all =
+            |place: usize| rest.split_whitespace().all(|c| c.split('/').nth(place).is_some_and(|w| !w.is_empty()));
+        let given = Given { uv: all(1), normals: all(2) };
+        if self.labels_changed || self.given != given {
+            (self.labels_changed, self.given) = (false, given);
             self.current.push_str(&format!("o {}\n", self.parts.len()));
-            self.parts.push((self.labels.clone(), self.line));
+            self.parts.push((self.labels.clone(), self.line, given));
         }
-        self.current.push_str("f ");
-        self.current.push_str(rest);
+        self.current.push('f');
+        for corner in rest.split_whitespace() {
+            let mut words = corner.splitn(3, '/');
+            let mut word = || words.next().unwrap_or("");
+            let (v, vt, vn) = (word(), word(), word());
+            let vt = if given.uv || !vt.is_empty() && vt.parse::<isize>().is_err() { vt } else { "" };
+            let vn = if given.normals || !vn.is_empty() && vn.parse::<isize>().is_err() { vn } else { "" };
+            self.current.push_str(&format!(" {v}/{vt}/{vn}"));
+        }
         self.current.push('\n');
         Ok(())
     }
@@ -369,7 +430,6 @@ mod tests {
             "mtllib missing.mtl\no house\n{SQUARE}vn 0 0 1\nusemtl brick wall\nf 1 2 3\nf 1 3 4\ng roof left\nf 1 2 4\nusemtl tile\ng\nf 2 3 4\n"
         );
         let mesh = obj(&text).unwrap();
-        assert!(mesh.has_normals);
         let found: Vec<_> = mesh
             .parts
             .iter()
@@ -403,6 +463,25 @@ mod tests {
         assert_eq!(mesh.without_surface, 1);
     }
 
+    /// Seams give a vertex several coordinates; faces that lack some are parts of their own.
+    #[test]
+    fn normals_and_texture_coordinates_stand_at_corners() {
+        let text = format!(
+            "{SQUARE}vt 0 0\nvt 1 0 0.5\nvt 0.25\nvn 0 0 1\nvn 0 0 -2\nf 1/1/1 2/2/2 3/3/1\nf 1/-3/-1 3/1/1 4/2/1\n\
+             f 1//1 2//1 3//2\nf 1/1 2/2 4/3\nf 1/1/1 2/2 3/3/1 4/1/2\n"
+        );
+        let mesh = obj(&text).unwrap();
+        let given = |p: &Part| (p.line, p.triangles.len(), p.uv.is_some(), p.normals.is_some());
+        let given: Vec<_> = mesh.parts.iter().map(given).collect();
+        assert_eq!(given, [(10, 2, true, true), (12, 1, false, true), (13, 3, true, false)]);
+        let whole = &mesh.parts[0];
+        let uv = [[[0., 0.], [1., 0.], [0.25, 0.]], [[0., 0.], [0., 0.], [1., 0.]]];
+        assert_eq!(whole.uv.as_deref(), Some(&uv[..]));
+        let (up, down) = ([0., 0., 1.], [0., 0., -2.]);
+        assert_eq!(whole.normals.as_deref(), Some(&[[up, down, up], [down, up, up]][..]));
+        assert_eq!(mesh.parts[1].normals.as_deref(), Some(&[[up, up, down]][..]));
+    }
+
     #[test]
     fn mistakes_name_their_line() {
         for (text, line, words) in [
@@ -419,6 +498,12 @@ mod tests {
             ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf", Some(4), "at least 3"),
             ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 c", Some(4), "whole numbers"),
             ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 /3", Some(4), "names no vertex"),
+            ("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/2", Some(5), "texture coordinate 2 does not exist"),
+            ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1//1 2//1 3//1", Some(4), "normal 1 does not exist: the file has 0 normals"),
+            ("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 1\nf 1 2 3", Some(4), "a normal needs three"),
+            ("v 0 0 0\nvt x 0\n", Some(2), "one to three numbers"),
+            ("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn nan 1 0\nf 1//1 2//1 3//1", Some(4), "not finite"),
+            ("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/c 3/1", Some(5), "whole numbers"),
             ("v 0 0 0\nusemtl\n", Some(2), "needs a name"),
             ("surf 0 1 0 1 1 2\n", Some(1), "free-form"),
             ("PK\u{3}\u{4}binary", Some(1), "not an OBJ statement"),

@@ -13,11 +13,16 @@ pub fn write(path: &Path, picture: &Picture, ev: f64) -> Result<()> {
 
 /// Writes 8-bit sRGB, three bytes a pixel, as it stands.
 pub fn write_srgb8(path: &Path, size: [u32; 2], rgb: &[u8]) -> Result<()> {
-    let bytes = encode(size, rgb).map_err(|error| Error::storage(path, format!("cannot be made: {error}")))?;
+    let bytes = encode_srgb8(size, rgb).map_err(|error| Error::storage(path, format!("cannot be made: {error}")))?;
     write_atomically(path, &bytes)
 }
 
-fn encode(size: [u32; 2], rgb: &[u8]) -> std::result::Result<Vec<u8>, png::EncodingError> {
+/// A picture as the bytes of a PNG file.
+pub fn encode(picture: &Picture, ev: f64) -> std::result::Result<Vec<u8>, png::EncodingError> {
+    encode_srgb8(picture.size, &picture.to_srgb8(ev))
+}
+
+fn encode_srgb8(size: [u32; 2], rgb: &[u8]) -> std::result::Result<Vec<u8>, png::EncodingError> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, size[0], size[1]);
     encoder.set_color(png::ColorType::Rgb);

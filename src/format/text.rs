@@ -1,10 +1,12 @@
 //! Spectra in files. Here CSV (`nm,value`, with more columns by name; `nm,n,k`) and `.spd` (`nm value`); which of the other
 //! formats a file has is told from its name and its first line.
 
+use std::fmt::{Debug, Write};
 use std::path::Path;
 
 use super::{library, modtran};
 use crate::error::Problem;
+use crate::spectral::Channels;
 
 /// Wavelengths in nm, ascending (two equal ones make a step), and a value for each.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,6 +15,23 @@ pub struct SpectrumTable {
     pub value: Vec<f64>,
     /// The 1-based line each value stands on; empty where the file has no lines.
     pub line: Vec<usize>,
+}
+
+/// A spectrum as CSV: a header, then the centre of each channel in nm, its radiance and, where known, standard error, with as
+/// many digits as bring back the numbers exactly.
+pub fn spectrum_csv<T: Debug>(channels: &Channels, radiance: &[T], standard_error: Option<&[T]>) -> String {
+    // The header stands first: many readers of CSV know no comments.
+    let mut csv = "wavelength_nm,radiance".to_owned();
+    csv += if standard_error.is_some() { ",standard_error\n" } else { "\n" };
+    for (k, radiance) in radiance.iter().enumerate() {
+        // Debug, not Display: 1e-30 instead of thirty zeros. Writing to a string cannot fail.
+        let _ = write!(csv, "{},{radiance:?}", channels.centre(k));
+        let _ = match standard_error {
+            Some(errors) => writeln!(csv, ",{:?}", errors[k]),
+            None => writeln!(csv),
+        };
+    }
+    csv
 }
 
 /// Reads the spectrum of `column` (by name; absent: the only one) of the file at `path`: CSV, `.spd`, an ENVI spectral
@@ -58,6 +77,24 @@ pub fn parse_spectrum(bytes: &[u8], path: &Path, column: Option<&str>) -> Result
 /// The columns `n` and `k` of an `nm,n,k` file; without a header, the second and the third of three.
 pub fn parse_index(bytes: &[u8], path: &Path) -> Result<[SpectrumTable; 2], Box<Problem>> {
     Ok([parse(bytes, path, Column::OfIndex("n"), None)?, parse(bytes, path, Column::OfIndex("k"), None)?])
+}
+
+/// Every column beside the wavelength, with the name that the header gives it.
+pub fn read_columns(path: &Path) -> Result<Vec<(String, SpectrumTable)>, Box<Problem>> {
+    parse_columns(&read(path)?, path)
+}
+
+/// [`read_columns`] on the content of the file.
+pub fn parse_columns(bytes: &[u8], path: &Path) -> Result<Vec<(String, SpectrumTable)>, Box<Problem>> {
+    let text = String::from_utf8_lossy(bytes);
+    let header = text.trim_start_matches('\u{feff}').lines();
+    let header = header.map(|line| line.split('#').next().unwrap_or("").trim()).find(|line| !line.is_empty());
+    let names = header.map_or_else(Vec::new, |header| Separator::of(header).split(header));
+    if let [_] | [] = names[..] {
+        // Says what is wrong.
+        return parse(bytes, path, Column::Only, None).map(|table| vec![(String::new(), table)]);
+    }
+    names[1..].iter().map(|name| Ok(((*name).to_owned(), parse(bytes, path, Column::Named(name), None)?))).collect()
 }
 
 /// Which column of a file is wanted.

@@ -5,17 +5,20 @@ use std::time::Duration;
 
 use serde::Serialize;
 
+use crate::gpu::allocation::{self, Given};
 use crate::gpu::deadline::Deadline;
 use crate::{Error, Result};
 
 /// What `spectile devices` says of one adapter.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct AdapterFacts {
     pub name: String,
     pub backend: String,
     /// `discrete GPU`, `integrated GPU`, `virtual GPU`, `CPU (software)` or `other`.
     pub kind: String,
     pub driver: String,
+    /// Address on the PCI bus, where the driver tells it.
+    pub pci: Option<String>,
     /// Largest buffer that one binding can show, bytes.
     pub max_binding: u64,
     pub max_buffer: u64,
@@ -102,6 +105,7 @@ fn facts(adapter: &wgpu::Adapter) -> AdapterFacts {
         }
         .to_owned(),
         driver: format!("{} {}", info.driver, info.driver_info).trim().to_owned(),
+        pci: Some(info.device_pci_bus_id).filter(|address| !address.is_empty()),
         max_binding: limits.max_storage_buffer_binding_size,
         max_buffer: limits.max_buffer_size,
         timestamps: adapter.features().contains(wgpu::Features::TIMESTAMP_QUERY),
@@ -156,15 +160,20 @@ impl std::str::FromStr for Selection {
 const MAX_DEVICES: usize = 64;
 
 impl Selection {
-    /// Positions in `listed`. Errors: no usable adapter, or a position that is not there or not usable.
-    fn choose(&self, listed: &[AdapterFacts]) -> Result<Vec<usize>> {
-        let all = usable_once(listed);
+    /// Positions in `listed`, of GPUs only those `given`. Errors: no usable adapter, or a position that is not there, not
+    /// usable or not given.
+    fn choose(&self, listed: &[AdapterFacts], given: &Given) -> Result<Vec<usize>> {
+        let all = usable_once(listed, given)?;
         match self {
             Selection::List(positions) => {
                 for &position in positions {
                     let unusable = match listed.get(position) {
                         None => Some("there is no such adapter".to_owned()),
-                        Some(facts) => facts.unusable.clone(),
+                        Some(facts) if facts.unusable.is_some() => facts.unusable.clone(),
+                        Some(facts) if given.count() > 0 && !facts.is_software && !all.contains(&position) => {
+                            Some("Slurm gave this job other GPUs".to_owned())
+                        }
+                        Some(_) => None,
                     };
                     if let Some(why) = unusable {
                         return Err(Error::NoDevice(format!(
@@ -176,7 +185,10 @@ impl Selection {
             }
             _ if all.is_empty() => {
                 let refused = listed.iter().filter_map(|f| Some((&f.name, f.unusable.as_ref()?)));
-                let reasons: String = refused.map(|(name, why)| format!("; {name}: {why}")).collect();
+                let mut reasons: String = refused.map(|(name, why)| format!("; {name}: {why}")).collect();
+                if *given != Given::Everything && given.count() == 0 {
+                    reasons += "; Slurm gave this job no GPU (--gpus-per-task)";
+                }
                 Err(Error::NoDevice(format!(
                     "no adapter that can run Spectile{reasons}: install a Vulkan driver for your GPU, or the software driver \
                      (Debian/Ubuntu: apt-get install mesa-vulkan-drivers libvulkan1)"
@@ -188,8 +200,9 @@ impl Selection {
     }
 }
 
-/// Usable adapters: every GPU, through the first backend that lists it; if there is none, every software adapter.
-fn usable_once(listed: &[AdapterFacts]) -> Vec<usize> {
+/// Usable adapters: every GPU that was given, through the first backend that lists it; if there is none, every software
+/// adapter.
+fn usable_once(listed: &[AdapterFacts], given: &Given) -> Result<Vec<usize>> {
     let of = |software: bool| -> Vec<usize> {
         let usable = |facts: &AdapterFacts| facts.unusable.is_none() && facts.is_software == software;
         let backend_of = |name: &str| listed.iter().find(|f| usable(f) && f.name == name).map(|f| &f.backend);
@@ -197,8 +210,8 @@ fn usable_once(listed: &[AdapterFacts]) -> Vec<usize> {
             .filter(|&i| usable(&listed[i]) && backend_of(&listed[i].name) == Some(&listed[i].backend))
             .collect()
     };
-    let gpus = of(false);
-    if gpus.is_empty() { of(true) } else { gpus }
+    let gpus = given.among(listed, &of(false))?;
+    Ok(if gpus.is_empty() { of(true) } else { gpus })
 }
 
 /// Where `now`, what another Instance lists, has the adapter `listed[index]`: by name, backend, and position among
@@ -219,7 +232,7 @@ impl Gpu {
     /// Opens the devices of a selection, each through its own wgpu Instance. At least one.
     pub fn open_all(selection: &Selection) -> Result<Vec<Gpu>> {
         let listed = list();
-        let chosen = selection.choose(&listed)?;
+        let chosen = selection.choose(&listed, &allocation::given()?)?;
         chosen.into_iter().map(|index| Self::open_like(&listed, index)).collect()
     }
 
@@ -326,13 +339,9 @@ mod tests {
         AdapterFacts {
             name: name.into(),
             backend: backend.into(),
-            kind: String::new(),
-            driver: String::new(),
-            max_binding: 0,
-            max_buffer: 0,
-            timestamps: false,
             is_software,
             unusable: unusable.map(str::to_owned),
+            ..AdapterFacts::default()
         }
     }
 
@@ -359,14 +368,24 @@ mod tests {
             adapter("B", "dx12", false, None),
             adapter("soft", "vulkan", true, None),
         ];
-        assert_eq!(Selection::All.choose(&listed).unwrap(), [0, 1, 5]);
-        assert_eq!(Selection::Count(2).choose(&listed).unwrap(), [0, 1]);
-        assert_eq!(Selection::Count(4).choose(&listed).unwrap(), [0, 1, 5, 0]);
-        assert_eq!(Selection::List(vec![6, 1]).choose(&listed).unwrap(), [6, 1]);
-        assert_eq!(Selection::List(vec![2]).choose(&listed).unwrap_err().exit_code(), 3);
-        assert_eq!(Selection::List(vec![7]).choose(&listed).unwrap_err().exit_code(), 3);
-        assert_eq!(Selection::All.choose(&listed[6..]).unwrap(), [0]);
-        assert_eq!(Selection::All.choose(&[]).unwrap_err().exit_code(), 3);
+        assert_eq!(Selection::All.choose(&listed, &Given::Everything).unwrap(), [0, 1, 5]);
+        assert_eq!(Selection::Count(2).choose(&listed, &Given::Everything).unwrap(), [0, 1]);
+        assert_eq!(Selection::Count(4).choose(&listed, &Given::Everything).unwrap(), [0, 1, 5, 0]);
+        assert_eq!(Selection::List(vec![6, 1]).choose(&listed, &Given::Everything).unwrap(), [6, 1]);
+        assert_eq!(Selection::List(vec![2]).choose(&listed, &Given::Everything).unwrap_err().exit_code(), 3);
+        assert_eq!(Selection::List(vec![7]).choose(&listed, &Given::Everything).unwrap_err().exit_code(), 3);
+        assert_eq!(Selection::All.choose(&listed[6..], &Given::Everything).unwrap(), [0]);
+        assert_eq!(Selection::All.choose(&[], &Given::Everything).unwrap_err().exit_code(), 3);
+        // In a job of Slurm's: what it gave, the software device where that is nothing, and more only if it said nothing.
+        let (first, none) = (Given::Places(vec![0]), Given::Places(vec![]));
+        assert_eq!(Selection::All.choose(&listed[..2], &first).unwrap(), [0]);
+        assert_eq!(Selection::Count(2).choose(&listed[..2], &first).unwrap(), [0, 0]);
+        let other = Selection::List(vec![1]).choose(&listed[..2], &first).unwrap_err();
+        assert!(other.to_string().contains("device 1: Slurm gave this job other GPUs"), "{other}");
+        assert_eq!(Selection::All.choose(&listed, &none).unwrap(), [6]);
+        assert_eq!(Selection::List(vec![1]).choose(&listed, &none).unwrap(), [1]);
+        let nothing = Selection::All.choose(&listed[..2], &none).unwrap_err();
+        assert!(nothing.to_string().contains("Slurm gave this job no GPU"), "{nothing}");
     }
 
     /// Adapters that come or go between two Instances do not make a device another one.

@@ -111,6 +111,26 @@ pub struct Part {
     pub eta_greatest: f32,
 }
 
+/// A light without a surface, two vectors of words (shaders/common/lamp.wgsl).
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
+pub struct Lamp {
+    /// Position in device units, or the unit vector towards the light.
+    pub place: [f32; 3],
+    /// One of `LAMP_…`.
+    pub kind: u32,
+    /// Of a sun's angular radius: sine squared, and 1 - cos.
+    pub sine2: f32,
+    pub versine: f32,
+    pub unused: [u32; 2],
+}
+
+pub const LAMP_POINT: u32 = 0;
+pub const LAMP_DIRECTIONAL: u32 = 1;
+pub const LAMP_SUN: u32 = 2;
+/// Bit of [`Emitter::spectrum`].
+pub const EMITTER_IS_LAMP: u32 = 0x4000_0000;
+
 /// `NONE` in WGSL.
 pub const NONE: u32 = u32::MAX;
 
@@ -126,8 +146,13 @@ pub struct Primitive {
     /// Index of the emitter, or [`NONE`].
     pub emitter: u32,
     pub c: [f32; 3],
-    pub unused: u32,
+    /// Where its [`crate::accel::Accel::attributes`] start, with [`HAS_COORDINATES`] and [`HAS_NORMALS`]; 0 without.
+    pub attributes: u32,
 }
+
+/// Bits of [`Primitive::attributes`].
+pub const HAS_COORDINATES: u32 = 0x8000_0000;
+pub const HAS_NORMALS: u32 = 0x4000_0000;
 
 /// The counters that every pass may raise, in the order of the `COUNTER_…` constants in WGSL.
 #[repr(C)]

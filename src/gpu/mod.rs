@@ -1,6 +1,7 @@
 //! The only place, with `render::worker`, that names wgpu.
 
 pub mod adapter;
+mod allocation;
 pub mod buffer;
 pub mod deadline;
 #[cfg(test)]

@@ -32,6 +32,11 @@ modules! {
     SHAPES = "common/shapes.wgsl";
     BVH = "common/bvh.wgsl";
     LIGHT = "common/light.wgsl";
+    ATTRIBUTES = "common/attributes.wgsl";
+    TEXTURE = "common/texture.wgsl";
+    LAMP = "common/lamp.wgsl";
+    MAP = "common/map.wgsl";
+    MAP_VALUE = "common/map_value.wgsl";
     RECORD = "common/record.wgsl";
     TABLES = "common/tables.wgsl";
     MATERIAL = "common/material.wgsl";

@@ -43,7 +43,10 @@ fn check_size(name: &str, bytes: u64, limits: &wgpu::Limits) -> Result<()> {
     }
     let (what, help) = match name {
         "spectra" | "knot_starts" | "knots" => ("the spectra of the scene", "fewer channels or fewer spectra"),
+        "map_table" | "map_texels" => ("the environment map", "a smaller one"),
         "emitters" | "emitter_cdf" => ("the emitting triangles of the scene", "a coarser mesh where it emits"),
+        "textures" | "texels" => ("the textures of the scene", "smaller ones"),
+        "attributes" => ("the texture coordinates and normals of the scene", "fewer triangles"),
         _ => ("the materials of the scene", "fewer of them"),
     };
     Err(Error::Usage(format!(
@@ -68,6 +71,20 @@ fn parts<'a>(prepared: &'a Prepared, windows: &Windows) -> Vec<(String, &'a [u8]
             ("parts".into(), bytemuck::cast_slice(&surfaces.parts)),
             ("tables".into(), bytemuck::cast_slice(&surfaces.tables)),
         ]),
+    }
+    if let Some(textures) = prepared.surfaces.as_ref().and_then(|surfaces| surfaces.textures.as_ref()) {
+        parts.push(("textures".into(), bytemuck::cast_slice(&textures.words)));
+        parts.push(("texels".into(), bytemuck::cast_slice(&textures.texels)));
+    }
+    if !prepared.accel.attributes.is_empty() {
+        parts.push(("attributes".into(), bytemuck::cast_slice(&prepared.accel.attributes)));
+    }
+    if prepared.features.general.is_some_and(|general| general.lamps) {
+        parts.push(("lamps".into(), bytemuck::cast_slice(&prepared.lamps)));
+    }
+    if let Some(sky) = &prepared.sky {
+        parts.push(("map_table".into(), bytemuck::cast_slice(&sky.table)));
+        parts.push(("map_texels".into(), bytemuck::cast_slice(&sky.texels)));
     }
     let mut add_windows = |name: &str, list: WindowList, bytes: &'a [u8], element: u64| {
         for i in 0..u64::from(list.count) {

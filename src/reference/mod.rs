@@ -10,7 +10,9 @@ mod lights;
 mod path;
 mod primitive;
 mod rng;
+mod shading;
 mod sky;
+mod texture;
 mod world;
 
 use std::num::NonZeroUsize;
@@ -174,15 +176,21 @@ mod tests {
             spectra: spectra.into(),
             materials: vec![crate::scene::Material {
                 name: "grey".into(),
-                bsdf: crate::scene::Bsdf::Diffuse { reflectance: 0 },
+                bsdf: crate::scene::Bsdf::Diffuse { reflectance: crate::scene::Reflectance::Spectrum(0) },
                 two_sided: true,
+                temperature: None,
             }],
+            textures: vec![],
             objects: vec![crate::scene::Object {
                 name: "ball".into(),
                 shape: Shape::Sphere { center: DVec3::ZERO, radius: 1.0 },
-                material: 0,
+                attributes: crate::scene::Attributes::default(),
+                material: Some(0),
                 emission: None,
+                interior: None,
             }],
+            media: vec![],
+            camera_medium: None,
             lights: vec![],
             environment: Some(Environment::Uniform(1)),
             warnings: vec![],

@@ -3,13 +3,14 @@
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
 use super::bsdf::{Bsdf, SpectralValues, Vertex};
 use super::camera;
 use super::lights::{LightPoint, Lights, Target, disk_solid_angle, emits, sample_disk};
 use super::primitive::Ray;
 use super::rng::Rng;
+use super::shading::Shading;
 use super::sky::Sky;
 use super::world::{Hit, World};
 use crate::scene::{Environment, Light, Scene, SpectrumId};
@@ -138,7 +139,7 @@ impl<'a> Tracer<'a> {
             }
 
             let object = &self.scene.objects[self.world.primitives[hit.primitive].object];
-            let bsdf = &self.materials[object.material];
+            let bsdf = &self.materials[object.material.expect("null boundaries are refused")];
             let aim = self.aim(&hit, rng);
             path.spectra.fill(bsdf.spectra());
             if let Some(aim) = &aim {
@@ -146,7 +147,10 @@ impl<'a> Tracer<'a> {
             }
 
             let inside = hit.point.normal.dot(ray.direction) > 0.0;
-            let frame = self.frame(&hit, inside);
+            let geometric = if inside { -hit.point.normal } else { hit.point.normal };
+            let shading = Shading::new(&object.attributes, &self.world.primitives[hit.primitive], &hit.point);
+            path.spectra.look_up(bsdf.textures(), shading.uv);
+            let frame = shading.frame(geometric, inside, -ray.direction);
             let o = frame.transpose() * -ray.direction;
             if o.z <= 0.0 {
                 // Along the surface to the last bit.
@@ -154,7 +158,8 @@ impl<'a> Tracer<'a> {
             }
             let Path { spectra, throughput, alive, radiance, factor, emitted } = &mut *path;
             let Some(scattering) = bsdf.at(Vertex { o, inside, spectra, alive: alive.clone() }) else { return };
-            if let Some(aim) = aim.filter(|aim| self.is_visible(&hit, aim)) {
+            let kept = aim.filter(|aim| shading.keeps_side(geometric, &frame, aim.direction));
+            if let Some(aim) = kept.filter(|aim| self.is_visible(&hit, aim)) {
                 let scattered = scattering.evaluate(frame.transpose() * aim.direction, factor);
                 // The balance heuristic leaves f cosθ over the sum of both densities by solid angle.
                 let weight = aim.density.map_or(1.0, |density| 1.0 / (density + scattered));
@@ -183,15 +188,11 @@ impl<'a> Tracer<'a> {
             }
             ray_density = next.density;
             let direction = (frame * next.direction).normalize();
+            if !shading.keeps_side(geometric, &frame, direction) {
+                return;
+            }
             ray = Ray { origin: self.world.leave(hit.primitive, &hit.point, direction), direction };
         }
-    }
-
-    /// Columns: tangent, bitangent and the normal on the side that the ray came from.
-    fn frame(&self, hit: &Hit, inside: bool) -> DMat3 {
-        let normal = if inside { -hit.point.normal } else { hit.point.normal };
-        let tangent = self.world.primitives[hit.primitive].surface.tangent(&hit.point);
-        DMat3::from_cols(tangent, normal.cross(tangent), normal)
     }
 
     /// Emission of the surface that a ray meets.

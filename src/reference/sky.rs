@@ -169,3 +169,136 @@ impl<'a> Sky<'a> {
         sum
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use glam::{DMat3, DVec3};
+    use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+    use super::*;
+    use crate::reference::lights::{disk_solid_angle, sample_disk};
+    use crate::scene;
+
+    /// Probability that right code fails one of the two tests, each of five configurations.
+    const ALPHA: f64 = 1e-4;
+
+    fn scene(channels: &str) -> Scene {
+        let text = format!(
+            "camera.perspective = {{ position = [0, 0, 5], look_at = [0, 0, 0], fov = 60 }}
+            film = {{ width = 1, height = 1 }}
+            channels.{channels}"
+        );
+        scene::parse(&text, Path::new("t.toml"), &[]).unwrap_or_else(|e| panic!("{e}"))
+    }
+
+    /// p-value of `counts` against probabilities, cells of fewer than 10 expected in one.
+    fn p_value(counts: &[u32], probabilities: &[f64]) -> f64 {
+        let n = f64::from(counts.iter().sum::<u32>());
+        assert!((probabilities.iter().sum::<f64>() - 1.0).abs() < 1e-9, "{}", probabilities.iter().sum::<f64>());
+        let (mut chi2, mut cells, mut few) = (0.0, 0, [0.0; 2]);
+        for (count, probability) in counts.iter().zip(probabilities) {
+            let expected = n * probability;
+            assert!(*count == 0 || expected > 0.0, "chosen where the density is 0");
+            if expected < 10.0 {
+                few = [few[0] + f64::from(*count), few[1] + expected];
+            } else {
+                chi2 += (f64::from(*count) - expected).powi(2) / expected;
+                cells += 1;
+            }
+        }
+        if few[1] > 0.0 {
+            chi2 += (few[0] - few[1]).powi(2) / few[1];
+            cells += 1;
+        }
+        ChiSquared::new(f64::from(cells - 1)).unwrap().sf(chi2)
+    }
+
+    fn sidak(p: f64) {
+        let each = -((-ALPHA).ln_1p() / 5.0).exp_m1();
+        assert!(p >= each, "p = {p:e} < {each:e}");
+    }
+
+    /// Directions of maps against their density, in cells of a quarter of a texel: flat, one bright texel, noise, a single
+    /// column, a single row; turned in five ways; and the density given with a direction is that of the direction.
+    #[test]
+    fn directions_follow_the_map() {
+        let scene = scene("equal = { from = 400, to = 700, count = 3 }");
+        let mut rng = Rng::from_keys(&[1]);
+        for (case, [width, height]) in [[6, 4], [8, 5], [16, 8], [1, 7], [9, 1]].into_iter().enumerate() {
+            let texels = (width * height) as usize;
+            let value = |t: usize| match case {
+                0 => 1.0,
+                1 => {
+                    if t == 19 {
+                        1e4
+                    } else {
+                        0.0
+                    }
+                }
+                _ => (t * t % 17) as f32,
+            };
+            let radiance: Vec<f32> = (0..2 * texels).map(|i| value(i / 2) * (1 + i % 2) as f32).collect();
+            let map = EnvironmentMap {
+                name: "map".into(),
+                to_map: DMat3::from_axis_angle(DVec3::new(1.0, 2.0, -2.0) / 3.0, case as f64),
+                scale: 1.0,
+                size: [width, height],
+                texels: Texels::Spectral { nm: vec![300.0, 800.0], radiance: radiance.into() },
+            };
+            let sky = Sky::new(&scene, &map);
+            let (columns, rows) = (2 * width as usize, 2 * height as usize);
+            let mut counts = vec![0; columns * rows];
+            for _ in 0..40_000 {
+                let (direction, density) = sky.sample(&mut rng);
+                let [u, v] = sky.uv(direction);
+                let index = |t: f64, count: usize| ((t * count as f64) as usize).min(count - 1);
+                counts[index(v, rows) * columns + index(u, columns)] += 1;
+                assert!((direction.length() - 1.0).abs() < 1e-12);
+                // On a texel's edge the neighbour may be found.
+                let near = |t: f64, count: usize| (t * count as f64 - (t * count as f64).round()).abs() < 1e-9;
+                if !near(u, columns) && !near(v, rows) {
+                    assert!((sky.density(direction) / density - 1.0).abs() < 1e-12);
+                }
+            }
+            let probability = |cell: usize| {
+                let [top, bottom] =
+                    [cell / columns, cell / columns + 1].map(|edge| (PI * edge as f64 / rows as f64).cos());
+                let texel = (cell / columns / 2) * width as usize + cell % columns / 2;
+                sky.texel_density(texel) * TAU / columns as f64 * (top - bottom)
+            };
+            sidak(p_value(&counts, &(0..columns * rows).map(probability).collect::<Vec<f64>>()));
+        }
+    }
+
+    /// Directions of suns against the uniform density over their disks: rings of equal solid angle x sectors.
+    #[test]
+    fn directions_fill_the_disk_of_a_sun() {
+        let mut rng = Rng::from_keys(&[2]);
+        for (degrees, axis) in [
+            (0.001f64, DVec3::Z),
+            (0.2665, DVec3::new(1.0, 2.0, 3.0)),
+            (5.0, DVec3::NEG_Y),
+            (45.0, DVec3::new(-1.0, 0.1, 0.0)),
+            (90.0, DVec3::new(0.3, -0.4, -0.5)),
+        ] {
+            let (radius, axis) = (degrees.to_radians(), axis.normalize());
+            const RINGS: usize = 8;
+            const SECTORS: usize = 12;
+            let (s, t) = axis.any_orthonormal_pair();
+            let mut counts = vec![0; RINGS * SECTORS];
+            for _ in 0..40_000 {
+                let d = sample_disk(axis, radius, &mut rng);
+                // 1 - cos by the chord, without cancellation.
+                let share = 0.5 * d.distance_squared(axis) / (2.0 * (0.5 * radius).sin().powi(2));
+                assert!(share <= 1.0 + 1e-9, "{degrees}: {share}");
+                let turn = 0.5 + d.dot(t).atan2(d.dot(s)) / TAU;
+                let ring = ((share * RINGS as f64) as usize).min(RINGS - 1);
+                counts[ring * SECTORS + ((turn * SECTORS as f64) as usize).min(SECTORS - 1)] += 1;
+            }
+            sidak(p_value(&counts, &[1.0 / (RINGS * SECTORS) as f64; RINGS * SECTORS]));
+        }
+        assert!((disk_solid_angle(0.5 * PI) - TAU).abs() < 1e-12);
+    }
+}

@@ -9,6 +9,8 @@ use crate::scene::{Object, Shape};
 pub struct Primitive {
     pub surface: Surface,
     pub object: usize,
+    /// Index into a mesh's triangles; 0 of other shapes.
+    pub triangle: usize,
     /// How far rays start off this surface, in metres: about 4,500 ulp of its largest coordinate, which is well above
     /// the rounding error of a projected point and well below any gap that f64 geometry can mean.
     offset: f64,
@@ -45,10 +47,10 @@ impl World {
     pub fn new(objects: &[Object]) -> Self {
         let mut primitives = Vec::new();
         for (object, item) in objects.iter().enumerate() {
-            for surface in surfaces(&item.shape) {
+            for (triangle, surface) in surfaces(&item.shape) {
                 let [low, high] = surface.bounds();
                 let offset = OFFSET * low.abs().max_element().max(high.abs().max_element());
-                primitives.push(Primitive { surface, object, offset });
+                primitives.push(Primitive { surface, object, triangle, offset });
             }
         }
         let mut order: Vec<usize> = (0..primitives.len()).collect();
@@ -133,19 +135,21 @@ impl Primitive {
     }
 }
 
-fn surfaces(shape: &Shape) -> Vec<Surface> {
+/// Each with the index of its triangle.
+fn surfaces(shape: &Shape) -> Vec<(usize, Surface)> {
     match shape {
         Shape::Mesh(mesh) => {
             let corner = |i: u32| mesh.positions[i as usize];
-            mesh.triangles.iter().filter_map(|t| Surface::triangle(t.map(corner))).collect()
+            let triangle = |(i, t): (usize, &[u32; 3])| Some((i, Surface::triangle(t.map(corner))?));
+            mesh.triangles.iter().enumerate().filter_map(triangle).collect()
         }
-        Shape::Sphere { center, radius } => vec![Surface::Sphere { center: *center, radius: *radius }],
+        Shape::Sphere { center, radius } => vec![(0, Surface::Sphere { center: *center, radius: *radius })],
         Shape::Disk { center, normal, radius } => {
-            vec![Surface::Disk { center: *center, normal: normal.normalize(), radius: *radius }]
+            vec![(0, Surface::Disk { center: *center, normal: normal.normalize(), radius: *radius })]
         }
         Shape::Cylinder { from, to, radius } => {
             let length = (*to - *from).length();
-            vec![Surface::Cylinder { from: *from, axis: (*to - *from) / length, length, radius: *radius }]
+            vec![(0, Surface::Cylinder { from: *from, axis: (*to - *from) / length, length, radius: *radius })]
         }
     }
 }
@@ -197,7 +201,8 @@ mod tests {
     use crate::scene::Mesh;
 
     fn object(shape: Shape) -> Object {
-        Object { name: "test".into(), shape, material: 0, emission: None }
+        let attributes = crate::scene::Attributes::default();
+        Object { name: "test".into(), shape, attributes, material: Some(0), emission: None, interior: None }
     }
 
     fn vector(rng: &mut Rng) -> DVec3 {

@@ -92,6 +92,7 @@ fn render_into(
         profile: false,
         devices: Selection::Count(devices),
         memory: Some(buffer::WGPU_BYTES + (160 << 10)),
+        feed: None,
     };
     let (mut warnings, mut units) = (Vec::new(), 0);
     let result = schedule::run(&job, &Arc::default(), &mut |event| {

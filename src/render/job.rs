@@ -2,10 +2,12 @@
 
 use std::ops::Range;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Duration;
 
 use crate::cube::{Existing, Header, epochs_in, whole_epochs};
 use crate::gpu::adapter::Selection;
+use crate::preview::Feed;
 use crate::render::plan;
 use crate::scene::Scene;
 use crate::{Error, Result, files};
@@ -49,6 +51,8 @@ pub struct Job {
     pub devices: Selection,
     /// Bytes of each device that may be used.
     pub memory: Option<u64>,
+    /// Where the render publishes how far it is, and hears what whoever watches wants.
+    pub feed: Option<Arc<Feed>>,
 }
 
 impl StopRule {

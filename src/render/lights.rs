@@ -1,25 +1,31 @@
 //! Decision probabilities of next-event estimation (DESIGN section 6), common to all channels.
 
 use crate::accel::Accel;
-use crate::scene::{Environment, Scene, Sides};
-use std::f64::consts::PI;
+use crate::scene::{Light, Scene, Sides};
+use crate::spectral::Curve;
 
 /// With which probability next-event estimation asks which light.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct LightPicks {
     /// The environment's probability; multiples of 2⁻²⁴, like the random numbers that decide.
     pub environment: f64,
-    /// Upper ends of the emitters' intervals, which lie above the environment's.
+    /// Upper ends of the emitters' intervals, which lie above the environment's. After the emitters, `lamps`.
     pub cdf: Vec<f32>,
-    /// Probability of each emitter, exactly what the device's choice amounts to.
+    /// Probability of each emitter, then of each lamp, exactly what the device's choice amounts to.
     pub emitters: Vec<f64>,
+    /// Indices into the scene's lights in the order of their intervals: suns last.
+    pub lamps: Vec<usize>,
 }
 
 /// q = ½ mean over channels of a light's share + ½ its normalised largest share over channels, where the share is its
 /// power over the total power in that channel. Channels without power are left out; if none has any, all lights are
-/// equally likely. `accel.emitters` are the lights and, if `environment` says so, the environment.
-pub fn light_picks(scene: &Scene, accel: &Accel, environment: bool) -> LightPicks {
-    // Emitters of one spectrum differ by area only, so shares are worked out per spectrum.
+/// equally likely. `accel.emitters` and the scene's lights are the lights and, with its radiance integrated over the
+/// sphere, the environment.
+pub fn light_picks(scene: &Scene, accel: &Accel, environment: Option<&Curve>) -> LightPicks {
+    let mut lamps: Vec<usize> = (0..scene.lights.len()).collect();
+    lamps.sort_by_key(|&i| matches!(scene.lights[i], Light::Sun { .. }));
+
+    // Emitters of one spectrum differ by area only, so shares are worked out per spectrum. All powers lack a factor π.
     let mut areas = vec![0.0; scene.spectra.len()];
     let emitted = |object: usize| scene.objects[object].emission.as_ref().expect("emitters come from emitting objects");
     let area_of =
@@ -27,38 +33,38 @@ pub fn light_picks(scene: &Scene, accel: &Accel, environment: bool) -> LightPick
     for emitter in &accel.emitters {
         areas[emitted(emitter.1).radiance] += area_of(emitter);
     }
-    let mut groups: Vec<(Option<usize>, f64)> =
-        areas.iter().enumerate().filter(|(_, a)| **a > 0.0).map(|(s, a)| (Some(s), *a)).collect();
-    if environment && scene.environment.is_some() {
-        // The flux of radiance L into the scene's bounding sphere is that of a surface of the sphere's area.
-        groups.push((None, 4.0 * PI * accel.space.radius.powi(2)));
-    }
-    let spectrum = |group: Option<usize>| match (group, &scene.environment) {
-        (Some(s), _) => s,
-        (None, Some(Environment::Uniform(radiance))) => *radiance,
-        (None, _) => unreachable!("only an environment adds a group without emitters"),
-    };
-    let shares = probabilities(
-        &groups
-            .iter()
-            .map(|&(g, area)| {
-                let curve = &scene.spectra[spectrum(g)].curve;
-                scene.channels.bounds.iter().map(|b| area * curve.mean(b[0], b[1])).collect()
-            })
-            .collect::<Vec<Vec<f64>>>(),
-    );
+    let mut groups: Vec<(usize, f64)> = areas.iter().copied().enumerate().filter(|(_, area)| *area > 0.0).collect();
+    let by_spectrum = groups.len();
+    // What comes from afar lights the cross-section of a sphere around everything.
+    let cross_section = accel.space.radius.powi(2);
+    groups.extend(lamps.iter().map(|&i| {
+        let light = &scene.lights[i];
+        let per_value = match light {
+            Light::Point { .. } => 4.0 * accel.space.scale.powi(2),
+            Light::Directional { .. } | Light::Sun { .. } => cross_section,
+        };
+        (light.spectrum(), per_value)
+    }));
+    let spectra = groups.iter().map(|&(spectrum, factor)| (&scene.spectra[spectrum].curve, factor));
+    let powers: Vec<Vec<f64>> = spectra
+        .chain(environment.map(|flux| (flux, cross_section)))
+        .map(|(curve, factor)| scene.channels.bounds.iter().map(|b| factor * curve.mean(b[0], b[1])).collect())
+        .collect();
+    let shares = probabilities(&powers);
 
-    let environment = match groups.last() {
-        Some((None, _)) if accel.emitters.is_empty() => 1.0,
+    let environment = match environment {
+        Some(_) if groups.is_empty() => 1.0,
         // Steps of 2^-24, and never so small or large that a side would never be asked.
-        Some((None, _)) => (shares[groups.len() - 1] * STEPS).round().clamp(1.0, STEPS - 1.0) / STEPS,
-        _ => 0.0,
+        Some(_) => (shares[groups.len()] * STEPS).round().clamp(1.0, STEPS - 1.0) / STEPS,
+        None => 0.0,
     };
-    let share_of =
-        |spectrum: usize| groups.iter().position(|g| g.0 == Some(spectrum)).map_or(0.0, |g| shares[g] / groups[g].1);
-    let weights: Vec<f64> = accel.emitters.iter().map(|e| share_of(emitted(e.1).radiance) * area_of(e)).collect();
+    let share_of = |spectrum: usize| {
+        groups[..by_spectrum].iter().position(|g| g.0 == spectrum).map_or(0.0, |g| shares[g] / groups[g].1)
+    };
+    let weights = accel.emitters.iter().map(|e| share_of(emitted(e.1).radiance) * area_of(e));
+    let weights: Vec<f64> = weights.chain(shares[by_spectrum..groups.len()].iter().copied()).collect();
     let (cdf, emitters) = intervals(environment, &weights);
-    LightPicks { environment, cdf, emitters }
+    LightPicks { environment, cdf, emitters, lamps }
 }
 
 /// Upper ends of the intervals in which a random number chooses each emitter, above the environment's [0, environment),

@@ -3,6 +3,7 @@
 use serde_json::{Map, Value, json};
 
 use crate::cube::{self, BLOCK, Header};
+use crate::files::format_bytes;
 use crate::gpu::upload;
 use crate::render::prepare::{Features, Prepared};
 use crate::render::wave::{Budget, DeviceLimits, WavePlan};
@@ -74,7 +75,7 @@ pub fn feature_lines(prepared: &Prepared, waves: &WavePlan) -> Vec<FeatureLine> 
         line("spheres, disks, cylinders", f.shapes, format!("{}, a test per primitive", module(s::SHAPES))),
         line(
             "next-event estimation",
-            f.emitters || f.environment,
+            f.emitters || f.environment || f.general.is_some_and(|g| g.lamps || g.map.is_some()),
             format!("{}, a shadow ray a bounce", module(s::LIGHT)),
         ),
         line("thin lens", f.thin_lens, "a pair of random numbers a path".into()),
@@ -102,6 +103,30 @@ pub fn feature_lines(prepared: &Prepared, waves: &WavePlan) -> Vec<FeatureLine> 
             f.general.is_some(),
             format!("records of 16 bytes instead of 8; {}", module(s::BSDF)),
         ),
+        line(
+            "textures",
+            f.general.is_some_and(|g| g.textures),
+            format!("{}, a record for each spectrum that a texture mixes", module(s::TEXTURE)),
+        ),
+        line(
+            "texture coordinates and normals",
+            f.general.is_some_and(|g| g.attributes),
+            format!(
+                "{}; {}",
+                module(s::ATTRIBUTES),
+                format_bytes(size_of_val(prepared.accel.attributes.as_slice()) as u64)
+            ),
+        ),
+        line(
+            "point, directional, sun lights",
+            f.general.is_some_and(|g| g.lamps),
+            format!("{}, 32 bytes a light", module(s::LAMP)),
+        ),
+        line(
+            "environment map",
+            f.general.is_some_and(|g| g.map.is_some()),
+            format!("{}, two records a bounce", module(s::MAP)),
+        ),
         line("dispersion", f.general.is_some_and(|g| g.dispersion), "16 bytes a path".into()),
         line(
             "windowed geometry",
@@ -126,10 +151,18 @@ pub fn host_memory(prepared: &Prepared, header: &Header) -> HostMemory {
     let accel = &prepared.accel;
     let scene = size_of_val(accel.nodes.as_slice())
         + size_of_val(accel.primitives.as_slice())
+        + size_of_val(accel.attributes.as_slice())
         + size_of_val(prepared.materials.as_slice())
         + prepared.surfaces.as_ref().map_or(0, |s| {
-            size_of_val(s.materials.as_slice()) + size_of_val(s.parts.as_slice()) + size_of_val(s.tables.as_slice())
+            let textures =
+                s.textures.as_ref().map_or(0, |t| size_of_val(t.words.as_slice()) + size_of_val(t.texels.as_slice()));
+            textures
+                + size_of_val(s.materials.as_slice())
+                + size_of_val(s.parts.as_slice())
+                + size_of_val(s.tables.as_slice())
         })
+        + prepared.sky.as_ref().map_or(0, |s| size_of_val(s.table.as_slice()) + size_of_val(s.texels.as_slice()))
+        + size_of_val(prepared.lamps.as_slice())
         + size_of_val(prepared.emitters.as_slice())
         + size_of_val(prepared.picks.cdf.as_slice())
         + size_of_val(prepared.tables.strata.as_slice())
@@ -149,6 +182,14 @@ pub fn check(scene: &Scene) -> Result<()> {
     let [width, height] = scene.film.cube_size();
     if width == 0 || height == 0 || scene.channels.is_empty() {
         return Err(Error::input(&scene.file, "there is nothing to render: no pixels or no channels"));
+    }
+    if let Some(hot) = scene.materials.iter().find(|m| m.temperature.is_some()) {
+        let message = format!("material \"{}\" has a `temperature`, which cannot be rendered yet: remove it", hot.name);
+        return Err(Error::input(&scene.file, message));
+    }
+    if let Some(medium) = scene.media.first() {
+        let message = format!("medium \"{}\" fills something, which cannot be rendered yet: remove it", medium.name);
+        return Err(Error::input(&scene.file, message));
     }
     Ok(())
 }

@@ -3,11 +3,11 @@
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{self, Sender};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, OnceLock, Weak};
 use std::thread;
 use std::time::Instant;
 
-use crate::cube::{Writer, epoch_samples, merge_means, samples_before};
+use crate::cube::{Look, Writer, epoch_samples, merge_means, samples_before};
 use crate::files::format_bytes;
 use crate::gpu::adapter::Gpu;
 use crate::gpu::buffer::{self, WARM_UP};
@@ -15,6 +15,7 @@ use crate::gpu::buffer::{self, WARM_UP};
 use crate::gpu::fault::Phase;
 use crate::gpu::layout::Counters;
 use crate::gpu::self_test;
+use crate::preview::Source;
 use crate::render::prepare::Prepared;
 use crate::render::queue::{Group, Next, Queue};
 use crate::render::watch::{Device, Reports};
@@ -35,6 +36,15 @@ pub struct Pool {
     pub memory: Option<u64>,
     pub profile: bool,
     pub interrupt: Arc<Interrupt>,
+}
+
+/// The cube of a render, for whoever watches: no longer than the render needs it.
+impl Source for Weak<Pool> {
+    fn look(&self, look: &mut dyn FnMut(Look<'_>)) -> bool {
+        let pool = self.upgrade();
+        let cube = pool.as_ref().and_then(|pool| pool.cube.get());
+        cube.map(|cube| look(cube.look())).is_some()
+    }
 }
 
 /// What a device tells the thread that decides.

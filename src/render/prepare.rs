@@ -1,16 +1,23 @@
 //! What this scene needs on a device, and nothing else: features, spectra, materials, lights and geometry, flat.
 
 use crate::accel::{Accel, MAX_MATERIALS};
-use crate::gpu::layout::{EMITS_BOTH_SIDES, Emitter, Frame, Material, NONE};
+use crate::gpu::layout::{
+    EMITS_BOTH_SIDES, EMITTER_IS_LAMP, Emitter, Frame, LAMP_DIRECTIONAL, LAMP_POINT, LAMP_SUN, Lamp, Material, NONE,
+};
 use crate::gpu::self_test::LOOP_LIMIT;
 use crate::gpu::shader::{self, Defines, Module};
 use crate::render::integration::Integration;
 use crate::render::lights::{LightPicks, STEPS, light_picks};
+use crate::render::sky::SkyMap;
 use crate::render::surfaces::{Kind, Needed, Surfaces};
-use crate::scene::{Bsdf, Environment, Filter, Light, Projection, Sampler, Scene, Sides};
+use crate::scene::{
+    Attributes, Bsdf, Environment, Filter, Light, Projection, Reflectance, Sampler, Scene, Sides, Texels,
+};
 use crate::spectral::Curve;
-use crate::spectral::table::{SpectralTables, Tabulated};
+use crate::spectral::table::{Exactness, SpectralTables, Tabulated};
 use crate::{Error, Result};
+use glam::DVec3;
+use std::f64::consts::PI;
 
 /// Spectra that may be held in registers while a pixel is evaluated; with more, each is looked up where it is needed.
 const MAX_REGISTER_SPECTRA: usize = 8;
@@ -52,16 +59,54 @@ pub struct General {
     pub dispersion: bool,
     /// Rough refraction that bends each channel by itself.
     pub spread: bool,
+    /// Textures of any kind; which of them, and of what, the rest says.
+    pub textures: bool,
+    pub textured: bool,
+    pub textured_base: bool,
+    pub colours: bool,
+    pub mixtures: bool,
+    /// Blends with a texture for weight.
+    pub shares: bool,
+    /// Texture coordinates, normals or axes on surfaces.
+    pub attributes: bool,
+    /// Shading normals.
+    pub smooth: bool,
+    /// Lights without a surface, and how many of them are suns.
+    pub lamps: bool,
+    pub suns: u32,
+    pub map: Option<Map>,
+}
+
+/// An environment map, as shaders are composed for it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Map {
+    pub size: [u32; 2],
+    /// Of a spectral one.
+    pub bands: Option<u32>,
+    /// Ids of the spectra that tell a wavelength's place, and that multiply all texels.
+    pub axis: u32,
+    pub source: u32,
 }
 
 impl General {
-    fn of(surfaces: &Surfaces) -> General {
+    fn of(surfaces: &Surfaces, scene: &Scene) -> General {
+        let textures = surfaces.textures.as_ref();
+        let carries = |f: &dyn Fn(&Attributes) -> bool| scene.objects.iter().any(|object| f(&object.attributes));
         General {
+            textures: textures.is_some(),
+            textured: surfaces.textured,
+            textured_base: surfaces.textured_base,
+            colours: textures.is_some_and(|t| t.colours),
+            mixtures: textures.is_some_and(|t| t.mixtures),
+            shares: textures.is_some_and(|t| t.first_share.is_some()),
+            attributes: carries(&|attributes| *attributes != Attributes::default()),
+            smooth: carries(&|attributes| attributes.normals.is_some()),
             kinds: surfaces.kinds,
             rough_base: surfaces.rough_base,
             anisotropic: surfaces.anisotropic,
             dispersion: surfaces.dispersion,
             spread: surfaces.spread,
+            ..General::default()
         }
     }
 
@@ -77,7 +122,11 @@ pub struct Prepared {
     pub materials: Vec<Material>,
     /// In general scenes, instead of `materials`.
     pub surfaces: Option<Surfaces>,
+    /// Emitting primitives, then lamps.
     pub emitters: Vec<Emitter>,
+    pub lamps: Vec<Lamp>,
+    /// The environment, where it is a map.
+    pub sky: Option<SkyMap>,
     pub picks: LightPicks,
     pub accel: Accel,
     pub tables: SpectralTables,
@@ -107,15 +156,26 @@ impl Prepared {
 
     /// `scene` in the channels that the device renders.
     fn flatten(scene: &Scene, seed: u64, integration: Option<Integration>) -> Result<Prepared> {
-        check_lights(scene)?;
         let accel = Accel::build(scene);
         if scene.materials.len() > MAX_MATERIALS {
             return Err(Error::input(&scene.file, format!("more than {MAX_MATERIALS} materials")));
         }
-        let general = scene.materials.iter().any(|m| !matches!(m.bsdf, Bsdf::Diffuse { .. } | Bsdf::Black));
+        let sky = scene.environment.as_ref().and_then(|e| e.map()).map(|map| SkyMap::new(scene, map));
+        let carries = scene.objects.iter().any(|object| object.attributes != Attributes::default());
+        let general = scene.materials.iter().any(|m| !matches!(m.bsdf, Bsdf::Diffuse { .. } | Bsdf::Black))
+            || carries
+            || !scene.textures.is_empty()
+            || !scene.lights.is_empty()
+            || sky.is_some();
         let mut surfaces = general.then(|| Surfaces::new(scene));
+        let axis = surfaces.as_mut().zip(sky.as_ref()).map(|(surfaces, sky)| {
+            surfaces.spectra.push(Needed::Exact("places in the environment map".into(), sky.axis.clone()));
+            surfaces.spectra.len() - 1
+        });
         // General scenes meet a uniform environment by sampling the BSDF, and do not aim at it.
-        let picks = light_picks(scene, &accel, !general);
+        let uniform = scene.environment.as_ref().and_then(|e| e.uniform()).filter(|_| !general);
+        let uniform = uniform.map(|radiance| scene.spectra[radiance].curve.scaled(4.0 * PI));
+        let picks = light_picks(scene, &accel, uniform.as_ref().or(sky.as_ref().map(|sky| &sky.flux)));
         let weights = integration.as_ref().map(|integration| integration.weights.as_slice());
         let (tables, ids) = spectral_tables(scene, surfaces.as_ref().map_or(&[], |s| &s.spectra), weights)?;
         if let Some(surfaces) = &mut surfaces {
@@ -128,6 +188,13 @@ impl Prepared {
             None => scene.materials.iter().map(|m| material(scene, m, factor)).collect(),
             Some(_) => Vec::new(),
         };
+        let map = sky.as_ref().zip(axis).map(|(sky, axis)| Map {
+            size: sky.size,
+            bands: sky.bands,
+            axis: tables.ids[ids.needed[axis]],
+            source: scene.environment.as_ref().and_then(daylight).map_or(0, source),
+        });
+        let (lamps, lamp_emitters) = lamps(scene, &accel, &picks, source);
         let emitters = accel
             .emitters
             .iter()
@@ -137,10 +204,13 @@ impl Prepared {
                 let sides = if emission.sides == Sides::Both { EMITS_BOTH_SIDES } else { 0 };
                 Emitter { primitive, spectrum: source(emission.radiance) | sides, pick: pick as f32, area: area as f32 }
             })
+            .chain(lamp_emitters)
             .collect();
         let environment_spectrum = scene.environment.as_ref().and_then(|e| e.uniform()).map_or(0, source);
         let mut features = features(scene, &accel, &tables, ids.factors.len() + ids.sources.len());
-        features.general = surfaces.as_ref().map(General::of);
+        let suns = scene.lights.iter().filter(|light| matches!(light, Light::Sun { .. })).count() as u32;
+        let of = |surfaces: &Surfaces| General { lamps: !lamps.is_empty(), suns, map, ..General::of(surfaces, scene) };
+        features.general = surfaces.as_ref().map(of);
         features.registers &= !general && integration.is_none();
         let frame = frame(scene, seed, &accel, &picks, environment_spectrum, tables.stratum_bits);
         let max_records = max_records(&frame, features, surfaces.as_ref());
@@ -158,6 +228,8 @@ impl Prepared {
             materials,
             surfaces,
             emitters,
+            lamps,
+            sky,
             picks,
             spectrum_names: ids.names,
             factors: ids.factors.len(),
@@ -213,13 +285,25 @@ impl Prepared {
             modules.push(shader::SHAPES);
         }
         modules.push(shader::BVH);
-        if self.features.emitters || self.features.environment {
+        if self.features.emitters || self.features.environment || self.features.general.is_some() {
             modules.push(shader::LIGHT);
         }
         let Some(general) = &self.features.general else {
             modules.push(shader::GENERATE_BOUNCE);
             return modules;
         };
+        if general.attributes {
+            modules.push(shader::ATTRIBUTES);
+        }
+        if general.textures {
+            modules.push(shader::TEXTURE);
+        }
+        if general.lamps {
+            modules.push(shader::LAMP);
+        }
+        if general.map.is_some() {
+            modules.push(shader::MAP);
+        }
         modules.extend([shader::RECORD, shader::TABLES, shader::MATERIAL, shader::GGX, shader::BSDF]);
         if general.anisotropic {
             modules.push(shader::TANGENT);
@@ -243,6 +327,9 @@ impl Prepared {
             modules.push(shader::RECORD);
             if general.has(&[Kind::BoundaryAgain]) || general.rough_base {
                 modules.push(shader::TABLES);
+            }
+            if general.map.is_some() {
+                modules.push(shader::MAP_VALUE);
             }
             modules.push(shader::PROGRAM);
         }
@@ -275,6 +362,30 @@ impl Prepared {
         }
         d.set("ROUGH_BASE", general.rough_base).set("OP_ETA_TABLE", rough_glass || general.rough_base);
         d.set("OP_ONLY", general.dispersion);
+        d.set("TEXTURES", general.textures).set("TEXTURED", general.textured).set("KEPT", general.textured_base);
+        d.set("COLOURS", general.colours).set("MIXTURES", general.mixtures).set("SHARES", general.shares);
+        d.set("TEXEL_NUMBERS", general.mixtures || general.shares);
+        d.set("ATTRIBUTES", general.attributes).set("SMOOTH", general.smooth);
+        if let Some(surfaces) = &self.surfaces {
+            if let Some(first) = surfaces.textures.as_ref().and_then(|textures| textures.first_share) {
+                d.constant("FIRST_SHARE", first);
+            }
+            if let Some(place) = surfaces.visible_place {
+                d.constant("VISIBLE_PLACE", place);
+            }
+        }
+        let chooses = self.features.emitters || general.lamps;
+        d.set("CHOOSES", chooses).set("AIMS", chooses || general.map.is_some()).set("LAMPS", general.lamps);
+        if general.suns > 0 {
+            d.constant("SUNS", general.suns);
+        }
+        if let Some(map) = general.map {
+            d.set("MAP", true).set("OP_MAP", true).constant("MAP_SOURCE", map.source);
+            d.constant("MAP_AXIS", map.axis).constant("MAP_WIDTH", map.size[0]).constant("MAP_HEIGHT", map.size[1]);
+            if let Some(bands) = map.bands {
+                d.set("MAP_SPECTRAL", true).constant("MAP_BANDS", bands);
+            }
+        }
         d.set("OP_ROUGH_TRANSMIT", general.spread).set("RAW_RECORDS", general.spread);
     }
 
@@ -395,19 +506,39 @@ struct SpectrumIds {
     names: Vec<String>,
 }
 
-/// Scenes may have lights that the devices do not know yet.
-fn check_lights(scene: &Scene) -> Result<()> {
-    let kind = match (scene.lights.first(), &scene.environment) {
-        (Some(Light::Point { .. }), _) => "a point light",
-        (Some(Light::Directional { .. }), _) => "a directional light",
-        (Some(Light::Sun { .. }), _) => "a sun",
-        (None, Some(Environment::Map(_))) => "an environment map",
-        _ => return Ok(()),
+/// The scene's lights as the device has them, and their places among the emitters.
+fn lamps(scene: &Scene, accel: &Accel, picks: &LightPicks, source: impl Fn(usize) -> u32) -> (Vec<Lamp>, Vec<Emitter>) {
+    let lamp = |(index, (&light, &pick)): (usize, (&usize, &f64))| {
+        let light = &scene.lights[light];
+        let place = |towards: DVec3| towards.as_vec3().to_array();
+        let (lamp, factor) = match *light {
+            Light::Point { position, .. } => {
+                let lamp = Lamp { place: accel.space.point(position), kind: LAMP_POINT, ..Lamp::default() };
+                (lamp, accel.space.scale.powi(2))
+            }
+            Light::Directional { direction, .. } => {
+                (Lamp { place: place(-direction), kind: LAMP_DIRECTIONAL, ..Lamp::default() }, 1.0)
+            }
+            Light::Sun { direction, angular_radius, .. } => {
+                let (sine, half) = (angular_radius.sin(), (0.5 * angular_radius).sin());
+                let (sine2, versine) = ((sine * sine) as f32, (2.0 * half * half) as f32);
+                // The irradiance facing a disk of unit radiance is π sin².
+                let factor = 1.0 / (PI * sine * sine);
+                (Lamp { place: place(-direction), kind: LAMP_SUN, sine2, versine, ..Lamp::default() }, factor)
+            }
+        };
+        let spectrum = source(light.spectrum()) | EMITTER_IS_LAMP;
+        (lamp, Emitter { primitive: index as u32, spectrum, pick: pick as f32, area: factor as f32 })
     };
-    Err(Error::input(
-        &scene.file,
-        format!("{kind} cannot be rendered yet: use emitting surfaces or a uniform environment"),
-    ))
+    picks.lamps.iter().zip(&picks.emitters[accel.emitters.len()..]).enumerate().map(lamp).unzip()
+}
+
+/// The spectrum that multiplies all texels of a map of colours.
+fn daylight(environment: &Environment) -> Option<usize> {
+    match &environment.map()?.texels {
+        Texels::Rgb { daylight, .. } => Some(*daylight),
+        Texels::Spectral { .. } => None,
+    }
 }
 
 /// Tables of the constant 1, of what multiplies throughput, then of what emits; the weights of responses, per channel, last.
@@ -419,11 +550,12 @@ fn spectral_tables(
     // General scenes have all of theirs among those needed.
     let plain = if needed.is_empty() { &scene.materials[..] } else { &[] };
     let factors = plain.iter().filter_map(|m| match m.bsdf {
-        Bsdf::Diffuse { reflectance } => Some(reflectance),
+        Bsdf::Diffuse { reflectance: Reflectance::Spectrum(reflectance) } => Some(reflectance),
         _ => None,
     });
     let sources = scene.objects.iter().filter_map(|o| o.emission.as_ref().map(|e| e.radiance));
-    let sources = sources.chain(scene.environment.as_ref().and_then(|e| e.uniform()));
+    let sources = sources.chain(scene.environment.as_ref().and_then(|e| e.uniform().or(daylight(e))));
+    let sources = sources.chain(scene.lights.iter().map(|light| light.spectrum()));
     let mut curves = vec![&Curve::Constant(1.0)];
     let mut names = vec!["1".to_owned()];
     let mut number = |list: std::collections::BTreeSet<usize>| -> std::collections::BTreeMap<usize, usize> {
@@ -437,10 +569,19 @@ fn spectral_tables(
     };
     let (factors, sources) = (number(factors.collect()), number(sources.collect()));
     let first = curves.len();
+    let mut exactness = Vec::new();
     for spectrum in needed {
         let (name, curve) = match spectrum {
             Needed::Scene(id) => (&scene.spectra[*id].name, &scene.spectra[*id].curve),
             Needed::Derived(name, curve) => (name, curve),
+            Needed::Pointwise(name, curve) => {
+                exactness.push((curves.len(), Exactness::Pointwise));
+                (name, curve)
+            }
+            Needed::Exact(name, curve) => {
+                exactness.push((curves.len(), Exactness::Exact));
+                (name, curve)
+            }
         };
         curves.push(curve);
         names.push(name.clone());
@@ -458,12 +599,15 @@ fn spectral_tables(
             format!("{} spectra in use, at most {MAX_SPECTRA} are supported", curves.len()),
         ));
     }
-    Ok((SpectralTables::build(&curves, &scene.channels), SpectrumIds { factors, sources, needed, response, names }))
+    Ok((
+        SpectralTables::with_exactness(&curves, &exactness, &scene.channels),
+        SpectrumIds { factors, sources, needed, response, names },
+    ))
 }
 
 fn material(scene: &Scene, m: &crate::scene::Material, factor: impl Fn(usize) -> u32) -> Material {
     let (factor, albedo) = match m.bsdf {
-        Bsdf::Diffuse { reflectance } => {
+        Bsdf::Diffuse { reflectance: Reflectance::Spectrum(reflectance) } => {
             let curve = &scene.spectra[reflectance].curve;
             let albedo = scene.channels.bounds.iter().map(|b| curve.max(b[0], b[1])).fold(0.0, f64::max);
             // What reflects in no channel is black.
@@ -482,7 +626,7 @@ fn features(scene: &Scene, accel: &Accel, tables: &SpectralTables, spectra: usiz
         gaussian: scene.film.filter == Filter::Gaussian,
         independent: scene.integrator.sampler == Sampler::Independent,
         emitters: !accel.emitters.is_empty(),
-        environment: scene.environment.is_some(),
+        environment: scene.environment.as_ref().is_some_and(|e| e.uniform().is_some()),
         shapes: accel.has_shapes,
         roulette: scene.integrator.russian_roulette_start > 0,
         strata: tables.stratum_bits > 0,
@@ -495,8 +639,12 @@ fn features(scene: &Scene, accel: &Accel, tables: &SpectralTables, spectra: usiz
 /// Most records of a path: at every scattering event what materials take, and emission where a surface or the sky emits.
 fn max_records(frame: &Frame, features: Features, surfaces: Option<&Surfaces>) -> u32 {
     let bounces = frame.max_bounces;
-    let emission = if features.emitters { bounces + 1 } else { 1 };
-    emission.saturating_add(bounces.saturating_mul(surfaces.map_or(1, |s| s.vertex_records)))
+    let general = features.general.unwrap_or_default();
+    // Where a path leaves the scene: the environment, and suns that may cover one another.
+    let emission = if features.emitters { bounces + 1 } else { 1 } + general.suns;
+    // A direction in a map is an instruction of its own, and parts a diffuse vertex in two.
+    let aimed = if general.map.is_some() { 2 } else { 0 };
+    emission.saturating_add(bounces.saturating_mul(surfaces.map_or(1, |s| s.vertex_records) + aimed))
 }
 
 fn frame(
@@ -529,7 +677,7 @@ fn frame(
         film_size: [scene.film.width as f32, scene.film.height as f32],
         max_bounces: bounces,
         roulette_start: scene.integrator.russian_roulette_start,
-        emitter_count: accel.emitters.len() as u32,
+        emitter_count: (accel.emitters.len() + picks.lamps.len()) as u32,
         environment_pick: picks.environment as f32,
         environment_spectrum,
         max_records: 0,

@@ -3,6 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::{Condvar, Mutex, MutexGuard};
 
+use crate::preview::Work;
+
 /// Units that a device takes together: those of some tiles in one epoch, or in all epochs from the first one on that are
 /// merged at once.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -40,6 +42,7 @@ struct State {
     allowed: u32,
     /// Epochs that a new tile gets at once.
     together: u32,
+    paused: bool,
     closed: bool,
     /// Attempts so far, and those under way: who took what.
     attempts: u64,
@@ -65,6 +68,7 @@ impl Default for Queue {
             undecided: Vec::new(),
             allowed: 0,
             together: 1,
+            paused: false,
             closed: false,
             attempts: 0,
             taken: BTreeMap::new(),
@@ -93,6 +97,9 @@ impl Queue {
         if state.closed || state.expelled.contains(&device) {
             return Next::Never;
         }
+        if state.paused {
+            return Next::Later;
+        }
         let Some(&(epoch, _)) = state.ready.front() else { return Next::Later };
         let epochs = if epoch == 0 { state.together } else { 1 };
         let at_once = at_once(epoch + epochs - 1).max(1);
@@ -116,7 +123,7 @@ impl Queue {
 
     /// Waits until [`Queue::next`] would have another answer than `Later`.
     pub fn wait(&self) {
-        let waiting = |state: &mut State| !state.closed && state.ready.is_empty();
+        let waiting = |state: &mut State| !state.closed && (state.paused || state.ready.is_empty());
         drop(self.changed.wait_while(self.state(), waiting).unwrap_or_else(|e| e.into_inner()));
     }
 
@@ -162,6 +169,19 @@ impl Queue {
         now.sort_unstable();
         state.ready.extend(now);
         state.undecided = later;
+        self.changed.notify_all();
+    }
+
+    /// What devices have taken and not merged.
+    pub fn under_way(&self) -> Vec<Work> {
+        let state = self.state();
+        let taken = state.taken.values();
+        taken.map(|(device, group)| Work { device: *device, epoch: group.epoch, tiles: group.tiles.clone() }).collect()
+    }
+
+    /// While paused nobody gets another unit; what is under way goes on.
+    pub fn pause(&self, paused: bool) {
+        self.state().paused = paused;
         self.changed.notify_all();
     }
 
@@ -238,6 +258,26 @@ mod tests {
         assert_eq!((&again.tiles[..], again.attempt > second.attempt), (&[1, 3][..], true));
         assert_eq!(queue.next(1, |_| 9), Next::Later);
         assert!(!queue.claim(&second) && queue.claim(&again) && !queue.claim(&again));
+    }
+
+    #[test]
+    fn nobody_gets_anything_during_a_pause() {
+        let queue = Queue::default();
+        queue.fill([(0, 0)], 1);
+        queue.allow(1);
+        queue.pause(true);
+        assert_eq!(queue.next(0, |_| 1), Next::Later);
+        std::thread::scope(|threads| {
+            let waiting = threads.spawn(|| queue.wait());
+            std::thread::sleep(std::time::Duration::from_millis(20));
+            assert!(!waiting.is_finished());
+            queue.pause(false);
+        });
+        assert_eq!(units(queue.next(0, |_| 1)), (0, vec![0]));
+        queue.pause(true);
+        queue.close();
+        queue.wait();
+        assert_eq!(queue.next(0, |_| 1), Next::Never);
     }
 
     /// Tiles of which something is there already go on from there; only new ones get epochs together.

@@ -1,15 +1,14 @@
 //! The render: epochs of the whole image, decided one after the other; devices that pull their units; what is known so far.
 
 use std::collections::{BTreeMap, VecDeque};
-use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, OnceLock};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use serde_json::json;
+use serde_json::{Value, json};
 
-use crate::cube::{Writer, check_target, epoch_samples, epochs_in, reduction, samples_before};
+use crate::cube::{Run, RunFile, Writer, check_target, epoch_samples, epochs_in, reduction, samples_before};
 use crate::gpu::adapter::Gpu;
 use crate::render::job::Job;
 use crate::render::plan;
@@ -49,6 +48,7 @@ pub struct Status {
 #[derive(Debug, Clone, PartialEq)]
 pub struct DeviceStatus {
     pub name: String,
+    pub paths: u64,
     /// Units that it has rendered, of all epochs.
     pub units: u64,
     /// Seconds in which it had work, and had not.
@@ -63,6 +63,8 @@ pub enum Event<'a> {
     Epoch(&'a Status),
     /// Somebody has asked, and what is merged is on disk.
     Asked(&'a Status),
+    /// Whoever watches has made the render rest, or go on.
+    Rests(bool),
     Warning(String),
 }
 
@@ -122,7 +124,7 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
     let names = gpus.iter().map(|gpu| gpu.name.clone()).collect();
     let mut render = Render::new(job, names, samples_limit, interrupt, started);
     let mut reports = pool.start(gpus)?;
-    let mut committer = None;
+    let (mut committer, mut run) = (None, None);
     let result = render.wait_for_devices(&mut reports, observe).and_then(|()| {
         check_interrupt(interrupt)?;
         // Only now is anything written: whatever can be refused has been.
@@ -130,7 +132,12 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
         let opened = Writer::open(&job.output, &header, job.existing, tiles, &mut |what| warnings.push(what));
         warnings.into_iter().try_for_each(|what| observe(Event::Warning(what)))?;
         let opened = opened?;
+        run = Some(RunFile::create(opened.cube().path(), Run::begin(&opened.tiles(), samples_limit))?);
         let cube = pool.cube.get_or_init(|| opened);
+        if let Some(feed) = &job.feed {
+            let there = cube.tiles().zip(cube.found()).filter(|(_, samples)| **samples > 0).map(|(tile, _)| tile);
+            feed.opened(Arc::new(Arc::downgrade(&pool)), cube.cube().grid().count(), there);
+        }
         let commits = Arc::clone(&pool);
         // What goes wrong there is what the next unit, or the last commit, ends with.
         committer = Some(thread::spawn(move || commits.cube.get().map(Writer::commit_regularly)));
@@ -151,7 +158,8 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
     }
     let flushed = cube.flush();
     let preview = render.write_preview(cube);
-    let facts = render.write_run_facts(cube);
+    let ended = result.as_ref().and(flushed.as_ref()).copied();
+    let facts = run.map_or(Ok(()), |run| render.write_run_facts(run, ended));
     let warned = render.report_counters(observe);
     result?;
     flushed?;
@@ -185,6 +193,9 @@ struct Render<'a> {
     device_bytes: u64,
     profile: Option<Profile>,
     status: Status,
+    /// Since when the render rests, and how long it has before.
+    resting: Option<Instant>,
+    rested: Duration,
     /// Devices that have not left.
     active: usize,
     /// Units merged of the current epoch and of those after it.
@@ -207,7 +218,7 @@ impl<'a> Render<'a> {
         started: Instant,
     ) -> Self {
         let devices: Vec<_> =
-            names.into_iter().map(|name| DeviceStatus { name, units: 0, busy_s: 0.0, idle_s: 0.0 }).collect();
+            names.into_iter().map(|name| DeviceStatus { name, paths: 0, units: 0, busy_s: 0.0, idle_s: 0.0 }).collect();
         Render {
             job,
             interrupt,
@@ -218,6 +229,8 @@ impl<'a> Render<'a> {
             merge_s: 0.0,
             device_bytes: 0,
             profile: None,
+            resting: None,
+            rested: Duration::ZERO,
             active: devices.len(),
             status: Status {
                 samples: 0,
@@ -288,6 +301,25 @@ impl<'a> Render<'a> {
         Ok(())
     }
 
+    /// Rests, or goes on, as whoever watches has asked.
+    fn rest_if_asked(&mut self, queue: &Queue, observe: &mut dyn FnMut(Event) -> Result<()>) -> Result<()> {
+        let Some(feed) = &self.job.feed else { return Ok(()) };
+        let rests = feed.is_pause_wanted();
+        if rests == self.resting.is_some() {
+            return Ok(());
+        }
+        queue.pause(rests);
+        self.rested = self.rested();
+        self.resting = rests.then(Instant::now);
+        feed.rests(rests);
+        observe(Event::Rests(rests))
+    }
+
+    /// How long the render has rested, which counts neither as time of rendering nor towards `--time`.
+    fn rested(&self) -> Duration {
+        self.rested + self.resting.map_or(Duration::ZERO, |since| since.elapsed())
+    }
+
     /// Counts what the cube holds already, and fills the queue with what is missing. Returns the first epoch that is.
     fn go_on(&mut self, cube: &Writer, queue: &Queue) -> u32 {
         let (full, grid) = (cube.cube().header().epoch, cube.cube().grid());
@@ -327,7 +359,7 @@ impl<'a> Render<'a> {
             if self.samples_limit.is_some_and(|limit| self.status.samples >= limit) || self.too_late(n) {
                 return Ok(());
             }
-            let (began, there) = (Instant::now(), self.merged.front().copied().unwrap_or(0));
+            let (began, rested, there) = (Instant::now(), self.rested(), self.merged.front().copied().unwrap_or(0));
             queue.allow(self.decided(epoch));
             self.status.samples_next =
                 self.status.samples.checked_add(n).ok_or_else(|| {
@@ -336,8 +368,11 @@ impl<'a> Render<'a> {
             self.status.units.0 = there;
             while self.status.units.0 < self.status.units.1 {
                 self.answer(cube, observe)?;
+                self.rest_if_asked(queue, observe)?;
                 match self.hear(reports)? {
-                    Some((device, Report::Merged(merged))) => self.note_merged(cube, epoch, device, merged, observe)?,
+                    Some((device, Report::Merged(merged))) => {
+                        self.note_merged(cube, queue, epoch, device, merged, observe)?
+                    }
                     Some((device, report)) => self.left(device, report, observe)?,
                     None => {}
                 }
@@ -346,8 +381,12 @@ impl<'a> Render<'a> {
             self.status.samples += n;
             // Of an epoch that was partly there before, as if all of it had been rendered now.
             let whole = f64::from(self.status.units.1) / f64::from((self.status.units.1 - there).max(1));
-            self.last_epoch = Some((n, began.elapsed().as_secs_f64() * whole));
+            let seconds = began.elapsed().saturating_sub(self.rested() - rested).as_secs_f64();
+            self.last_epoch = Some((n, seconds * whole));
             self.update_estimate(cube);
+            if let Some(feed) = &self.job.feed {
+                feed.epoch(&self.status);
+            }
             observe(Event::Epoch(&self.status))?;
         }
         unreachable!("epochs go on until a stop rule ends them")
@@ -361,7 +400,7 @@ impl<'a> Render<'a> {
     }
 
     fn rendering_s(&self) -> f64 {
-        self.started.elapsed().as_secs_f64() - self.setup_s
+        (self.started.elapsed() - self.rested()).as_secs_f64() - self.setup_s
     }
 
     /// Whether an epoch of `n` samples would not fit into the time that is left, at the pace of the last one: the first ones
@@ -370,7 +409,8 @@ impl<'a> Render<'a> {
         let Some(limit) = self.job.stop.time else { return false };
         let predicted = self.last_epoch.map_or(0.0, |(samples, seconds)| seconds / f64::from(samples) * f64::from(n));
         // A render always begins; one that is gone on with need not.
-        self.status.samples > 0 && self.started.elapsed().as_secs_f64() + predicted > limit.as_secs_f64()
+        self.status.samples > 0
+            && (self.started.elapsed() - self.rested()).as_secs_f64() + predicted > limit.as_secs_f64()
     }
 
     /// A device has left. The others go on without it, if it was lost and there are others.
@@ -395,6 +435,7 @@ impl<'a> Render<'a> {
     fn note_merged(
         &mut self,
         cube: &Writer,
+        queue: &Queue,
         current: u32,
         device: usize,
         merged: Merged,
@@ -409,13 +450,17 @@ impl<'a> Render<'a> {
         self.status.units.0 = self.merged[0];
         self.count(&merged);
         self.update_clock();
-        let rendering_s = self.status.rendering_s;
+        let (rendering_s, rested) = (self.status.rendering_s, self.rested().as_secs_f64());
         let of_device = &mut self.status.devices[device];
         of_device.units += merged.group.tiles.len() as u64 * u64::from(merged.group.epochs);
+        of_device.paths += merged.paths;
         of_device.idle_s = merged.idle_s;
-        of_device.busy_s = rendering_s - merged.idle_s;
+        of_device.busy_s = rendering_s + rested - merged.idle_s;
         if self.next_preview.is_none_or(|next| next <= Instant::now()) {
             self.write_preview(cube)?;
+        }
+        if let Some(feed) = &self.job.feed {
+            feed.merged(&merged.group.tiles, &self.status, queue.under_way());
         }
         observe(Event::Progress(&self.status))
     }
@@ -451,7 +496,8 @@ impl<'a> Render<'a> {
     /// Time until the last epoch ends, from the paths still to trace.
     fn remaining(&self) -> Option<Duration> {
         let left = self.paths_needed.map(|paths| self.rendering_s() * (paths / self.status.paths.max(1) as f64 - 1.0));
-        let until = self.job.stop.time.map(|limit| limit.as_secs_f64() - self.status.elapsed.as_secs_f64());
+        let spent = self.status.elapsed.saturating_sub(self.rested());
+        let until = self.job.stop.time.map(|limit| limit.as_secs_f64() - spent.as_secs_f64());
         let seconds = [left, until].into_iter().flatten().reduce(f64::min)?;
         Duration::try_from_secs_f64(seconds.max(0.0)).ok()
     }
@@ -475,7 +521,7 @@ impl<'a> Render<'a> {
     }
 
     /// Facts about this process, which are not part of what the cube is.
-    fn write_run_facts(&self, cube: &Writer) -> Result<()> {
+    fn write_run_facts(&self, mut file: RunFile, ended: std::result::Result<(), &Error>) -> Result<()> {
         let devices =
             self.status.devices.iter().map(|d| json!({ "name": d.name, "units": d.units, "idle_seconds": d.idle_s }));
         let facts = json!({
@@ -490,9 +536,12 @@ impl<'a> Render<'a> {
             "negative_samples": self.tally.negative,
             "version": env!("CARGO_PKG_VERSION"),
         });
-        let folder = cube.cube().path().join(".spectile");
-        let file: &Path = &folder.join(format!("run-{}.json", files::random_suffix()));
-        files::write_atomically(file, format!("{facts:#}\n").as_bytes())
+        if let Value::Object(facts) = facts {
+            file.run.facts = facts;
+        }
+        file.run.units = self.status.devices.iter().map(|d| d.units).sum();
+        file.run.end(ended);
+        file.write()
     }
 
     /// Bad samples are bugs, never silent.

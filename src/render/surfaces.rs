@@ -7,9 +7,10 @@ use glam::DVec3;
 
 use crate::gpu::layout::{MATERIAL_DIFFUSE, MATERIAL_TRANSMITS, Part, SurfaceMaterial};
 use crate::render::lights::STEPS;
+use crate::render::textures::{self, Share, Textures};
 use crate::scattering::fresnel::{self, mean_conductor, mean_dielectric};
 use crate::scattering::{DielectricAlbedo, ReflectionAlbedo, ReflectionProbability, index_range};
-use crate::scene::{Bsdf, MaterialId, SMOOTH, Scene, SpectrumId};
+use crate::scene::{Bsdf, MaterialId, Reflectance, SMOOTH, Scene, SpectrumId, Texture, TextureKind, Weight};
 use crate::spectral::Curve;
 
 /// What a part is: the `KIND_…` of `shaders/common/material.wgsl`.
@@ -33,6 +34,7 @@ const OPAQUE: u32 = 0x100;
 const TWO_SIDED: u32 = 0x200;
 const DISPERSES: u32 = 0x400;
 const NARROW: u32 = 0x800;
+const TEXTURED: u32 = 0x1000;
 
 /// Intervals of the device's tables over the cosine.
 const INTERVALS: usize = 256;
@@ -46,6 +48,10 @@ const MATCHED: f64 = 1e-4;
 pub enum Needed {
     Scene(SpectrumId),
     Derived(String, Curve),
+    /// Within the tables' bound of every value, not of each channel's peak.
+    Pointwise(String, Curve),
+    /// As `Derived`, and not to be approximated: it is a place in a table.
+    Exact(String, Curve),
 }
 
 /// The materials of a scene, flat. Spectra of parts are positions in `spectra` until [`Surfaces::name_spectra`].
@@ -63,6 +69,15 @@ pub struct Surfaces {
     pub dispersion: bool,
     /// Some rough boundary bends each channel by itself.
     pub spread: bool,
+    /// Where any material has some.
+    pub textures: Option<Textures>,
+    /// Some reflectance is a texture; of a coated base.
+    pub textured: bool,
+    pub textured_base: bool,
+    /// Where textures are colours: the spectrum that says where in the visible a wavelength is.
+    pub visible_place: Option<u32>,
+    /// What blend textures leave of each part.
+    shares: Vec<Vec<Share>>,
     /// Most records of a scattering event.
     pub vertex_records: u32,
     albedos: BTreeMap<[u64; 3], Arc<DielectricAlbedo>>,
@@ -77,6 +92,8 @@ struct Leaf {
     /// Whether it scatters what comes from before, from behind.
     active: [bool; 2],
     albedo: Albedo,
+    /// What blend textures leave of it.
+    shares: Vec<Share>,
     /// Records that one evaluation takes; 0 for the only directions of mirrors and ideal refraction.
     records: u32,
 }
@@ -87,10 +104,23 @@ impl Surfaces {
         let mut surfaces = Surfaces::default();
         for material in 0..scene.materials.len() {
             let mut leaves = Vec::new();
-            surfaces.collect(scene, material, 1.0, &mut leaves);
+            surfaces.collect(scene, material, 1.0, &[], &mut leaves);
             surfaces.add(scene, leaves);
         }
+        if !scene.textures.is_empty() {
+            let mut textures = Textures::new(scene, |spectrum| surfaces.spectrum(spectrum));
+            textures.add_shares(&surfaces.shares);
+            if textures.colours {
+                let place = surfaces.derived("place in the visible".to_owned(), textures::visible_place());
+                surfaces.visible_place = Some(place);
+            }
+            surfaces.textures = Some(textures);
+        }
         surfaces.albedos.clear();
+        // Where nothing scatters, shaders still bind a part.
+        if surfaces.parts.is_empty() {
+            surfaces.parts.push(Part::default());
+        }
         surfaces
     }
 
@@ -102,9 +132,18 @@ impl Surfaces {
     pub fn name_spectra(&mut self, id: impl Fn(usize) -> u32) {
         let both = |word: u32| id((word & 0xffff) as usize) | id((word >> 16) as usize) << 16;
         let low = |word: u32| id((word & 0xffff) as usize) | word & 0xffff_0000;
+        self.visible_place = self.visible_place.map(|position| id(position as usize));
+        if let Some(textures) = &mut self.textures {
+            textures.name_spectra(&id);
+        }
         for part in &mut self.parts {
             match part.kind & 0xff {
+                // A texture has its own.
+                k if k == Kind::Lambert as u32 && part.kind & TEXTURED != 0 => {}
                 k if k == Kind::Conductor as u32 || k == Kind::RoughConductor as u32 => part.ab = both(part.ab),
+                k if k == Kind::Base as u32 && part.kind & TEXTURED != 0 => {
+                    (part.ab, part.cd) = (low(part.ab), both(part.cd));
+                }
                 k if k == Kind::Base as u32 => (part.ab, part.cd) = (low(part.ab), low(part.cd)),
                 k if k == Kind::BoundaryAgain as u32 || k == Kind::BeyondAgain as u32 => {
                     (part.ab, part.cd) = (low(part.ab), both(part.cd));
@@ -134,7 +173,8 @@ impl Surfaces {
             }
         }
         let diffuse = leaves.len() == 1 && leaves[0].part.kind & 0xff == Kind::Lambert as u32 && leaves[0].active[0];
-        let diffuse = diffuse && leaves[0].part.weight == 1.0;
+        let diffuse = diffuse && leaves[0].part.weight == 1.0 && leaves[0].part.kind & TEXTURED == 0;
+        let diffuse = diffuse && leaves[0].shares.is_empty();
         let transmits = leaves.iter().any(|leaf| leaf.part.kind & OPAQUE == 0);
         self.materials.push(SurfaceMaterial {
             first_part: self.parts.len() as u32,
@@ -148,11 +188,12 @@ impl Surfaces {
             self.kinds |= 1 << (leaf.part.kind & 0xff);
             let picks = self.table(&picks);
             self.parts.push(Part { picks, ..leaf.part });
+            self.shares.push(leaf.shares);
         }
     }
 
     /// The leaves of `material` with their shares of `weight`.
-    fn collect(&mut self, scene: &Scene, material: MaterialId, weight: f64, out: &mut Vec<Leaf>) {
+    fn collect(&mut self, scene: &Scene, material: MaterialId, weight: f64, shares: &[Share], out: &mut Vec<Leaf>) {
         if weight == 0.0 {
             return;
         }
@@ -177,14 +218,20 @@ impl Surfaces {
                 let rough = (roughness >= SMOOTH).then_some(roughness);
                 (true, self.plastic(scene, &description.name, reflectance, eta, rough))
             }
-            Bsdf::Blend { a, b, weight: of_b } => {
-                self.collect(scene, a, weight * (1.0 - of_b), out);
-                return self.collect(scene, b, weight * of_b, out);
+            Bsdf::Blend { a, b, weight: Weight::Constant(of_b) } => {
+                self.collect(scene, a, weight * (1.0 - of_b), shares, out);
+                return self.collect(scene, b, weight * of_b, shares, out);
+            }
+            Bsdf::Blend { a, b, weight: Weight::Texture(texture) } => {
+                let with = |missing| [shares, &[(texture, missing)]].concat();
+                self.collect(scene, a, weight, &with(true), out);
+                return self.collect(scene, b, weight, &with(false), out);
             }
         };
         let two_sided = description.two_sided;
         for mut leaf in leaves {
             leaf.part.weight = weight as f32;
+            leaf.shares = shares.to_vec();
             leaf.part.kind |= if opaque { OPAQUE } else { 0 } | if two_sided { TWO_SIDED } else { 0 };
             leaf.active = [true, !opaque || two_sided];
             if opaque {
@@ -196,14 +243,24 @@ impl Surfaces {
         }
     }
 
-    fn diffuse(&mut self, scene: &Scene, reflectance: SpectrumId) -> Vec<Leaf> {
-        let means = channel_means(scene, reflectance);
+    fn diffuse(&mut self, scene: &Scene, reflectance: Reflectance) -> Vec<Leaf> {
+        let means = match reflectance {
+            Reflectance::Spectrum(spectrum) => channel_means(scene, spectrum),
+            Reflectance::Texture(texture) => textures::bound(scene, &scene.textures[texture]),
+        };
         // What reflects in no channel is black.
         if means.iter().all(|m| *m <= 0.0) {
             return Vec::new();
         }
-        let part = Part { ab: self.spectrum(reflectance), ..part(Kind::Lambert) };
-        vec![leaf(part, 1, move |_, _, k| means[k])]
+        let (part, records) = match reflectance {
+            Reflectance::Spectrum(spectrum) => (Part { ab: self.spectrum(spectrum), ..part(Kind::Lambert) }, 1),
+            Reflectance::Texture(texture) => {
+                self.textured = true;
+                let part = Part { kind: Kind::Lambert as u32 | TEXTURED, loss: texture as u32, ..Part::default() };
+                (part, texture_records(&scene.textures[texture]))
+            }
+        };
+        vec![leaf(part, records, move |_, _, k| means[k])]
     }
 
     fn conductor(
@@ -338,14 +395,14 @@ impl Surfaces {
         &mut self,
         scene: &Scene,
         name: &str,
-        reflectance: SpectrumId,
+        reflectance: Reflectance,
         eta: SpectrumId,
         roughness: Option<f64>,
     ) -> Vec<Leaf> {
-        let curves = [reflectance, eta].map(|s| &scene.spectra[s].curve);
+        let of_index = &scene.spectra[eta].curve;
         let n = channel_means(scene, eta);
         let id = self.spectrum(eta);
-        let rough = roughness.map(|alpha| self.dielectric_albedo(alpha, index_range(curves[1], &scene.channels)));
+        let rough = roughness.map(|alpha| self.dielectric_albedo(alpha, index_range(of_index, &scene.channels)));
         let table = rough.clone();
         let mean_reflected = move |eta: f64| match &table {
             None => mean_dielectric(eta),
@@ -357,16 +414,34 @@ impl Surfaces {
             let leaves = mean / (v[1] * v[1]);
             v[0] * leaves / (1.0 - v[0] * (1.0 - leaves)) / mean
         };
-        let inner = Curve::derived(&curves, &scene.channels, inner);
-        let base_means = means_of(scene, &inner);
-        let cd = self.derived(format!("{name}, base"), inner);
+        let (cd, base_means, textured, records) = match reflectance {
+            Reflectance::Spectrum(spectrum) => {
+                let curve = Curve::derived(&[&scene.spectra[spectrum].curve, of_index], &scene.channels, inner);
+                let means = means_of(scene, &curve);
+                (self.derived(format!("{name}, base"), curve), means, Part::default(), 3)
+            }
+            Reflectance::Texture(id) => {
+                (self.textured, self.textured_base) = (true, true);
+                let bound = textures::bound(scene, &scene.textures[id]);
+                let means = bound.iter().zip(&n).map(|(rho, eta)| inner(&[*rho, *eta])).collect();
+                // What the coat sends back to the base, and τ over the mean transmittance.
+                let back = |v: &[f64]| 1.0 - (1.0 - mean_reflected(v[0])) / (v[0] * v[0]);
+                let back = Curve::derived(&[of_index], &scene.channels, back);
+                let square = Curve::derived(&[of_index], &scene.channels, |v| (v[0] * v[0]).recip());
+                let back = self.derived(format!("{name}, back to the base"), back);
+                let square = self.derived(format!("{name}, out of the base"), square);
+                let part = Part { kind: TEXTURED, loss: id as u32, ..Part::default() };
+                (back | square << 16, means, part, texture_records(&scene.textures[id]) + 4)
+            }
+        };
         let alpha = [roughness.unwrap_or(0.0) as f32; 2];
         // Seen from outside nothing is totally reflected, whatever the index.
         let coat_kind = if roughness.is_some() { Kind::RoughCoat } else { Kind::Mirror };
         let coat = Part { kind: coat_kind as u32 | DISPERSES, ab: id, alpha, eta: 1.0, ..Part::default() };
         let number = rough.as_ref().map_or(0, |table| self.eta_table(table));
         self.rough_base |= rough.is_some();
-        let base = Part { ab: id | number << 16, cd, alpha, ..part(Kind::Base) };
+        let kind = Kind::Base as u32 | textured.kind;
+        let base = Part { kind, ab: id | number << 16, cd, alpha, ..textured };
         let mean: Vec<f64> = n.iter().map(|&eta| 1.0 - mean_reflected(eta)).collect();
         let reflected = Arc::new(move |cosine: f64, k: usize| match &rough {
             None => fresnel::dielectric(cosine, n[k]),
@@ -375,7 +450,7 @@ impl Surfaces {
         let of_coat = Arc::clone(&reflected);
         vec![
             leaf(coat, u32::from(roughness.is_some()), move |_, cosine, k| of_coat(cosine, k)),
-            leaf(base, 3, move |_, cosine, k| (1.0 - reflected(cosine, k)) * base_means[k] * mean[k]),
+            leaf(base, records, move |_, cosine, k| (1.0 - reflected(cosine, k)) * base_means[k] * mean[k]),
         ]
     }
 
@@ -416,6 +491,15 @@ impl Surfaces {
     }
 }
 
+/// Most records that a textured reflectance takes.
+fn texture_records(texture: &Texture) -> u32 {
+    match &texture.kind {
+        TextureKind::Colour => 4,
+        TextureKind::Mixture(endmembers) => endmembers.len() as u32,
+        TextureKind::Number => unreachable!("numbers are no reflectance"),
+    }
+}
+
 /// The index of a boundary.
 struct Index {
     /// Behind over before; what all channels bend by, or the mean of those they bend by.
@@ -444,7 +528,7 @@ fn part(kind: Kind) -> Part {
 }
 
 fn leaf(part: Part, records: u32, albedo: impl Fn(bool, f64, usize) -> f64 + 'static) -> Leaf {
-    Leaf { part, active: [true; 2], albedo: Box::new(albedo), records }
+    Leaf { part, active: [true; 2], albedo: Box::new(albedo), shares: Vec::new(), records }
 }
 
 /// The mean of `curve` over each channel.

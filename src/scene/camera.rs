@@ -9,11 +9,19 @@ use super::{Camera, Film, Filter, Projection};
 /// Pixels along one side: pixel numbers of the full film fit u32.
 const MAX_SIDE: u32 = 65_535;
 const FILM: Keys = Keys::new(&["width", "height", "filter", "crop"]);
-const PERSPECTIVE: Keys = Keys::new(&["position", "look_at", "up", "flip_x", "fov", "fov_axis"]).later(&["medium"]);
-const THIN_LENS: Keys =
-    Keys::new(&["position", "look_at", "up", "flip_x", "fov", "fov_axis", "aperture_radius", "focus_distance"])
-        .later(&["medium"]);
-const ORTHOGRAPHIC: Keys = Keys::new(&["position", "look_at", "up", "flip_x", "width"]).later(&["medium"]);
+const PERSPECTIVE: Keys = Keys::new(&["position", "look_at", "up", "flip_x", "medium", "fov", "fov_axis"]);
+const THIN_LENS: Keys = Keys::new(&[
+    "position",
+    "look_at",
+    "up",
+    "flip_x",
+    "medium",
+    "fov",
+    "fov_axis",
+    "aperture_radius",
+    "focus_distance",
+]);
+const ORTHOGRAPHIC: Keys = Keys::new(&["position", "look_at", "up", "flip_x", "medium", "width"]);
 
 pub fn decode_film(item: &Item) -> Option<Film> {
     let fields = item.table(FILM)?;
@@ -44,6 +52,11 @@ fn decode_crop(item: &Item, width: u32, height: u32) -> Option<[u32; 4]> {
         return None;
     }
     Some(crop)
+}
+
+/// Where the camera names the medium that fills space, if it does.
+pub fn medium<'a>(item: &Item<'a>) -> Option<Item<'a>> {
+    CAMERAS.iter().find_map(|kind| item.member(kind))?.member("medium")
 }
 
 /// `film` gives the shape of the picture; without it (it was wrong) only mistakes are looked for.

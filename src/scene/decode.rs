@@ -190,6 +190,12 @@ impl<'a> Item<'a> {
         unit
     }
 
+    /// The value of `key`, if this is a table that has it.
+    pub fn member(&self, key: &str) -> Option<Item<'a>> {
+        let Value::Table(entries) = &self.node.value else { return None };
+        entries.iter().find(|e| e.key == key).map(|e| child(self.cx, &self.path, e))
+    }
+
     /// The table, with unknown keys reported and keys of later versions refused by name.
     pub fn table(&self, keys: Keys) -> Option<Fields<'a>> {
         let Value::Table(entries) = &self.node.value else {
@@ -206,11 +212,6 @@ impl<'a> Item<'a> {
             return self.wrong_kind("a table");
         };
         Some(entries.iter().map(|e| (e.key.as_str(), child(self.cx, &self.path, e))).collect())
-    }
-
-    /// Refuses a value that the contract has and this version has not.
-    pub fn not_supported_yet(&self) {
-        self.error_help(format!("`{}` is not supported yet", self.path), "remove it, or use a later version");
     }
 }
 

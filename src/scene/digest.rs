@@ -4,7 +4,8 @@ use glam::DVec3;
 use sha2::{Digest, Sha256};
 
 use super::{
-    Bsdf, Environment, EnvironmentMap, Filter, Light, Projection, Sampler, Scene, Shape, Sides, Texels, Wavelengths,
+    Attributes, Bsdf, Environment, EnvironmentMap, Field, Filter, Light, Medium, Projection, Reflectance, Sampler,
+    Scene, Shape, Sides, Texels, TextureKind, Wavelengths, Weight,
 };
 use crate::spectral::{Curve, Outside};
 
@@ -19,9 +20,13 @@ pub fn digest(scene: &Scene) -> String {
     hash.count(scene.materials.len());
     for material in &scene.materials {
         match material.bsdf {
-            Bsdf::Diffuse { reflectance } => {
+            Bsdf::Diffuse { reflectance: Reflectance::Spectrum(spectrum) } => {
                 hash.tag(0);
-                hash.count(reflectance);
+                hash.count(spectrum);
+            }
+            Bsdf::Diffuse { reflectance: Reflectance::Texture(texture) } => {
+                hash.tag(6);
+                hash.count(texture);
             }
             Bsdf::Black => hash.tag(1),
             Bsdf::Conductor { eta, k, roughness, energy_compensation } => {
@@ -38,24 +43,43 @@ pub fn digest(scene: &Scene) -> String {
                 hash.number(roughness);
             }
             Bsdf::Plastic { reflectance, eta, roughness } => {
-                hash.tag(4);
-                hash.count(reflectance);
+                match reflectance {
+                    Reflectance::Spectrum(spectrum) => {
+                        hash.tag(4);
+                        hash.count(spectrum);
+                    }
+                    Reflectance::Texture(texture) => {
+                        hash.tag(7);
+                        hash.count(texture);
+                    }
+                }
                 hash.count(eta);
                 hash.number(roughness);
             }
             Bsdf::Blend { a, b, weight } => {
-                hash.tag(5);
+                match weight {
+                    Weight::Constant(weight) => {
+                        hash.tag(5);
+                        hash.number(weight);
+                    }
+                    Weight::Texture(texture) => {
+                        hash.tag(8);
+                        hash.count(texture);
+                    }
+                }
                 hash.count(a);
                 hash.count(b);
-                hash.number(weight);
             }
         }
         hash.tag(u8::from(material.two_sided));
+        hash.option(material.temperature, Hash::number);
     }
+    hash.textures(scene);
     hash.count(scene.objects.len());
     for object in &scene.objects {
+        hash.attributes(&object.attributes);
         hash.shape(&object.shape);
-        hash.count(object.material);
+        hash.option(object.material, Hash::count);
         match &object.emission {
             None => hash.tag(0),
             Some(emission) => {
@@ -66,7 +90,15 @@ pub fn digest(scene: &Scene) -> String {
                 hash.count(emission.radiance);
             }
         }
+        hash.option(object.interior, |hash, interior| {
+            hash.count(interior.body);
+            hash.count(interior.medium);
+            hash.numbers(&interior.to_grid.to_cols_array());
+        });
     }
+    hash.count(scene.media.len());
+    scene.media.iter().for_each(|medium| hash.medium(medium));
+    hash.option(scene.camera_medium, Hash::count);
     match &scene.environment {
         None => hash.tag(0),
         Some(Environment::Uniform(radiance)) => {
@@ -110,6 +142,41 @@ impl Hash {
     fn text(&mut self, text: &str) {
         self.count(text.len());
         self.0.update(text);
+    }
+
+    fn option<T>(&mut self, value: Option<T>, some: impl FnOnce(&mut Self, T)) {
+        self.tag(u8::from(value.is_some()));
+        if let Some(value) = value {
+            some(self, value);
+        }
+    }
+
+    fn medium(&mut self, medium: &Medium) {
+        self.count(medium.absorbers.len());
+        for absorber in &medium.absorbers {
+            self.number(absorber.strength);
+            self.count(absorber.columns.len());
+            for (kelvin, spectrum) in &absorber.columns {
+                self.number(*kelvin);
+                self.count(*spectrum);
+            }
+        }
+        self.option(medium.temperature.as_ref(), Hash::field);
+        self.field(&medium.density);
+    }
+
+    fn field(&mut self, field: &Field) {
+        match field {
+            Field::Constant(value) => {
+                self.tag(0);
+                self.number(*value);
+            }
+            Field::Grid(grid) => {
+                self.tag(1);
+                grid.size.iter().for_each(|n| self.count(*n as usize));
+                grid.values.iter().for_each(|value| self.0.update(value.to_bits().to_le_bytes()));
+            }
+        }
     }
 
     /// Camera, film, channels and integrator.
@@ -187,6 +254,45 @@ impl Hash {
                 self.tag(3);
                 self.numbers(&[*kelvin, *scale]);
             }
+        }
+    }
+
+    fn textures(&mut self, scene: &Scene) {
+        if scene.textures.is_empty() {
+            return;
+        }
+        self.text("textures");
+        self.count(scene.textures.len());
+        for texture in &scene.textures {
+            match &texture.kind {
+                TextureKind::Colour => self.tag(0),
+                TextureKind::Mixture(endmembers) => {
+                    self.tag(1);
+                    self.count(endmembers.len());
+                    endmembers.iter().for_each(|spectrum| self.count(*spectrum));
+                }
+                TextureKind::Number => self.tag(2),
+            }
+            texture.size.iter().for_each(|size| self.count(*size as usize));
+            texture.texels.iter().for_each(|texel| self.0.update(texel.to_bits().to_le_bytes()));
+        }
+    }
+
+    /// Tags that no shape has, before the shape; nothing where there are none.
+    fn attributes(&mut self, attributes: &Attributes) {
+        if let Some(uv) = &attributes.uv {
+            self.tag(100);
+            self.count(uv.len());
+            self.numbers(uv.iter().flatten().flat_map(|uv| [&uv.x, &uv.y]));
+        }
+        if let Some(normals) = &attributes.normals {
+            self.tag(101);
+            self.count(normals.len());
+            normals.iter().flatten().for_each(|normal| self.vector(*normal));
+        }
+        if let Some(axes) = &attributes.axes {
+            self.tag(102);
+            self.numbers(&axes.to_cols_array());
         }
     }
 

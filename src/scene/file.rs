@@ -10,6 +10,7 @@ use super::digest::digest;
 use super::environment;
 use super::light;
 use super::material::Materials;
+use super::medium::Media;
 use super::object::Objects;
 use super::overrides;
 use super::spectrum::Spectra;
@@ -112,14 +113,17 @@ fn decode<'a>(cx: &'a Context<'a>, root: &'a [Entry]) -> Option<Scene> {
 
     let mut spectra = Spectra::new(cx, top.get("spectra"), channels.clone());
     let mut materials = Materials::new(top.get("materials"), &mut spectra);
-    let mut objects = Objects::new(&mut spectra, &mut materials);
+    let mut media = Media::new(top.get("media"), &mut spectra);
+    let mut objects = Objects::new(&mut spectra, &mut materials, &mut media);
     if let Some(items) = top.get("objects").and_then(|item| item.array()) {
         items.iter().for_each(|item| objects.add(item));
     }
     let objects = objects.finish();
+    let (materials, textures) = materials.finish();
+    let outer = top.get("camera").and_then(|item| camera::medium(&item));
+    let camera_medium = outer.map(|item| media.take_outer(&item, &mut spectra));
     let lights = light::decode_lights(top.get("lights"), &mut spectra);
     let environment = top.get("environment").map(|item| environment::decode(&item, &mut spectra));
-    refuse_media(top.get("media"));
 
     Some(Scene {
         file: PathBuf::new(),
@@ -127,9 +131,15 @@ fn decode<'a>(cx: &'a Context<'a>, root: &'a [Entry]) -> Option<Scene> {
         film: film?,
         channels: channels?,
         integrator: integrator?,
-        materials: materials.finish(),
+        materials,
+        textures,
         spectra: spectra.finish(),
         objects,
+        media: media.finish(),
+        camera_medium: match camera_medium {
+            Some(medium) => Some(medium?),
+            None => None,
+        },
         lights,
         environment: match environment {
             Some(environment) => Some(environment?),
@@ -210,11 +220,4 @@ fn choice_or_later<T: Copy>(item: &Item, now: &[(&str, T)], later: &[&str]) -> O
         return None;
     }
     item.choice(now)
-}
-
-/// `[media]` come with a later version.
-fn refuse_media(item: Option<Item>) {
-    for (_, medium) in item.and_then(|item| item.named_items()).unwrap_or_default() {
-        medium.not_supported_yet();
-    }
 }

@@ -4,34 +4,65 @@ use super::blend::{Parts, check_blends};
 use super::decode::{Fields, Item, Keys, did_you_mean, list};
 use super::overrides::MATERIAL_KINDS;
 use super::spectrum::{Handle, Quantity, Spectra};
+use super::texture::{self, Number, Textures, is_texture};
 use super::tree::Value;
-use super::{Bsdf, Material, MaterialId, SMOOTH};
+use super::{Bsdf, Material, MaterialId, Reflectance, SMOOTH, Texture, Weight};
 
 const KINDS: Keys = Keys::new(&MATERIAL_KINDS);
-const DIFFUSE: Keys = Keys::new(&["reflectance", "two_sided"]).later(&["temperature"]);
-const CONDUCTOR: Keys =
-    Keys::new(&["nk", "eta", "k", "roughness", "energy_compensation", "two_sided"]).later(&["temperature"]);
-const DIELECTRIC: Keys = Keys::new(&["eta", "dispersion", "roughness"]).later(&["temperature"]);
-const PLASTIC: Keys = Keys::new(&["reflectance", "eta", "roughness", "two_sided"]).later(&["temperature"]);
-const BLEND: Keys = Keys::new(&["a", "b", "weight"]).later(&["temperature"]);
-const BLACK: Keys = Keys::new(&["two_sided"]).later(&["temperature"]);
+const DIFFUSE: Keys = Keys::new(&["reflectance", "two_sided", "temperature"]);
+const CONDUCTOR: Keys = Keys::new(&["nk", "eta", "k", "roughness", "energy_compensation", "two_sided", "temperature"]);
+const DIELECTRIC: Keys = Keys::new(&["eta", "dispersion", "roughness", "temperature"]);
+const PLASTIC: Keys = Keys::new(&["reflectance", "eta", "roughness", "two_sided", "temperature"]);
+const BLEND: Keys = Keys::new(&["a", "b", "weight", "temperature"]);
+const BLACK: Keys = Keys::new(&["two_sided", "temperature"]);
+/// K. The peak of Planck's radiance there is 4e33 W m⁻² sr⁻¹ nm⁻¹, near the end of f32.
+const HOTTEST: f64 = 1e9;
 
 const REFLECTANCE: &str = "reflectance = 0.5, or the name of a spectrum";
 const ETA: &str = "eta = 1.5, or the name of a spectrum";
 
+/// Why something cannot have a temperature.
+const TRANSPARENT: &str = "absorbs nothing, so it emits nothing and has no temperature";
+
 /// A material as the file defines it.
 pub enum Kind<'a> {
-    Diffuse { reflectance: Handle },
+    Diffuse { reflectance: Reflects },
     Conductor { eta: Handle, k: Handle, roughness: [f64; 2], energy_compensation: bool },
     Dielectric { eta: Handle, dispersion: bool, roughness: f64 },
-    Plastic { reflectance: Handle, eta: Handle, roughness: f64 },
-    Blend { parts: Parts<'a>, weight: f64 },
+    Plastic { reflectance: Reflects, eta: Handle, roughness: f64 },
+    Blend { parts: Parts<'a>, weight: Share },
     Black,
+}
+
+/// A reflectance, the same all over or textured.
+#[derive(Clone, Copy)]
+pub enum Reflects {
+    Spectrum(Handle),
+    Texture(texture::Handle),
+}
+
+/// The share of a blend's second part.
+#[derive(Clone, Copy)]
+pub enum Share {
+    Constant(f64),
+    Texture(texture::Handle),
+}
+
+/// What a material asks of the surfaces that have it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Needs {
+    /// Texture coordinates.
+    pub uv: bool,
+    /// A direction on the surface: the look depends on how it is turned about its normal.
+    pub tangent: bool,
+    /// The normal that light sees; nothing on black.
+    pub normal: bool,
 }
 
 pub struct Declared<'a> {
     pub kind: Kind<'a>,
     two_sided: bool,
+    temperature: Option<f64>,
     taken: Option<MaterialId>,
 }
 
@@ -41,15 +72,18 @@ pub struct Materials<'a> {
     declared: Vec<(&'a str, Option<Declared<'a>>)>,
     /// In the order of their first use, parts before their blend.
     scene: Vec<Material>,
+    textures: Textures,
 }
 
 impl<'a> Materials<'a> {
     pub fn new(item: Option<Item<'a>>, spectra: &mut Spectra<'a>) -> Self {
-        let items = item.and_then(|item| item.named_items()).unwrap_or_default();
-        let declared = items.iter().map(|(name, item)| (*name, decode(item, spectra))).collect();
-        let mut materials = Materials { declared, scene: Vec::new() };
+        let items = item.as_ref().and_then(|item| item.named_items()).unwrap_or_default();
+        let mut textures = Textures::default();
+        let declared = items.iter().map(|(name, item)| (*name, decode(item, spectra, &mut textures))).collect();
+        let mut materials = Materials { declared, scene: Vec::new(), textures };
         materials.look_up_parts();
         check_blends(&mut materials.declared);
+        materials.check_temperatures(item.as_ref());
         materials
     }
 
@@ -84,9 +118,9 @@ impl<'a> Materials<'a> {
         if let Some(id) = declared.taken {
             return Some(id);
         }
-        let (name, two_sided) = ((*name).to_owned(), declared.two_sided);
+        let (name, two_sided, temperature) = ((*name).to_owned(), declared.two_sided, declared.temperature);
         let bsdf = match declared.kind {
-            Kind::Diffuse { reflectance } => Bsdf::Diffuse { reflectance: spectra.take(reflectance) },
+            Kind::Diffuse { reflectance } => Bsdf::Diffuse { reflectance: self.take_reflectance(reflectance, spectra) },
             Kind::Conductor { eta, k, roughness, energy_compensation } => {
                 Bsdf::Conductor { eta: spectra.take(eta), k: spectra.take(k), roughness, energy_compensation }
             }
@@ -94,16 +128,21 @@ impl<'a> Materials<'a> {
                 Bsdf::Dielectric { eta: spectra.take(eta), dispersion, roughness }
             }
             Kind::Plastic { reflectance, eta, roughness } => {
-                Bsdf::Plastic { reflectance: spectra.take(reflectance), eta: spectra.take(eta), roughness }
+                let reflectance = self.take_reflectance(reflectance, spectra);
+                Bsdf::Plastic { reflectance, eta: spectra.take(eta), roughness }
             }
             Kind::Blend { ref parts, weight } => {
                 let [a, b] = parts.indices?;
+                let weight = match weight {
+                    Share::Constant(weight) => Weight::Constant(weight),
+                    Share::Texture(handle) => Weight::Texture(self.textures.take(handle, spectra)),
+                };
                 let (a, b) = (self.take_declared(a, spectra), self.take_declared(b, spectra));
                 Bsdf::Blend { a: a?, b: b?, weight }
             }
             Kind::Black => Bsdf::Black,
         };
-        self.scene.push(Material { name, bsdf, two_sided });
+        self.scene.push(Material { name, bsdf, two_sided, temperature });
         let id = self.scene.len() - 1;
         if let Some(declared) = &mut self.declared[index].1 {
             declared.taken = Some(id);
@@ -111,22 +150,66 @@ impl<'a> Materials<'a> {
         Some(id)
     }
 
+    fn take_reflectance(&mut self, reflectance: Reflects, spectra: &mut Spectra) -> Reflectance {
+        match reflectance {
+            Reflects::Spectrum(handle) => Reflectance::Spectrum(spectra.take(handle)),
+            Reflects::Texture(handle) => Reflectance::Texture(self.textures.take(handle, spectra)),
+        }
+    }
+
     /// The name of a material of the scene.
     pub fn name(&self, id: MaterialId) -> &str {
         &self.scene[id].name
     }
 
-    /// Whether the look of a material of the scene depends on how the surface is turned about its normal.
-    pub fn is_anisotropic(&self, id: MaterialId) -> bool {
+    /// What a material of the scene asks of its surfaces.
+    pub fn needs(&self, id: MaterialId) -> Needs {
+        let textured =
+            |reflectance| Needs { uv: matches!(reflectance, Reflectance::Texture(_)), tangent: false, normal: true };
         match self.scene[id].bsdf {
-            Bsdf::Conductor { roughness: [x, y], .. } => x != y,
-            Bsdf::Blend { a, b, .. } => self.is_anisotropic(a) || self.is_anisotropic(b),
-            _ => false,
+            Bsdf::Diffuse { reflectance } | Bsdf::Plastic { reflectance, .. } => textured(reflectance),
+            Bsdf::Conductor { roughness: [x, y], .. } => Needs { uv: false, tangent: x != y, normal: true },
+            Bsdf::Dielectric { .. } => Needs { uv: false, tangent: false, normal: true },
+            Bsdf::Blend { a, b, weight } => {
+                let (a, b) = (self.needs(a), self.needs(b));
+                Needs {
+                    uv: a.uv || b.uv || matches!(weight, Weight::Texture(_)),
+                    tangent: a.tangent || b.tangent,
+                    normal: a.normal || b.normal,
+                }
+            }
+            Bsdf::Black => Needs::default(),
         }
     }
 
-    pub fn finish(self) -> Vec<Material> {
-        self.scene
+    pub fn finish(self) -> (Vec<Material>, Vec<Texture>) {
+        (self.scene, self.textures.finish())
+    }
+
+    /// Reports blends with a temperature of which no part can be hot, and leaves `None` in their place.
+    fn check_temperatures(&mut self, item: Option<&Item<'a>>) {
+        for i in 0..self.declared.len() {
+            let (name, Some(declared)) = &self.declared[i] else { continue };
+            if declared.temperature.is_none() || self.absorbs(i) {
+                continue;
+            }
+            let blend = item.and_then(|item| item.member(name)?.member("blend")?.member("temperature"));
+            if let Some(item) = blend {
+                item.error_help(format!("all that \"{name}\" blends {TRANSPARENT}"), "remove it");
+            }
+            self.declared[i].1 = None;
+        }
+    }
+
+    /// Whether some part absorbs, or is not known to absorb nothing.
+    fn absorbs(&self, index: usize) -> bool {
+        match self.declared[index].1.as_ref().map(|d| &d.kind) {
+            Some(Kind::Dielectric { .. }) => false,
+            Some(Kind::Blend { parts: Parts { indices: Some(indices), .. }, .. }) => {
+                indices.iter().any(|&part| self.absorbs(part))
+            }
+            _ => true,
+        }
     }
 
     /// The parts of every blend, by name; a name that does not exist is reported.
@@ -152,13 +235,13 @@ impl<'a> Materials<'a> {
     }
 }
 
-fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Declared<'a>> {
+fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>, textures: &mut Textures) -> Option<Declared<'a>> {
     let fields = item.table(KINDS)?;
     let kind = fields.exactly_one(&MATERIAL_KINDS, "kind of material")?;
     let (fields, kind) = match kind.path.rsplit('.').next() {
         Some("diffuse") => {
             let fields = kind.table(DIFFUSE)?;
-            let reflectance = spectrum(&fields, "reflectance", REFLECTANCE, Quantity::Reflectance, spectra);
+            let reflectance = reflects(&fields, spectra, textures);
             (fields, reflectance.map(|reflectance| Kind::Diffuse { reflectance }))
         }
         Some("conductor") => {
@@ -170,15 +253,23 @@ fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Declared<'a>
             let fields = kind.table(DIELECTRIC)?;
             let eta = spectrum(&fields, "eta", ETA, Quantity::Index, spectra);
             let (dispersion, roughness) = (boolean(&fields, "dispersion", true), roughness(&fields));
+            if let Some(item) = fields.get("temperature") {
+                item.error_help(
+                    format!("a dielectric {TRANSPARENT}"),
+                    "remove it; for glass that absorbs, give the object an `interior` whose medium has a temperature",
+                );
+                return None;
+            }
             return Some(Declared {
                 kind: Kind::Dielectric { eta: eta?, dispersion: dispersion?, roughness: roughness? },
                 two_sided: true,
+                temperature: None,
                 taken: None,
             });
         }
         Some("plastic") => {
             let fields = kind.table(PLASTIC)?;
-            let reflectance = spectrum(&fields, "reflectance", REFLECTANCE, Quantity::Reflectance, spectra);
+            let reflectance = reflects(&fields, spectra, textures);
             let eta = spectrum(&fields, "eta", ETA, Quantity::CoatIndex, spectra);
             let kind = match (reflectance, eta, roughness(&fields)) {
                 (Some(reflectance), Some(eta), Some(roughness)) => Some(Kind::Plastic { reflectance, eta, roughness }),
@@ -188,12 +279,13 @@ fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Declared<'a>
         }
         Some("blend") => {
             let fields = kind.table(BLEND)?;
-            return Some(Declared { kind: blend(&fields)?, two_sided: true, taken: None });
+            let (kind, temperature) = (blend(&fields, textures), temperature(&fields));
+            return Some(Declared { kind: kind?, two_sided: true, temperature: temperature?, taken: None });
         }
         _ => (kind.table(BLACK)?, Some(Kind::Black)),
     };
-    let two_sided = boolean(&fields, "two_sided", true);
-    Some(Declared { kind: kind?, two_sided: two_sided?, taken: None })
+    let (two_sided, temperature) = (boolean(&fields, "two_sided", true), temperature(&fields));
+    Some(Declared { kind: kind?, two_sided: two_sided?, temperature: temperature?, taken: None })
 }
 
 fn conductor<'a>(fields: &Fields<'a>, spectra: &mut Spectra<'a>) -> Option<Kind<'a>> {
@@ -245,7 +337,18 @@ fn roughness(fields: &Fields) -> Option<f64> {
     fields.get("roughness").map_or(Some(0.0), |item| alpha(&item))
 }
 
-fn blend<'a>(fields: &Fields<'a>) -> Option<Kind<'a>> {
+/// The outer `None` is a mistake that has been said.
+#[expect(clippy::option_option, reason = "a mistake differs from a key that is absent")]
+fn temperature(fields: &Fields) -> Option<Option<f64>> {
+    fields.get("temperature").map_or(Some(None), |item| kelvin(&item).map(Some))
+}
+
+/// A temperature that `item` holds.
+pub fn kelvin(item: &Item) -> Option<f64> {
+    item.number_where(|kelvin| kelvin > 0.0 && kelvin <= HOTTEST, "a temperature in K, above 0 and at most 1e9")
+}
+
+fn blend<'a>(fields: &Fields<'a>, textures: &mut Textures) -> Option<Kind<'a>> {
     let part = |key: &str| {
         let item = fields.require(key, &format!("{key} = \"white\", the name of a material"))?;
         item.text().map(|_| item)
@@ -253,12 +356,19 @@ fn blend<'a>(fields: &Fields<'a>) -> Option<Kind<'a>> {
     let (a, b) = (part("a"), part("b"));
     let weight = fields.require("weight", "weight = 0.5, the share of b").and_then(|item| {
         if matches!(item.node.value, Value::Table(_)) {
-            item.table(Keys::new(&[]).later(&["texture"]));
-            return None;
+            return textures.number(&item, Number::Weight).map(Share::Texture);
         }
-        item.number_where(|weight| (0.0..=1.0).contains(&weight), "the share of b, in [0, 1]")
+        item.number_where(|weight| (0.0..=1.0).contains(&weight), "the share of b, in [0, 1]").map(Share::Constant)
     });
     Some(Kind::Blend { parts: Parts { items: [a?, b?], indices: None }, weight: weight? })
+}
+
+fn reflects<'a>(fields: &Fields<'a>, spectra: &mut Spectra<'a>, textures: &mut Textures) -> Option<Reflects> {
+    let item = fields.require("reflectance", REFLECTANCE)?;
+    if is_texture(&item) {
+        return textures.reflectance(&item, spectra).map(Reflects::Texture);
+    }
+    spectra.resolve(&item, Quantity::Reflectance).map(Reflects::Spectrum)
 }
 
 fn spectrum<'a>(

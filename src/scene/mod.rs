@@ -4,6 +4,7 @@
 mod blend;
 mod camera;
 mod channels;
+mod closed;
 mod context;
 mod decode;
 mod digest;
@@ -11,17 +12,19 @@ mod environment;
 mod file;
 mod light;
 mod material;
+mod medium;
 mod object;
 mod overrides;
 mod shape;
 mod spectrum;
+mod texture;
 mod transform;
 mod tree;
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DAffine3, DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 pub use file::{load, parse};
@@ -30,8 +33,12 @@ use crate::spectral::{Channels, Curve};
 
 /// Index into [`Scene::spectra`].
 pub type SpectrumId = usize;
+/// Index into [`Scene::textures`].
+pub type TextureId = usize;
 /// Index into [`Scene::materials`].
 pub type MaterialId = usize;
+/// Index into [`Scene::media`].
+pub type MediumId = usize;
 
 /// Everything a render needs to know about what is rendered.
 #[derive(Debug, Clone)]
@@ -46,7 +53,13 @@ pub struct Scene {
     pub spectra: Vec<Spectrum>,
     /// Only materials that some object uses, itself or as a part of a blend.
     pub materials: Vec<Material>,
+    /// Only those that some material in use has.
+    pub textures: Vec<Texture>,
     pub objects: Vec<Object>,
+    /// Only those that fill something.
+    pub media: Vec<Medium>,
+    /// What fills space outside all interiors.
+    pub camera_medium: Option<MediumId>,
     pub lights: Vec<Light>,
     pub environment: Option<Environment>,
     /// Said once to the user: held tables, dropped triangles, …
@@ -152,13 +165,16 @@ pub struct Material {
     /// Whether the back side (against the geometric normal) scatters like the front; otherwise it absorbs. True, and
     /// without meaning, for dielectrics, whose back is their inside, and for blends, whose parts have their own.
     pub two_sided: bool,
+    /// K, above 0: emits ε(λ, ω) B(λ, T), ε = 1 - what the very same surface sends on of flux along ω, on either side. Of
+    /// a blend: for those of its parts that have none of their own. `None` on dielectrics, which absorb nothing.
+    pub temperature: Option<f64>,
 }
 
 /// How a surface scatters. Roughness is the α of the GGX distribution in [0, 1]; what is below [`SMOOTH`] is smooth.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Bsdf {
     Diffuse {
-        reflectance: SpectrumId,
+        reflectance: Reflectance,
     },
     /// Complex index of refraction η + i k, k > 0 absorbs.
     Conductor {
@@ -177,7 +193,7 @@ pub enum Bsdf {
     },
     /// A diffuse base under a dielectric coat.
     Plastic {
-        reflectance: SpectrumId,
+        reflectance: Reflectance,
         eta: SpectrumId,
         roughness: f64,
     },
@@ -185,9 +201,62 @@ pub enum Bsdf {
     Blend {
         a: MaterialId,
         b: MaterialId,
-        weight: f64,
+        weight: Weight,
     },
     Black,
+}
+
+/// The fraction of light that a surface reflects, over wavelength.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Reflectance {
+    /// The same all over.
+    Spectrum(SpectrumId),
+    /// A texture of [`TextureKind::Colour`] or [`TextureKind::Mixture`].
+    Texture(TextureId),
+}
+
+/// The share of a blend's second part, in [0, 1].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Weight {
+    Constant(f64),
+    /// A texture of [`TextureKind::Number`].
+    Texture(TextureId),
+}
+
+/// Numbers over a surface by its texture coordinates (u, v): u runs right, v up, both repeat. Texel (x, y), counted from
+/// the top left, is centred at u = (x + ½) / width, 1 - v = (y + ½) / height; between centres everything is bilinear:
+/// of colours the spectra, not their coefficients.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Texture {
+    /// The file, for messages.
+    pub name: String,
+    /// Width and height.
+    pub size: [u32; 2],
+    pub kind: TextureKind,
+    /// \[y\]\[x\]\[channel\], rows from the top.
+    pub texels: Arc<[f32]>,
+}
+
+/// What the channels of a texture are.
+#[derive(Debug, Clone, PartialEq)]
+pub enum TextureKind {
+    /// Linear sRGB in [0, 1]; each texel's spectrum is that of `rgb` ([`crate::spectral::upsample::reflectance`]).
+    Colour,
+    /// The share of each of these reflectances; they sum to 1 at most, and what is missing is black.
+    Mixture(Vec<SpectrumId>),
+    /// One number: a weight, or kelvins.
+    Number,
+}
+
+impl Texture {
+    /// Numbers in a texel.
+    pub fn channels(&self) -> usize {
+        match &self.kind {
+            TextureKind::Colour => 3,
+            TextureKind::Mixture(endmembers) => endmembers.len(),
+            TextureKind::Number => 1,
+        }
+    }
 }
 
 /// Roughness below this is none: a mirror, or ideal refraction.
@@ -199,15 +268,93 @@ pub struct Object {
     /// For messages, e.g. `objects.3 (floor.obj, material "white")`.
     pub name: String,
     pub shape: Shape,
-    pub material: MaterialId,
+    pub attributes: Attributes,
+    /// `None`: a null boundary, which only bounds its interior. Paths pass it as if it were not there.
+    pub material: Option<MaterialId>,
     pub emission: Option<Emission>,
+    /// What fills the inside of a closed shape: behind its geometric normal.
+    pub interior: Option<Interior>,
+}
+
+/// A medium in its place. Where several interiors overlap, the innermost counts: the one that a path entered last.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Interior {
+    /// Objects that are parts of one closed surface have the same number, all others numbers of their own.
+    pub body: usize,
+    pub medium: MediumId,
+    /// From the world to the unit cube that the medium's grids fill: the object's bounding box in its own space.
+    pub to_grid: DAffine3,
+}
+
+/// A gas that absorbs and emits. Its absorption coefficient in m⁻¹ is density · Σ strength · table(λ, T); where it has a
+/// temperature it emits as much as it absorbs, times Planck's radiance.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Medium {
+    pub name: String,
+    pub absorbers: Vec<Absorber>,
+    /// K, not negative.
+    pub temperature: Option<Field>,
+    /// Relative, not negative.
+    pub density: Field,
+}
+
+/// A term of a medium's absorption.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Absorber {
+    /// Fraction x pressure of a species; 1 for an absorption that is given as such.
+    pub strength: f64,
+    /// K, ascending, and the spectrum there, in m⁻¹ at strength 1. Between two, linear in temperature; beyond, the ends
+    /// are held. Where there is only one, temperature does not matter.
+    pub columns: Vec<(f64, SpectrumId)>,
+}
+
+/// A number of a medium, or one for each voxel.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Field {
+    Constant(f64),
+    Grid(Arc<Grid>),
+}
+
+/// Voxels with a constant value each, x fastest. All grids of one medium have one shape.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Grid {
+    /// Voxels along x, y and z.
+    pub size: [u32; 3],
+    pub values: Vec<f32>,
+}
+
+impl Medium {
+    /// Voxels along x, y and z, where any quantity has a grid.
+    pub fn grid_size(&self) -> Option<[u32; 3]> {
+        [self.temperature.as_ref(), Some(&self.density)].into_iter().flatten().find_map(|field| match field {
+            Field::Constant(_) => None,
+            Field::Grid(grid) => Some(grid.size),
+        })
+    }
+}
+
+/// What a shape carries beside its geometry, each only where its material asks for it.
+///
+/// Textures are laid out by (u, v), and anisotropic materials turned by a tangent, of either sign, which is the direction
+/// of growing u. On a quad u runs along `edge_u`, v along `edge_v`. On each face of a cube u runs to the right and v up,
+/// seen from outside with y up; on top and bottom u runs along x. On an OBJ mesh they are its `vt`. Round shapes have an
+/// axis, y: the sphere its own y axis, the disk its normal, the cylinder that from `from` to `to`; and with (x, y, z) in
+/// [`Attributes::axes`], u = ½ + atan2(x, z) / 2π, so that u grows counter-clockwise about the axis. v is ½ + asin(y) / π
+/// on a unit sphere, 0 at `from` and 1 at `to` on a cylinder, 0 on the rim and 1 in the centre of a disk.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Attributes {
+    /// (u, v) at the corners of each triangle of a mesh.
+    pub uv: Option<Vec<[DVec2; 3]>>,
+    /// Unit shading normals at the corners of each triangle of a mesh, on its front; interpolated between.
+    pub normals: Option<Vec<[DVec3; 3]>>,
+    /// Columns: where x, y (the axis) and z of a round shape point. Orthonormal, left-handed on what is mirrored.
+    pub axes: Option<DMat3>,
 }
 
 /// World-space geometry, transforms applied.
 ///
-/// Anisotropic materials are turned by a tangent, of either sign: along the first edge (corner 0 to 1) of a triangle,
-/// which is along `edge_u` on a quad; around the axis of a disk or cylinder. Spheres and OBJ meshes have no tangent to
-/// speak of and no anisotropic material.
+/// Without texture coordinates the tangent of anisotropic materials ([`Attributes`]) is along the first edge (corner 0 to
+/// 1) of a triangle, which is that of growing u on quads and cubes.
 #[derive(Debug, Clone)]
 pub enum Shape {
     /// Also quads and cubes. Front = counter-clockwise.

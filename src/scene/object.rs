@@ -4,16 +4,19 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 use std::rc::Rc;
 
-use glam::DAffine3;
+use glam::{DAffine3, DVec3};
 
+use super::closed;
 use super::decode::{Fields, Item, Keys, list};
-use super::material::Materials;
+use super::material::{Materials, Needs};
+use super::medium::Media;
 use super::overrides::SHAPES;
-use super::shape;
+use super::shape::{self, Replaced};
 use super::spectrum::{Handle, Quantity, Spectra, report_in_file};
 use super::transform;
 use super::tree::Value;
-use super::{Emission, MaterialId, Object, Shape, Sides};
+use super::{Attributes, Emission, Interior, MaterialId, MediumId, Object, Shape, Sides};
+use crate::error::Problem;
 use crate::format::obj::{self, Obj, Part};
 
 const KEYS: Keys = Keys::new(&[
@@ -28,16 +31,19 @@ const KEYS: Keys = Keys::new(&[
     "emission",
     "emission_sides",
     "transform",
-])
-.later(&["interior"]);
+    "interior",
+]);
 
 /// Decodes objects one after the other; a mesh file is read once.
 pub struct Objects<'s, 'a> {
     pub spectra: &'s mut Spectra<'a>,
     pub materials: &'s mut Materials<'a>,
+    pub media: &'s mut Media<'a>,
     /// `None` where the file is wrong, which has been said.
     meshes: HashMap<PathBuf, Option<Rc<Obj>>>,
     scene: Vec<Object>,
+    /// Interiors so far.
+    bodies: usize,
 }
 
 /// What all pieces of one object share. An outer `None` is a mistake that has been said; the rest of the object is
@@ -45,11 +51,28 @@ pub struct Objects<'s, 'a> {
 struct Common {
     affine: Option<DAffine3>,
     emission: Option<Option<(Handle, Sides)>>,
+    interior: Option<Option<Filling>>,
+}
+
+/// The medium of an interior, and the box around it in the object's own space.
+#[derive(Clone, Copy)]
+struct Filling {
+    body: usize,
+    medium: MediumId,
+    bounds: [DVec3; 2],
+}
+
+/// What an object says about its material.
+#[derive(Clone, Copy)]
+enum Look {
+    Of(MaterialId),
+    /// None: a null boundary.
+    Invisible,
 }
 
 impl<'s, 'a> Objects<'s, 'a> {
-    pub fn new(spectra: &'s mut Spectra<'a>, materials: &'s mut Materials<'a>) -> Self {
-        Objects { spectra, materials, meshes: HashMap::new(), scene: Vec::new() }
+    pub fn new(spectra: &'s mut Spectra<'a>, materials: &'s mut Materials<'a>, media: &'s mut Media<'a>) -> Self {
+        Objects { spectra, materials, media, meshes: HashMap::new(), scene: Vec::new(), bodies: 0 }
     }
 
     /// Decodes one entry of `[[objects]]`.
@@ -60,34 +83,45 @@ impl<'s, 'a> Objects<'s, 'a> {
         if let (Some(group), false) = (&group, fields.has("mesh")) {
             group.error_help("goes with `mesh` only", "remove it");
         }
-        let common = self.common(&fields);
+        let mut common = self.common(&fields);
         let named = fields.get("material");
-        let material = named.as_ref().map(|named| self.named_material(named));
+        // An outer `None` has no material; an inner one is a mistake.
+        let look = match (&named, fields.get("interior")) {
+            (Some(named), _) => Some(self.named_material(named).map(Look::Of)),
+            (None, Some(_)) => Some(self.null_boundary(&fields)),
+            (None, None) => None,
+        };
         let Some(shape) = shape else { return };
 
         if shape.path.ends_with(".mesh") {
             let Some(mesh) = self.read(&shape) else { return };
             let Some(parts) = pick(&mesh, &shape, group.as_ref()) else { return };
-            match material {
-                Some(material) => self.push_mesh(&fields, &shape, &parts, None, material, &common),
+            if fields.has("interior") {
+                common.interior = self.filling(&fields, &Shape::Mesh(shape::join(&parts, Needs::default()).0));
+            }
+            match look {
+                Some(look) => {
+                    if let Some(Look::Invisible) = look {
+                        self.warn_about_usemtl(&shape, &parts);
+                    }
+                    self.push_mesh(&fields, &shape, &parts, None, look, &common);
+                }
                 None => self.push_by_usemtl(&fields, &shape, &parts, &common),
             }
             return;
         }
         let Some(local) = shape::decode(&shape) else { return };
-        let Some(material) = material else {
-            // A shape without material but with an interior will be a null boundary; it has been refused by name.
-            if !fields.has("interior") {
-                no_material(&fields, "the object has no `material`");
-            }
+        let Some(look) = look else {
+            no_material(&fields, "the object has no `material`");
             return;
         };
-        let kind = shape.path.rsplit('.').next().unwrap_or_default();
-        if let (Some(material), "sphere") = (material, kind) {
-            self.refuse_anisotropic(&fields, "a sphere", material);
+        if fields.has("interior") {
+            common.interior = self.filling(&fields, &local);
         }
+        let kind = shape.path.rsplit('.').next().unwrap_or_default();
+        let attributes = shape::attributes(&local, self.needs(look));
         let name = format!("{} ({kind})", item.path);
-        self.push(&fields, name, local, material, &common);
+        self.push(&fields, name, (local, attributes), look, &common);
     }
 
     pub fn finish(self) -> Vec<Object> {
@@ -110,7 +144,47 @@ impl<'s, 'a> Objects<'s, 'a> {
             Some(radiance) => radiance.zip(sides).map(Some),
             None => sides.map(|_| None),
         };
-        Common { affine, emission }
+        Common { affine, emission, interior: Some(None) }
+    }
+
+    /// An object that is nothing but the bound of its interior; `None` if it should be more.
+    fn null_boundary(&self, fields: &Fields<'a>) -> Option<Look> {
+        let emission = fields.get("emission");
+        if let Some(emission) = &emission {
+            emission.error_help(
+                "goes with a `material` only: without one the object is the invisible boundary of its interior",
+                "give the object a material, or remove `emission`; a medium with a temperature emits by itself",
+            );
+        }
+        emission.is_none().then_some(Look::Invisible)
+    }
+
+    /// What `interior` says of an object whose shape, in its own space, is `local`.
+    #[expect(clippy::option_option, reason = "as in `Common`")]
+    fn filling(&mut self, fields: &Fields<'a>, local: &Shape) -> Option<Option<Filling>> {
+        let item = fields.get("interior")?;
+        let medium = self.media.take(&item, self.spectra);
+        if let Some(opening) = closed::opening(local) {
+            item.error_help(
+                format!("fills closed shapes only, but {opening}"),
+                "use a sphere, a cube, or a mesh that is closed and whose faces are all turned outward",
+            );
+            return None;
+        }
+        self.bodies += 1;
+        Some(Some(Filling { body: self.bodies - 1, medium: medium?, bounds: closed::bounds(local) }))
+    }
+
+    /// A null boundary leaves usemtl names alone that may have been meant.
+    fn warn_about_usemtl(&self, shape: &Item, parts: &[&Part]) {
+        let named = parts.iter().filter_map(|part| part.labels.material.as_deref());
+        if let Some(name) = named.into_iter().find(|name| self.materials.has(name)) {
+            shape.cx.warn(format!(
+                "{}: its usemtl names, such as \"{name}\", are not used: without `material` the object is the invisible \
+                 boundary of its interior",
+                file_name(shape)
+            ));
+        }
     }
 
     fn named_material(&mut self, item: &Item<'a>) -> Option<MaterialId> {
@@ -143,9 +217,6 @@ impl<'s, 'a> Objects<'s, 'a> {
 
     /// One object for each `usemtl` name, in the order of the file.
     fn push_by_usemtl(&mut self, fields: &Fields<'a>, shape: &Item<'a>, parts: &[&Part], common: &Common) {
-        if fields.has("interior") {
-            return;
-        }
         let mut names: Vec<&str> = Vec::new();
         let mut bare = None;
         for part in parts {
@@ -175,7 +246,7 @@ impl<'s, 'a> Objects<'s, 'a> {
             let of_name: Vec<&Part> =
                 parts.iter().copied().filter(|part| part.labels.material.as_deref() == Some(name)).collect();
             let material = self.materials.take(name, self.spectra);
-            self.push_mesh(fields, shape, &of_name, Some(name), material, common);
+            self.push_mesh(fields, shape, &of_name, Some(name), material.map(Look::Of), common);
         }
     }
 
@@ -185,30 +256,58 @@ impl<'s, 'a> Objects<'s, 'a> {
         shape: &Item<'a>,
         parts: &[&Part],
         usemtl: Option<&str>,
-        material: Option<MaterialId>,
+        look: Option<Look>,
         common: &Common,
     ) {
-        if let Some(material) = material {
-            self.refuse_anisotropic(fields, "an OBJ mesh", material);
+        let needs = self.needs(look);
+        let bare = parts.iter().find(|part| (needs.uv || needs.tangent) && part.uv.is_none());
+        if let (Some(part), Some(Look::Of(material))) = (bare, look) {
+            let why = if needs.uv { "is textured" } else { "has two roughnesses" };
+            let message = format!(
+                "material \"{}\" {why}, but the faces from here on have no texture coordinates (vt)",
+                self.materials.name(material)
+            );
+            shape.cx.push(Problem {
+                file: shape.cx.path(shape.text().unwrap_or_default()),
+                line: Some(part.line),
+                key: Some(shape.path.clone()),
+                message,
+                help: Some("export the mesh with its UV map, or give it another material".to_owned()),
+                ..Problem::default()
+            });
+            return;
         }
         let label = usemtl.map_or_else(String::new, |name| format!(", material \"{name}\""));
         let name = format!("{} ({}{label})", fields.path, file_name(shape));
-        self.push(fields, name, Shape::Mesh(shape::join(parts)), material, common);
+        let (mesh, attributes) = shape::join(parts, needs);
+        if needs.tangent {
+            let count = shape::without_tangent(&attributes);
+            if count > 0 {
+                shape.cx.warn(format!(
+                    "{name}: on {count} triangles the texture coordinates give no direction for its two roughnesses; \
+                     their first edge does"
+                ));
+            }
+        }
+        self.push(fields, name, (Shape::Mesh(mesh), attributes), look, common);
     }
 
-    /// Roughness that differs along and across needs directions on the surface, which not all shapes have yet.
-    fn refuse_anisotropic(&self, fields: &Fields<'a>, shape: &str, material: MaterialId) {
-        if self.materials.is_anisotropic(material) {
-            let name = self.materials.name(material);
-            fields.error_help(
-                format!("material \"{name}\" has two roughnesses, which is not supported yet on {shape}"),
-                "use one roughness, or a quad, cube, disk or cylinder",
-            );
+    fn needs(&self, look: Option<Look>) -> Needs {
+        match look {
+            Some(Look::Of(material)) => self.materials.needs(material),
+            _ => Needs::default(),
         }
     }
 
     /// Moves `local` into the world and adds it to the scene.
-    fn push(&mut self, fields: &Fields<'a>, name: String, local: Shape, material: Option<MaterialId>, common: &Common) {
+    fn push(
+        &mut self,
+        fields: &Fields<'a>,
+        name: String,
+        (local, mut attributes): (Shape, Attributes),
+        look: Option<Look>,
+        common: &Common,
+    ) {
         let Some(affine) = common.affine else { return };
         let mut shape = match transform::apply(&affine, local) {
             Ok(shape) => shape,
@@ -219,8 +318,9 @@ impl<'s, 'a> Objects<'s, 'a> {
                 return;
             }
         };
+        transform::apply_attributes(&affine, &mut attributes);
         if let Shape::Mesh(mesh) = &mut shape {
-            let dropped = shape::drop_degenerate(mesh);
+            let dropped = shape::drop_degenerate(mesh, &mut attributes);
             if mesh.triangles.is_empty() {
                 fields.error_help(format!("{name} has no area: all its triangles are degenerate"), "correct the mesh");
                 return;
@@ -228,10 +328,31 @@ impl<'s, 'a> Objects<'s, 'a> {
             if dropped > 0 {
                 fields.cx.warn(format!("{name}: {dropped} triangles without area were dropped"));
             }
+            let Replaced { without_length, behind } = shape::settle_normals(mesh, &mut attributes);
+            if without_length > 0 {
+                let warning =
+                    format!("{name}: {without_length} vertex normals of length 0 are replaced by their triangle's");
+                fields.cx.warn(warning);
+            }
+            if behind > 0 {
+                let warning = format!(
+                    "{name}: {behind} vertex normals point behind their triangle, whose front is where its corners run \
+                     counter-clockwise; they are turned round"
+                );
+                fields.cx.warn(warning);
+            }
         }
-        let (Some(material), Some(emission)) = (material, common.emission) else { return };
+        let (Some(look), Some(emission), Some(interior)) = (look, common.emission, common.interior) else { return };
+        let material = match look {
+            Look::Of(material) => Some(material),
+            Look::Invisible => None,
+        };
+        let interior = interior.map(|Filling { body, medium, bounds: [low, high] }| {
+            let to_unit = DAffine3::from_scale((high - low).recip()) * DAffine3::from_translation(-low);
+            Interior { body, medium, to_grid: to_unit * affine.inverse() }
+        });
         let emission = emission.map(|(radiance, sides)| Emission { radiance: self.spectra.take(radiance), sides });
-        self.scene.push(Object { name, shape, material, emission });
+        self.scene.push(Object { name, shape, attributes, material, emission, interior });
     }
 }
 
@@ -267,9 +388,6 @@ fn pick<'m>(mesh: &'m Obj, shape: &Item, group: Option<&Item>) -> Option<Vec<&'m
 
 fn warn_about(item: &Item, mesh: &Obj) {
     let file = file_name(item);
-    if mesh.has_normals {
-        item.cx.warn(format!("{file}: its vertex normals are not used; shading follows the triangles"));
-    }
     if mesh.without_surface > 0 {
         item.cx.warn(format!("{file}: {} points and lines have no surface and are left out", mesh.without_surface));
     }

@@ -170,6 +170,15 @@ fn rivals(parents: &[&str], key: &str) -> Vec<&'static str> {
         // Everywhere else a table with these keys is a spectrum.
         _ => {
             let mut rivals = others(&SPECTRUM_SOURCES);
+            match key {
+                // A texture stands in the place of a spectrum, with keys of its own.
+                "texture" | "endmembers" => {
+                    rivals.extend(SPECTRUM_SOURCES);
+                    rivals.extend(["column", "scale", "outside"]);
+                }
+                _ if SPECTRUM_SOURCES.contains(&key) => rivals.extend(["texture", "endmembers"]),
+                _ => {}
+            }
             if SPECTRUM_SOURCES.contains(&key) && key != "file" {
                 rivals.push("column");
             }
@@ -243,6 +252,13 @@ mod tests {
             &["objects.0.material=w", "objects.0.sphere.radius=1.5"],
         );
         check("e = { file = \"x\", column = \"c\" }", &[("e.blackbody", "300")], &["e.blackbody=300"]);
+        check(
+            "r = { texture = \"a.exr\", endmembers = [\"s\"] }",
+            &[("r.texture", "b.exr")],
+            &["r.endmembers.0=s", "r.texture=b.exr"],
+        );
+        check("r = { texture = \"a.exr\", endmembers = [\"s\"] }", &[("r.constant", "1")], &["r.constant=1"]);
+        check("r = { file = \"a\", column = \"c\", scale = 2 }", &[("r.texture", "a.png")], &["r.texture=a.png"]);
         check("objects = []", &[("objects.0.material", "red")], &["objects.0.material=red"]);
         check("p = [1, 2, 3]", &[("p.1", "-4e1")], &["p.0=1", "p.1=-40.0", "p.2=3"]);
         check("m.\"my paint\".k = 1", &[("m.\"my paint\".k", "dpept-pixel")], &["m.\"my paint\".k=dpept-pixel"]);

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use super::context::Context;
 use super::decode::{Item, Keys, did_you_mean, list};
 use super::overrides::SPECTRUM_SOURCES;
+use super::texture::is_texture;
 use super::tree::{Origin, Value};
 use super::{Spectrum, SpectrumId};
 use crate::error::Problem;
@@ -20,6 +21,8 @@ const LONGEST: f64 = 1e15;
 const BRIGHTEST: f64 = 1e35;
 /// Far above any index of refraction (200 or so in metals at 20 um) and its squares far inside f32.
 const DENSEST: f64 = 1e3;
+/// Opaque within any distance that matters, and far inside f32 times one.
+const MOST_ABSORBING: f64 = 1e15;
 
 /// What a spectrum describes: decides the allowed values, what a table means beyond its ends, and what `rgb` is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -38,6 +41,8 @@ pub enum Quantity {
     CoatIndex,
     /// Imaginary part of a complex index, not negative; held beyond its table, with a warning.
     Extinction,
+    /// Of a gas: m⁻¹ (and per atmosphere of a species), not negative; zero beyond its table, with a warning.
+    Absorption,
 }
 
 impl Quantity {
@@ -47,7 +52,7 @@ impl Quantity {
     }
 
     fn default_outside(self) -> Outside {
-        if self.is_light() { Outside::Zero } else { Outside::Hold }
+        if self.is_light() || self == Quantity::Absorption { Outside::Zero } else { Outside::Hold }
     }
 
     fn noun(self) -> &'static str {
@@ -59,6 +64,7 @@ impl Quantity {
             Quantity::Index => "an index of refraction",
             Quantity::CoatIndex => "the index of refraction of a coat",
             Quantity::Extinction => "an extinction coefficient k",
+            Quantity::Absorption => "an absorption coefficient",
         }
     }
 
@@ -69,6 +75,7 @@ impl Quantity {
             Quantity::Index => value > 0.0 && value <= DENSEST,
             Quantity::CoatIndex => (1.0..=DENSEST).contains(&value),
             Quantity::Extinction => (0.0..=DENSEST).contains(&value),
+            Quantity::Absorption => (0.0..=MOST_ABSORBING).contains(&value),
         }
     }
 
@@ -79,6 +86,7 @@ impl Quantity {
             Quantity::Index => "(0, 1000]",
             Quantity::CoatIndex => "[1, 1000]",
             Quantity::Extinction => "[0, 1000]",
+            Quantity::Absorption => "[0, 1e15]",
         };
         format!("{} must lie in {range}", self.noun())
     }
@@ -133,8 +141,7 @@ pub struct Spectra<'a> {
 }
 
 const KEYS: Keys =
-    Keys::new(&["file", "constant", "blackbody", "samples", "regular", "rgb", "column", "unit", "scale", "outside"])
-        .later(&["texture", "endmembers"]);
+    Keys::new(&["file", "constant", "blackbody", "samples", "regular", "rgb", "column", "unit", "scale", "outside"]);
 
 impl<'a> Spectra<'a> {
     /// Decodes `[spectra]`. `channels` decide what a table leaves uncovered.
@@ -207,6 +214,34 @@ impl<'a> Spectra<'a> {
         n.zip(k)
     }
 
+    /// The columns of the file that `item` names, absorption of a species at temperatures: K, ascending, and a spectrum.
+    pub fn species(&mut self, item: &Item<'a>) -> Option<Vec<(f64, Handle)>> {
+        let written = item.text()?;
+        let path = item.cx.path(written);
+        let columns = text::read_columns(&path).map_err(|problem| report_in_file(item, *problem)).ok()?;
+        let mut found = Vec::new();
+        for (name, table) in columns {
+            let kelvin = column_kelvin(&name);
+            if kelvin.is_none() {
+                item.error_help(
+                    format!("the columns of {} must be named by temperatures, but one is \"{name}\"", path.display()),
+                    "write a header such as nm,300,600,1000: temperatures in K",
+                );
+                return None;
+            }
+            let data = table_data(table, path.clone());
+            let source = Source { data, scale: 1.0, outside: None, path: item.path.clone(), at: item.at };
+            let kelvin = kelvin?;
+            found.push((kelvin, self.check(&source, &format!("{written} ({kelvin} K)"), item, Quantity::Absorption)?));
+        }
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some(same) = found.windows(2).find(|w| w[0].0 == w[1].0) {
+            item.error_help(format!("{} has two columns for {} K", path.display(), same[0].0), "remove one");
+            return None;
+        }
+        Some(found)
+    }
+
     /// The index of a checked spectrum in the scene. Equal curves share one.
     pub fn take(&mut self, handle: Handle) -> SpectrumId {
         let spectrum = &mut self.checked[handle];
@@ -246,6 +281,11 @@ impl<'a> Spectra<'a> {
         }
         self.checked.push(Checked { name, curve, warnings, taken: None });
         Some(self.checked.len() - 1)
+    }
+
+    /// Says `warning` to the user, once.
+    pub fn warn(&self, warning: String) {
+        self.cx.warn(warning);
     }
 
     /// The spectra in use.
@@ -315,10 +355,15 @@ impl<'a> Spectra<'a> {
                     return None;
                 }
                 let outside = source.outside.unwrap_or(quantity.default_outside());
-                if outside == Outside::Hold && source.outside.is_none() {
+                let instead = match (outside, quantity) {
+                    (Outside::Hold, _) => Some("its end values are held there"),
+                    (Outside::Zero, Quantity::Absorption) => Some("nothing is absorbed there"),
+                    (Outside::Zero, _) => None,
+                };
+                if let (Some(instead), None) = (instead, source.outside) {
                     warnings.extend(self.uncovered(nm[0], nm[nm.len() - 1]).map(|gap| {
                         let noun = quantity.noun();
-                        format!("spectrum `{name}` ({noun}) does not cover {gap}: its end values are held there")
+                        format!("spectrum `{name}` ({noun}) does not cover {gap}: {instead}")
                     }));
                 }
                 let value = value.iter().map(|v| v * source.scale).collect();
@@ -375,7 +420,7 @@ impl<'a> Spectra<'a> {
 
 /// A spectrum written as a number or a table.
 fn source<'a>(item: &Item<'a>) -> Option<Source<'a>> {
-    let Value::Table(entries) = &item.node.value else {
+    let Value::Table(_) = &item.node.value else {
         if !matches!(item.node.value, Value::Integer(_) | Value::Float(_)) {
             item.error_help(
                 format!("must be a spectrum, but is {}", item.node.value.kind()),
@@ -386,10 +431,14 @@ fn source<'a>(item: &Item<'a>) -> Option<Source<'a>> {
         let data = Data::Constant(item.number()?);
         return Some(Source { data, scale: 1.0, outside: None, path: item.path.clone(), at: item.at });
     };
-    let fields = item.table(KEYS)?;
-    if entries.iter().any(|e| KEYS.later.contains(&e.key.as_str())) {
+    if is_texture(item) {
+        item.error_help(
+            "is the same all over a surface, so it cannot be a texture",
+            "textures are for `reflectance` of diffuse and plastic, `weight` of blend, and `temperature`",
+        );
         return None;
     }
+    let fields = item.table(KEYS)?;
     let kind = fields.exactly_one(&SPECTRUM_SOURCES, "spectrum source");
     let scale = match fields.get("scale") {
         Some(item) => item.not_negative(),
@@ -462,6 +511,13 @@ fn index_file(item: &Item, path: PathBuf, column: Option<&str>) -> Option<Data> 
         item.error(format!("{} does not give {name}", path.display()));
     }
     Some(table_data(table?, path))
+}
+
+/// The temperature that names a column: `300`, `300K`, or with words before it as in `kappa_300K`.
+fn column_kelvin(name: &str) -> Option<f64> {
+    let number = name.trim_end_matches(['K', 'k', ' ']);
+    let start = number.rfind(|c: char| !c.is_ascii_digit() && c != '.').map_or(0, |i| i + 1);
+    number.get(start..)?.parse().ok().filter(|kelvin: &f64| kelvin.is_finite() && *kelvin > 0.0)
 }
 
 fn table_data(table: SpectrumTable, file: PathBuf) -> Data {

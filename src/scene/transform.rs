@@ -4,7 +4,7 @@ use glam::{DAffine3, DMat3, DVec3};
 
 use super::decode::{Item, Keys};
 use super::tree::Value;
-use super::{Mesh, Shape};
+use super::{Attributes, Mesh, Shape};
 
 const KEYS: Keys = Keys::new(&["translate", "rotate", "scale", "matrix"]);
 /// Coordinates beyond this have squares near the end of f32.
@@ -129,6 +129,29 @@ pub fn apply(affine: &DAffine3, shape: Shape) -> Result<Shape, String> {
         return Err("shrinks the shape to nothing".to_owned());
     }
     Ok(moved)
+}
+
+/// Moves what a shape carries along with it.
+pub fn apply_attributes(affine: &DAffine3, attributes: &mut Attributes) {
+    let matrix = affine.matrix3;
+    let mirrored = matrix.determinant() < 0.0;
+    if let Some(uv) = attributes.uv.as_mut().filter(|_| mirrored) {
+        uv.iter_mut().for_each(|corners| corners.swap(0, 1));
+    }
+    if let Some(normals) = &mut attributes.normals {
+        // Their length is settled later.
+        let to_world = matrix.inverse().transpose();
+        for corners in normals {
+            *corners = corners.map(|normal| to_world * normal);
+            if mirrored {
+                corners.swap(0, 1);
+            }
+        }
+    }
+    if let Some(axes) = &mut attributes.axes {
+        let moved = matrix * *axes;
+        *axes = DMat3::from_cols(moved.x_axis.normalize(), moved.y_axis.normalize(), moved.z_axis.normalize());
+    }
 }
 
 #[cfg(test)]

@@ -224,6 +224,11 @@ pub fn srgb_encode(linear: f64) -> f64 {
     if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
+/// The inverse of [`srgb_encode`].
+pub fn srgb_decode(encoded: f64) -> f64 {
+    if encoded <= 0.040_45 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
+}
+
 /// 8-bit sRGB of one quantity: a colour map that is perceptually uniform (inferno, by N. Smith and S. van der Walt) from the
 /// first to the second number of `range`. What lies beyond its ends has their colours, what is not rendered yet is black.
 pub fn map_srgb8(values: &[f32], range: [f64; 2]) -> Vec<u8> {

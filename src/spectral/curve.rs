@@ -132,6 +132,17 @@ impl Curve {
         }
     }
 
+    /// The curve times `factor`.
+    pub fn scaled(&self, factor: f64) -> Curve {
+        match self {
+            Curve::Constant(value) => Curve::Constant(value * factor),
+            Curve::Blackbody { kelvin, scale } => Curve::Blackbody { kelvin: *kelvin, scale: scale * factor },
+            Curve::Linear { nm, value, outside } => {
+                Curve::Linear { nm: nm.clone(), value: value.iter().map(|v| v * factor).collect(), outside: *outside }
+            }
+        }
+    }
+
     /// Whether the value is the same at every wavelength.
     pub fn is_constant(&self) -> bool {
         match self {

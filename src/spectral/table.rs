@@ -5,6 +5,8 @@ use super::{Channels, Curve};
 
 /// Pointwise bound relative to the channel's peak (DESIGN section 7).
 pub const POINTWISE_BOUND: f64 = 1e-4;
+/// What makes a curve a line, relative to the channel's peak: some roundings of f32.
+const LINE_BOUND: f64 = 1e-6;
 /// Most entries (strata x channels) per spectrum, and of all spectra together: 96 MiB, less than what every device binds.
 const MAX_ENTRIES: usize = 1 << 18;
 const MAX_ENTRIES_IN_ALL: usize = 12 << 20;
@@ -58,6 +60,17 @@ pub struct SpectralTables {
     pub bounds: Vec<Bounds>,
 }
 
+/// What the error of a table is measured against.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Exactness {
+    /// The largest value in the channel.
+    Peak,
+    /// The value itself: an absorption acts in an exponent, where the wing of a line matters beside its top.
+    Pointwise,
+    /// Nothing: knots, unless a line in each channel is all that the curve is.
+    Exact,
+}
+
 /// Errors of one spectrum's table over all channels.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Bounds {
@@ -68,11 +81,24 @@ pub struct Bounds {
 impl SpectralTables {
     /// Tables for `curves` over `channels`, in the order given (spectra that need knots move to the end).
     pub fn build(curves: &[Tabulated], channels: &Channels) -> SpectralTables {
+        SpectralTables::with_exactness(curves, &[], channels)
+    }
+
+    /// [`SpectralTables::build`]; the curves at the given positions are held as exactly as said.
+    pub fn with_exactness(curves: &[Tabulated], exactness: &[(usize, Exactness)], channels: &Channels) -> SpectralTables {
         let channels_padded = channels.len().next_multiple_of(4);
         // All spectra have as many strata as the one that needs most.
         let entries = MAX_ENTRIES.min(MAX_ENTRIES_IN_ALL / curves.len().max(1));
         let max_bits = (entries / channels_padded).max(1).ilog2().min(MAX_STRATUM_BITS);
-        let needed: Vec<Option<u32>> = curves.iter().map(|c| strata_needed(*c, channels, max_bits)).collect();
+        let of = |i: usize| exactness.iter().find(|e| e.0 == i).map_or(Exactness::Peak, |e| e.1);
+        let needed: Vec<Option<u32>> = curves
+            .iter()
+            .enumerate()
+            .map(|(i, c)| match of(i) {
+                Exactness::Exact => strata_needed(*c, channels, 0, LINE_BOUND, Exactness::Peak),
+                kind => strata_needed(*c, channels, max_bits, POINTWISE_BOUND, kind),
+            })
+            .collect();
         let stratum_bits = needed.iter().flatten().copied().max().unwrap_or(0);
 
         // The stratified first, the knotted after them.
@@ -94,7 +120,7 @@ impl SpectralTables {
             bounds: vec![Bounds::default(); curves.len()],
         };
         for (id, &i) in stratified.iter().enumerate() {
-            tables.bounds[i] = tables.fill_strata(id, curves[i], channels);
+            tables.bounds[i] = tables.fill_strata(id, curves[i], channels, of(i));
         }
         for &i in &knotted {
             tables.bounds[i] = tables.add_knots(curves[i], channels);
@@ -102,14 +128,14 @@ impl SpectralTables {
         tables
     }
 
-    fn fill_strata(&mut self, id: usize, spectrum: Tabulated, channels: &Channels) -> Bounds {
+    fn fill_strata(&mut self, id: usize, spectrum: Tabulated, channels: &Channels, kind: Exactness) -> Bounds {
         let strata = 1usize << self.stratum_bits;
         let quads = self.channels_padded / 4;
         let mut bounds = Bounds::default();
         for k in 0..channels.len() {
             let curve = spectrum.of(k);
             let lines = fit_channel(curve, channels, k, strata);
-            bounds = bounds.max(channel_bounds(curve, channels, k, &lines));
+            bounds = bounds.max(channel_bounds(curve, channels, k, &lines, kind));
             for (stratum, line) in lines.iter().enumerate() {
                 let at = (((stratum * self.stratified + id) * quads + k / 4) * 2) * 4 + k % 4;
                 self.strata[at] = line.value as f32;
@@ -172,13 +198,13 @@ impl Bounds {
 }
 
 /// Stratum bits that keep the pointwise bound in every channel, or `None` where `max_bits` do not.
-fn strata_needed(spectrum: Tabulated, channels: &Channels, max_bits: u32) -> Option<u32> {
+fn strata_needed(spectrum: Tabulated, channels: &Channels, max_bits: u32, bound: f64, kind: Exactness) -> Option<u32> {
     // What satisfied the channels so far is where the next channel starts.
     (0..channels.len()).try_fold(0, |least, k| {
         let curve = spectrum.of(k);
         let keeps_bound = |bits: &u32| {
             let lines = fit_channel(curve, channels, k, 1 << bits);
-            channel_bounds(curve, channels, k, &lines).pointwise <= POINTWISE_BOUND
+            channel_bounds(curve, channels, k, &lines, kind).pointwise <= bound
         };
         (least..=max_bits).find(keeps_bound)
     })
@@ -227,7 +253,7 @@ fn non_negative(mean: f64, slope: f64) -> Line {
     Line { value: mean - 0.5 * slope, slope }
 }
 
-fn channel_bounds(curve: &Curve, channels: &Channels, k: usize, lines: &[Line]) -> Bounds {
+fn channel_bounds(curve: &Curve, channels: &Channels, k: usize, lines: &[Line], kind: Exactness) -> Bounds {
     let [from, to] = channels.bounds[k];
     let peak = curve.max(from, to);
     if peak <= 0.0 {
@@ -243,7 +269,8 @@ fn channel_bounds(curve: &Curve, channels: &Channels, k: usize, lines: &[Line]) 
         });
         for (nm, value) in nodes {
             let place = (nm - a) / (b - a);
-            pointwise = pointwise.max((line.value + place * line.slope - value).abs() / peak);
+            let of = if kind == Exactness::Pointwise { value.max(1e-9 * peak) } else { peak };
+            pointwise = pointwise.max((line.value + place * line.slope - value).abs() / of);
         }
     }
     let mean = lines.iter().map(|l| l.value + 0.5 * l.slope).sum::<f64>() / strata;

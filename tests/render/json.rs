@@ -82,6 +82,8 @@ fn the_document_names_every_event_and_field() {
         vec!["plan", "scene.toml", "--json"],
         vec!["devices", "--json"],
         vec!["info", "a.zarr", "--json"],
+        vec!["info", "a.zarr", "--json", "--watch"],
+        vec!["submit", "scene.toml", "-o", "e.zarr", "--spp", "64", "--dry-run", "--json"],
         vec!["compare", "a.zarr", "b.zarr", "--json"],
         vec!["export", "a.zarr", "-o", "b.png", "--json"],
         vec!["export", "a.zarr", "-o", "c.png", "--colour-map", "--json"],

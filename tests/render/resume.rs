@@ -165,7 +165,7 @@ fn the_second_on_a_tile_is_refused() {
         assert!(code == Some(5) && said.contains("tiles 0..4 are in use by another process"), "{said}");
     }
     let (stdout, _) = place.success(&["info", "cube.zarr"]);
-    assert!(stdout.contains("a process works on the tiles 0..4"), "{stdout}");
+    assert!(stdout.contains("tiles 0..4 by ") && stdout.contains("\nwaiting          5 tiles: 4..9"), "{stdout}");
     // The others are free, and who ends, however it does, holds nothing.
     assert_eq!(second(&["--tiles", "4..9"]).0, Some(0));
     first.0.kill().expect("killed");

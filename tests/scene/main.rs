@@ -1,10 +1,13 @@
 //! The scene loader from outside: what good scenes resolve to, number by number, what is said about wrong ones, and
 //! that nothing makes it panic.
 
+mod heat;
 mod lights;
 mod materials;
+mod media;
 mod never_panics;
 mod resolved;
+mod textures;
 mod wrong;
 
 use spectile::Result;

@@ -1,7 +1,7 @@
 //! Conductors, dielectrics, plastics and blends: what good ones resolve to, and what is said about wrong ones.
 
 use spectile::Error;
-use spectile::scene::{Bsdf, Material, Scene, Shape};
+use spectile::scene::{Bsdf, Material, Reflectance, Scene, Shape, Weight};
 use spectile::spectral::{Curve, Outside};
 
 use super::wrong::check_wrong;
@@ -69,7 +69,9 @@ fn dielectrics_and_plastics_resolve() {
     assert!((scene.spectra[eta].curve.eval(500.0) - 1.54).abs() < 1e-7 && !dispersion && roughness == 1.0);
     let scene = load("[materials.m.plastic]\nreflectance = \"grey\"\neta = 1.5\nroughness = 0.05");
     let m = material(&scene, "m");
-    let Bsdf::Plastic { reflectance, eta, roughness } = m.bsdf else { panic!("{m:?}") };
+    let Bsdf::Plastic { reflectance: Reflectance::Spectrum(reflectance), eta, roughness } = m.bsdf else {
+        panic!("{m:?}")
+    };
     assert_eq!(scene.spectra[reflectance].curve, Curve::Constant(0.5));
     assert_eq!((&scene.spectra[eta].curve, roughness, m.two_sided), (&Curve::Constant(1.5), 0.05, true));
 }
@@ -82,8 +84,8 @@ fn blends_resolve() {
     );
     let names: Vec<_> = scene.materials.iter().map(|m| m.name.as_str()).collect();
     assert_eq!(names, ["white", "soot", "inner", "m"]);
-    assert_eq!(material(&scene, "m").bsdf, Bsdf::Blend { a: 2, b: 0, weight: 0.25 });
-    assert_eq!(material(&scene, "inner").bsdf, Bsdf::Blend { a: 0, b: 1, weight: 1.0 });
+    assert_eq!(material(&scene, "m").bsdf, Bsdf::Blend { a: 2, b: 0, weight: Weight::Constant(0.25) });
+    assert_eq!(material(&scene, "inner").bsdf, Bsdf::Blend { a: 0, b: 1, weight: Weight::Constant(1.0) });
 }
 
 #[test]
@@ -149,7 +151,6 @@ fn wrong_materials() {
         ("roughness negative", conductor("roughness = [0.1, -0.1] #!"), "materials.m.conductor.roughness.1", &["in [0, 1]"]),
         ("half smooth", conductor("roughness = [0, 0.1] #!"), "materials.m.conductor.roughness", &["0.001", "0 and 0.1"]),
         ("compensation", conductor("energy_compensation = 1 #!"), "materials.m.conductor.energy_compensation", &["true or false"]),
-        ("temperature", conductor("temperature = 300 #!"), "materials.m.conductor.temperature", &["not supported yet"]),
         ("no eta of glass", "[materials.m.dielectric] #!".into(), "materials.m.dielectric.eta", &["`eta` is missing"]),
         ("eta negative", "[materials.m.dielectric]\neta = -1.5 #!".into(), "materials.m.dielectric.eta", &["(0, 1000]"]),
         ("eta of a body", "[materials.m.dielectric]\neta = { blackbody = 300 } #!".into(), "materials.m.dielectric.eta.blackbody", &["is a black body"]),
@@ -164,7 +165,6 @@ fn wrong_materials() {
         ("no k to take", "[materials.m.dielectric]\neta = { file = \"n.yml\", column = \"k\" } #!".into(), "materials.m.dielectric.eta.file", &["does not give k"]),
         ("no weight", blend("").replace("blend]", "blend] #!"), "materials.m.blend.weight", &["missing", "share of b"]),
         ("weight", blend("weight = 1.25 #!"), "materials.m.blend.weight", &["[0, 1]", "1.25"]),
-        ("mask", blend("weight = { texture = \"a.png\" } #!"), "materials.m.blend.weight.texture", &["not supported yet"]),
         ("unknown part", blend("weight = 0.5").replace("\"soot\"", "\"sot\" #!"), "materials.m.blend.b", &["no material is named \"sot\"", "did you mean `soot`?"]),
         ("part a number", blend("weight = 0.5").replace("\"soot\"", "1 #!"), "materials.m.blend.b", &["a string"]),
         ("itself", blend("weight = 0.5").replace("\"soot\"", "\"m\" #!"), "materials.m.blend.b", &["cannot contain itself: m -> m"]),
@@ -189,19 +189,25 @@ fn a_blend_of_too_many() {
     check_wrong(&scene, &[], "64 parts", "materials.b5.blend.b", &["blends 64 materials", "at most 32"]);
 }
 
-/// Two roughnesses need directions on the surface.
+/// Two roughnesses need directions on the surface: spheres have them, meshes where they have texture coordinates.
 #[test]
-fn anisotropy_is_refused_where_a_surface_has_no_tangent() {
+fn anisotropy_needs_a_tangent() {
     const BRUSHED: &str = "[materials.m.conductor]\neta = 1\nk = 1\nroughness = [0.1, 0.2]\n[materials.mix.blend]\na = \"soot\"\nb = \"m\"\nweight = 0.5";
     for name in ["m", "mix"] {
         let text = with_material(BRUSHED).replace("material = \"m\"", &format!("material = \"{name}\""));
         good(&text, &[], &[]);
-        let mark = |text: &str| text.replacen("[[objects]]", "[[objects]] #!", 1);
         let quad = "quad = { corner = [0, 0, 0], edge_u = [2, 0, 0], edge_v = [0, 3, 0] }";
-        let ball = mark(&text).replace(quad, "sphere = { center = [0, 0, 0], radius = 1 }");
-        check_wrong(&ball, &[], name, "objects.0", &["two roughnesses", "on a sphere"]);
-        let mesh = mark(&text).replace(quad, "mesh = \"tri.obj\"");
-        check_wrong(&mesh, &[], name, "objects.0", &["two roughnesses", "on an OBJ mesh"]);
+        let ball = text.replace(quad, "sphere = { center = [0, 0, 0], radius = 1 }");
+        assert_eq!(good(&ball, &[], &[]).objects[0].attributes.axes, Some(glam::DMat3::IDENTITY));
+        let mesh = text.replace(quad, "mesh = \"tri.obj\"");
+        let Err(Error::Input(problems)) = parse_with(&mesh, &[], &[]) else { panic!("no tangent") };
+        let [problem] = &problems[..] else { panic!("{problems:?}") };
+        assert!(problem.file.ends_with("tri.obj") && problem.line == Some(6), "{problem}");
+        assert!(problem.key.as_deref() == Some("objects.0.mesh") && problem.message.contains("two roughnesses"));
+        let with_uv = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n";
+        assert!(good(&mesh, &[("tri.obj", with_uv)], &[]).warnings.is_empty());
+        let flat = good(&mesh, &[("tri.obj", &with_uv.replace("vt 0 1", "vt 2 0"))], &[]).warnings;
+        assert!(flat.len() == 1 && flat[0].contains("1 triangles") && flat[0].contains("first edge"), "{flat:?}");
     }
 }
 

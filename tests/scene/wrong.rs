@@ -79,7 +79,6 @@ fn camera() {
         ("flip_x a number", "fov = 60.0", "fov = 60.0\nflip_x = 1 #!", "camera.perspective.flip_x", &["true or false"]),
         ("two cameras", "fov = 60.0", "fov = 60.0\n[camera.orthographic] #!", "camera.orthographic", &["only one kind of camera", "perspective, orthographic"]),
         ("unknown camera", "fov = 60.0", "fov = 60.0\n[camera.fisheye] #!", "camera.fisheye", &["unknown key", "thin_lens"]),
-        ("medium", "fov = 60.0", "fov = 60.0\nmedium = \"air\" #!", "camera.perspective.medium", &["not supported yet"]),
     ]);
     for (name, from, to, key, words) in [
         ("no fov", "fov = 60.0", "", "camera.perspective.fov", "`fov` is missing"),
@@ -229,8 +228,6 @@ fn spectra_and_materials() {
         ("unknown far spectrum", USE, "reflectance = \"copper\" #!", white, &["no spectrum is named", "grey, lamp"]),
         ("file for a name", USE, "reflectance = \"white.csv\" #!", white, &["write { file = \"white.csv\" }"]),
         ("boolean spectrum", USE, "reflectance = true #!", white, &["must be a spectrum", "a boolean"]),
-        ("texture", USE, "reflectance = { texture = \"a.png\" } #!", "materials.white.diffuse.reflectance.texture", &["not supported yet"]),
-        ("temperature", USE, "reflectance = 0.5\ntemperature = 300 #!", "materials.white.diffuse.temperature", &["not supported yet"]),
         ("two_sided", USE, "reflectance = 0.5\ntwo_sided = \"yes\" #!", "materials.white.diffuse.two_sided", &["true or false"]),
         ("two kinds", "[materials.soot.black]", "[materials.soot.black]\n[materials.soot.diffuse] #!\nreflectance = 1", "materials.soot.diffuse", &["only one kind of material"]),
         ("no kind", "[materials.soot.black]", "[materials.soot.black]\n[materials.bare] #!", "materials.bare", &["no kind of material"]),
@@ -260,7 +257,6 @@ fn objects() {
         ("unknown material", "material = \"white\"", "material = \"whit\" #!", "objects.0.material", &["no material is named \"whit\"", "did you mean `white`?"]),
         ("negative emission", "emission = \"lamp\"", "emission = -2 #!", "objects.1.emission", &["[0, 1e35]", "-2"]),
         ("emission_sides", "emission = \"lamp\"", "emission = 1\nemission_sides = \"back\" #!", "objects.1.emission_sides", &["\"front\", \"both\""]),
-        ("interior", "emission = \"lamp\"", "interior = \"plume\" #!", "objects.1.interior", &["not supported yet"]),
         ("missing mesh", MESH, "mesh = \"nowhere.obj\" #!\nmaterial = \"soot\"", "objects.1.mesh", &["nowhere.obj", "cannot be read"]),
         ("unknown group", MESH, "mesh = \"tri.obj\"\nmaterial = \"soot\"\ngroup = \"roof\" #!", "objects.1.group", &["\"roof\"", "groups with faces: part"]),
         ("scale 0", MESH, "mesh = \"tri.obj\"\nmaterial = \"soot\"\ntransform = { scale = 0 } #!", "objects.1.transform", &["determinant is 0"]),
@@ -275,7 +271,6 @@ fn objects() {
         ("negative sky", "radiance = 0.25", "radiance = -0.25 #!", "environment.radiance", &["[0, 1e35]"]),
         ("sky scaled too far", "radiance = 0.25", "radiance = 1e30\nscale = 1e10 #!", "environment.scale", &["[0, 1e35]", "after scaling"]),
         ("sky scaled below 0", "radiance = 0.25", "radiance = 1\nscale = -1 #!", "environment.scale", &["0 or greater"]),
-        ("medium", "[environment]", "[media.air] #!\nabsorption = 1\n[environment]", "media.air", &["not supported yet"]),
         ("objects no array", "[environment]", "[environment]\nobjects = 3 #!", "environment.objects", &["unknown key"]),
     ]);
     let text = changed(QUAD, "").replacen("[[objects]]", "[[objects]] #!", 1);
@@ -444,7 +439,7 @@ fn overrides_replace_and_their_mistakes_name_them() {
     );
     assert_eq!(scene.channels.len(), 1000);
     assert_eq!(scene.film.cube_size(), [8, 8]);
-    assert_eq!((scene.objects[0].material, scene.materials.len()), (0, 1));
+    assert_eq!((scene.objects[0].material, scene.materials.len()), (Some(0), 1));
     assert_eq!(scene.spectra[0].curve, Curve::Constant(0.75));
     assert!(matches!(scene.objects[1].shape, Shape::Sphere { radius: 2.0, .. }));
     assert_eq!(good(BASE, &[], &[("channels.intervals", "[[400, 500]]")]).channels.bounds, [[400.0, 500.0]]);

@@ -7,8 +7,9 @@ pub mod surfaces;
 
 use glam::{DMat3, DVec2, DVec3};
 use spectile::scene::{
-    Bsdf, Camera, Emission, Environment, EnvironmentMap, Film, Filter, Integrator, Light, Material, Mesh, Object,
-    Projection, Sampler, Scene, Shape, Sides, Spectrum, Texels, Wavelengths,
+    Attributes, Bsdf, Camera, Emission, Environment, EnvironmentMap, Film, Filter, Integrator, Light, Material, Mesh,
+    Object, Projection, Reflectance, Sampler, Scene, Shape, Sides, Spectrum, Texels, Texture, TextureKind, Wavelengths,
+    Weight,
 };
 use spectile::spectral::{Channels, Curve, upsample};
 
@@ -33,7 +34,10 @@ impl Builder {
             },
             spectra: Vec::new(),
             materials: Vec::new(),
+            textures: Vec::new(),
             objects: Vec::new(),
+            media: Vec::new(),
+            camera_medium: None,
             lights: Vec::new(),
             environment: None,
             warnings: Vec::new(),
@@ -108,12 +112,12 @@ impl Builder {
     /// A shape that reflects and does not emit, on both sides.
     pub fn diffuse(mut self, shape: Shape, reflectance: impl IntoCurve) -> Self {
         let reflectance = self.spectrum(reflectance);
-        self.object(shape, Bsdf::Diffuse { reflectance }, true, None)
+        self.object(shape, Bsdf::Diffuse { reflectance: Reflectance::Spectrum(reflectance) }, true, None)
     }
 
     pub fn one_sided(mut self, shape: Shape, reflectance: impl IntoCurve) -> Self {
         let reflectance = self.spectrum(reflectance);
-        self.object(shape, Bsdf::Diffuse { reflectance }, false, None)
+        self.object(shape, Bsdf::Diffuse { reflectance: Reflectance::Spectrum(reflectance) }, false, None)
     }
 
     /// A shape that reflects and emits.
@@ -125,7 +129,12 @@ impl Builder {
         sides: Sides,
     ) -> Self {
         let (reflectance, radiance) = (self.spectrum(reflectance), self.spectrum(radiance));
-        self.object(shape, Bsdf::Diffuse { reflectance }, true, Some(Emission { radiance, sides }))
+        self.object(
+            shape,
+            Bsdf::Diffuse { reflectance: Reflectance::Spectrum(reflectance) },
+            true,
+            Some(Emission { radiance, sides }),
+        )
     }
 
     /// A shape that emits and reflects nothing.
@@ -152,14 +161,58 @@ impl Builder {
 
     pub fn plastic(mut self, shape: Shape, reflectance: impl IntoCurve, eta: impl IntoCurve, roughness: f64) -> Self {
         let (reflectance, eta) = (self.spectrum(reflectance), self.spectrum(eta));
-        self.object(shape, Bsdf::Plastic { reflectance, eta, roughness }, true, None)
+        self.object(
+            shape,
+            Bsdf::Plastic { reflectance: Reflectance::Spectrum(reflectance), eta, roughness },
+            true,
+            None,
+        )
     }
 
     /// A blend of the materials of the last two objects, which only lend theirs.
     pub fn blend_of_last_two(mut self, shape: Shape, weight: f64) -> Self {
         let last = self.0.materials.len() - 1;
         self.0.objects.truncate(self.0.objects.len() - 2);
-        self.object(shape, Bsdf::Blend { a: last - 1, b: last, weight }, true, None)
+        self.object(shape, Bsdf::Blend { a: last - 1, b: last, weight: Weight::Constant(weight) }, true, None)
+    }
+
+    /// A diffuse surface with a texture.
+    pub fn textured(self, shape: Shape, texture: usize) -> Self {
+        self.object(shape, Bsdf::Diffuse { reflectance: Reflectance::Texture(texture) }, true, None)
+    }
+
+    /// A coat over a textured base.
+    pub fn coated(mut self, shape: Shape, texture: usize, eta: impl IntoCurve, roughness: f64) -> Self {
+        let eta = self.spectrum(eta);
+        let bsdf = Bsdf::Plastic { reflectance: Reflectance::Texture(texture), eta, roughness };
+        self.object(shape, bsdf, true, None)
+    }
+
+    /// A blend of the materials of the last two objects, which only lend theirs, by a texture.
+    pub fn masked_last_two(mut self, shape: Shape, texture: usize) -> Self {
+        self = self.blend_of_last_two(shape, 0.5);
+        let Some(Bsdf::Blend { weight, .. }) = self.0.materials.last_mut().map(|m| &mut m.bsdf) else { unreachable!() };
+        *weight = Weight::Texture(texture);
+        self
+    }
+
+    /// Shares of `endmembers`, \[y\]\[x\]\[endmember\], rows from the top.
+    pub fn mixture(&mut self, size: [u32; 2], texels: &[f32], endmembers: &[Curve]) -> usize {
+        let spectra = endmembers.iter().map(|curve| self.spectrum(curve.clone())).collect();
+        self.texture(size, texels, TextureKind::Mixture(spectra))
+    }
+
+    pub fn texture(&mut self, size: [u32; 2], texels: &[f32], kind: TextureKind) -> usize {
+        let texture = Texture { name: "texture".into(), size, kind, texels: texels.into() };
+        assert_eq!(texels.len(), size[0] as usize * size[1] as usize * texture.channels());
+        self.0.textures.push(texture);
+        self.0.textures.len() - 1
+    }
+
+    /// The last object's attributes.
+    pub fn attributes(mut self, attributes: Attributes) -> Self {
+        self.0.objects.last_mut().expect("an object").attributes = attributes;
+        self
     }
 
     pub fn build(self) -> Scene {
@@ -174,9 +227,10 @@ impl Builder {
 
     fn object(mut self, shape: Shape, bsdf: Bsdf, two_sided: bool, emission: Option<Emission>) -> Self {
         let material = self.0.materials.len();
-        self.0.materials.push(Material { name: format!("material {material}"), bsdf, two_sided });
+        self.0.materials.push(Material { name: format!("material {material}"), bsdf, two_sided, temperature: None });
         let name = format!("objects.{}", self.0.objects.len());
-        self.0.objects.push(Object { name, shape, material, emission });
+        let (attributes, material) = (Attributes::default(), Some(material));
+        self.0.objects.push(Object { name, shape, attributes, material, emission, interior: None });
         self
     }
 }

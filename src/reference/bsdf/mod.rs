@@ -30,7 +30,7 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use crate::scene::{Bsdf as Description, MaterialId, SMOOTH, Scene, SpectrumId};
+use crate::scene::{Bsdf as Description, MaterialId, Reflectance, SMOOTH, Scene, SpectrumId, TextureId, Weight};
 pub use spectra::SpectralValues;
 
 /// Where a path meets a material.
@@ -39,7 +39,7 @@ pub struct Vertex<'v> {
     pub o: DVec3,
     /// Whether the path comes from behind, against the geometric normal: from inside a dielectric.
     pub inside: bool,
-    /// At this path's wavelengths; holds those of [`Bsdf::spectra`].
+    /// At this path's wavelengths; holds those of [`Bsdf::spectra`], and [`Bsdf::textures`] at this vertex.
     pub spectra: &'v SpectralValues<'v>,
     /// The channels that have not stopped.
     pub alive: Range<usize>,
@@ -78,8 +78,10 @@ enum Choice {
 /// A lobe's place in a material.
 struct Part {
     lobe: Box<dyn Lobe>,
-    /// Share of a blend.
+    /// Share of a blend, but for what is textured of it.
     weight: f64,
+    /// Textures whose number, or what is missing of it to 1 (true), are factors of the share.
+    shares: Vec<(TextureId, bool)>,
     /// Whether nothing passes. An opaque surface has no inside: its back is as its front, or black.
     opaque: bool,
     two_sided: bool,
@@ -89,6 +91,7 @@ struct Part {
 pub struct Bsdf {
     parts: Vec<Part>,
     spectra: Vec<SpectrumId>,
+    textures: Vec<TextureId>,
 }
 
 /// A direction to go on in.
@@ -110,8 +113,8 @@ pub struct Scattering<'v> {
 
 impl Bsdf {
     pub fn new(scene: &Scene, material: MaterialId) -> Self {
-        let mut bsdf = Bsdf { parts: Vec::new(), spectra: Vec::new() };
-        bsdf.add(scene, material, 1.0);
+        let mut bsdf = Bsdf { parts: Vec::new(), spectra: Vec::new(), textures: Vec::new() };
+        bsdf.add(scene, material, 1.0, &[]);
         bsdf.spectra.sort_unstable();
         bsdf.spectra.dedup();
         bsdf
@@ -122,7 +125,19 @@ impl Bsdf {
         &self.spectra
     }
 
-    fn add(&mut self, scene: &Scene, material: MaterialId, weight: f64) {
+    /// What [`SpectralValues`] must have looked up at the vertex before [`Bsdf::at`].
+    pub fn textures(&self) -> &[TextureId] {
+        &self.textures
+    }
+
+    fn add_reflectance(&mut self, reflectance: Reflectance) {
+        match reflectance {
+            Reflectance::Spectrum(spectrum) => self.spectra.push(spectrum),
+            Reflectance::Texture(texture) => self.textures.push(texture),
+        }
+    }
+
+    fn add(&mut self, scene: &Scene, material: MaterialId, weight: f64, shares: &[(TextureId, bool)]) {
         if weight == 0.0 {
             return;
         }
@@ -131,7 +146,7 @@ impl Bsdf {
         let (opaque, lobes): (bool, Vec<Box<dyn Lobe>>) = match material.bsdf {
             Description::Black => (true, Vec::new()),
             Description::Diffuse { reflectance } => {
-                self.spectra.push(reflectance);
+                self.add_reflectance(reflectance);
                 (true, vec![Box::new(Lambert { reflectance })])
             }
             Description::Conductor { eta, k, roughness, energy_compensation } => {
@@ -145,17 +160,25 @@ impl Bsdf {
                 (false, dielectric::lobes(scene, eta, dispersion, roughness))
             }
             Description::Plastic { reflectance, eta, roughness } => {
-                self.spectra.extend([reflectance, eta]);
+                self.add_reflectance(reflectance);
+                self.spectra.push(eta);
                 let roughness = (!smooth(roughness)).then_some(roughness);
                 (true, plastic::lobes(scene, reflectance, eta, roughness))
             }
-            Description::Blend { a, b, weight: of_b } => {
-                self.add(scene, a, weight * (1.0 - of_b));
-                return self.add(scene, b, weight * of_b);
+            Description::Blend { a, b, weight: Weight::Constant(of_b) } => {
+                self.add(scene, a, weight * (1.0 - of_b), shares);
+                return self.add(scene, b, weight * of_b, shares);
+            }
+            Description::Blend { a, b, weight: Weight::Texture(texture) } => {
+                self.textures.push(texture);
+                let with = |missing| [shares, &[(texture, missing)]].concat();
+                self.add(scene, a, weight, &with(true));
+                return self.add(scene, b, weight, &with(false));
             }
         };
         let two_sided = material.two_sided;
-        self.parts.extend(lobes.into_iter().map(|lobe| Part { lobe, weight, opaque, two_sided }));
+        let part = |lobe| Part { lobe, weight, shares: shares.to_vec(), opaque, two_sided };
+        self.parts.extend(lobes.into_iter().map(part));
     }
 
     /// The material as a path meets it; `None` where nothing is scattered.
@@ -164,7 +187,7 @@ impl Bsdf {
         let mut parts: Vec<(&Part, f64)> = active.map(|part| (part, 1.0)).collect();
         if let [(part, _)] = parts[..] {
             let seen = part.seen_from(&at);
-            let largest = at.alive.clone().map(|k| part.weight * part.lobe.albedo(&seen, k)).fold(0.0, f64::max);
+            let largest = at.alive.clone().map(|k| part.share(&at) * part.lobe.albedo(&seen, k)).fold(0.0, f64::max);
             return (largest > 0.0).then(|| Scattering { parts, at, survival: largest.min(1.0) });
         }
         let (mut mean, mut largest) = (vec![0.0; parts.len()], vec![0.0f64; parts.len()]);
@@ -172,7 +195,7 @@ impl Bsdf {
         let mut albedos = vec![0.0; parts.len()];
         for k in at.alive.clone() {
             for (albedo, (part, _)) in albedos.iter_mut().zip(&parts) {
-                *albedo = part.weight * part.lobe.albedo(&part.seen_from(&at), k).max(0.0);
+                *albedo = part.share(&at) * part.lobe.albedo(&part.seen_from(&at), k).max(0.0);
             }
             let total: f64 = albedos.iter().sum();
             if total > 0.0 {
@@ -196,6 +219,15 @@ impl Bsdf {
 }
 
 impl Part {
+    /// The share of a blend at a vertex.
+    fn share(&self, at: &Vertex) -> f64 {
+        let factor = |&(texture, missing): &(TextureId, bool)| {
+            let number = at.spectra.number(texture);
+            if missing { 1.0 - number } else { number }
+        };
+        self.weight * self.shares.iter().map(factor).product::<f64>()
+    }
+
     fn seen_from<'v>(&self, at: &Vertex<'v>) -> Vertex<'v> {
         Vertex { inside: at.inside && !self.opaque, ..at.clone() }
     }
@@ -214,7 +246,7 @@ impl Scattering<'_> {
         let mut density = 0.0;
         for (part, q) in &self.parts {
             let at = part.seen_from(&self.at);
-            part.lobe.evaluate(&at, i, part.weight, out);
+            part.lobe.evaluate(&at, i, part.share(&at), out);
             density += q * part.lobe.density(&at, i);
         }
         density
@@ -247,7 +279,7 @@ impl Scattering<'_> {
                 let count = channel.map_or(1.0, |_| self.at.alive.len() as f64);
                 for k in self.at.alive.clone() {
                     let goes_on = channel.is_none_or(|channel| channel == k);
-                    factor[k] = if goes_on { count * part.weight * part.lobe.factor(&at, k) / q } else { 0.0 };
+                    factor[k] = if goes_on { count * part.share(&at) * part.lobe.factor(&at, k) / q } else { 0.0 };
                 }
                 Some(Sampled { direction, density: None, channel })
             }
@@ -257,12 +289,12 @@ impl Scattering<'_> {
 
 /// Lambert's law.
 struct Lambert {
-    reflectance: SpectrumId,
+    reflectance: Reflectance,
 }
 
 impl Lobe for Lambert {
     fn albedo(&self, at: &Vertex, k: usize) -> f64 {
-        at.spectra.value(self.reflectance, k)
+        at.spectra.reflectance(self.reflectance, k)
     }
 
     fn sample(&self, _at: &Vertex, u: [f64; 3]) -> Option<Choice> {
@@ -272,7 +304,7 @@ impl Lobe for Lambert {
     fn evaluate(&self, at: &Vertex, i: DVec3, scale: f64, out: &mut [f64]) {
         let density = scale * cosine_density(i);
         for k in at.alive.clone() {
-            out[k] += density * at.spectra.value(self.reflectance, k);
+            out[k] += density * at.spectra.reflectance(self.reflectance, k);
         }
     }
 

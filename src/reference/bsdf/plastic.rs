@@ -10,10 +10,10 @@ use super::reflection::{Boundary, Mirror, RoughMirror};
 use super::{Choice, Lobe, Vertex, cosine_density, cosine_direction, fresnel};
 use crate::scattering::fresnel::mean_dielectric;
 use crate::scattering::{DielectricAlbedo, index_range};
-use crate::scene::{Scene, SpectrumId};
+use crate::scene::{Reflectance, Scene, SpectrumId};
 
 /// The coat's reflection, and what comes out of the base.
-pub fn lobes(scene: &Scene, reflectance: SpectrumId, eta: SpectrumId, roughness: Option<f64>) -> Vec<Box<dyn Lobe>> {
+pub fn lobes(scene: &Scene, reflectance: Reflectance, eta: SpectrumId, roughness: Option<f64>) -> Vec<Box<dyn Lobe>> {
     let range = index_range(&scene.spectra[eta].curve, &scene.channels);
     let rough = roughness.map(|alpha| Arc::new(DielectricAlbedo::new(alpha, range)));
     let coat = Coat { eta, rough };
@@ -69,14 +69,14 @@ impl Boundary for Coat {
 /// as diffuse). Reciprocal, and white with a white base under every coat. A rough coat's own multiple scattering goes
 /// into the base.
 struct Base {
-    reflectance: SpectrumId,
+    reflectance: Reflectance,
     coat: Coat,
 }
 
 impl Base {
     /// ρ τ / (1 - ρ (1 - τ)), and t_avg.
     fn inner(&self, at: &Vertex, k: usize) -> (f64, f64) {
-        let (rho, eta) = (at.spectra.value(self.reflectance, k), at.spectra.value(self.coat.eta, k));
+        let (rho, eta) = (at.spectra.reflectance(self.reflectance, k), at.spectra.value(self.coat.eta, k));
         let mean = 1.0 - self.coat.mean_reflected(at, k);
         let leaves = mean / (eta * eta);
         (rho * leaves / (1.0 - rho * (1.0 - leaves)), mean)

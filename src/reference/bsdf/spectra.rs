@@ -1,6 +1,9 @@
 //! Spectra at the wavelength samples of one path.
 
-use crate::scene::{Scene, SpectrumId};
+use glam::DVec2;
+
+use super::super::texture::{self, Colours};
+use crate::scene::{Reflectance, Scene, SpectrumId, TextureId, TextureKind};
 
 /// Every spectrum of a scene at a path's wavelength samples, filled in when first asked for.
 pub struct SpectralValues<'a> {
@@ -8,11 +11,20 @@ pub struct SpectralValues<'a> {
     /// λ_k in nm.
     wavelength: Vec<f64>,
     values: Vec<Option<Vec<f64>>>,
+    /// What each texture is at the vertex of the last [`SpectralValues::look_up`] that named it: \[K\], or one number.
+    textured: Vec<Vec<f64>>,
+    colours: Colours,
 }
 
 impl<'a> SpectralValues<'a> {
     pub fn new(scene: &'a Scene) -> Self {
-        SpectralValues { scene, wavelength: vec![0.0; scene.channels.len()], values: vec![None; scene.spectra.len()] }
+        SpectralValues {
+            scene,
+            wavelength: vec![0.0; scene.channels.len()],
+            values: vec![None; scene.spectra.len()],
+            textured: vec![Vec::new(); scene.textures.len()],
+            colours: Colours::default(),
+        }
     }
 
     /// Goes over to wavelength coordinate `mu` (Eq. 4 of the method: one for all channels).
@@ -53,6 +65,48 @@ impl<'a> SpectralValues<'a> {
             let curve = &self.scene.spectra[spectrum].curve;
             self.wavelength.iter().map(|&nm| curve.eval(nm)).collect()
         })
+    }
+
+    /// Looks `textures` up at a vertex.
+    pub fn look_up(&mut self, textures: &[TextureId], uv: DVec2) {
+        let scene = self.scene;
+        for &id in textures {
+            let texture = &scene.textures[id];
+            let mut values = vec![0.0; self.wavelength.len()];
+            match &texture.kind {
+                TextureKind::Colour => {
+                    let wavelength = &self.wavelength;
+                    self.colours.at(texture, uv, |spectrum, weight| {
+                        for (value, nm) in values.iter_mut().zip(wavelength) {
+                            *value += weight * spectrum.eval(*nm);
+                        }
+                    });
+                }
+                TextureKind::Mixture(endmembers) => {
+                    for (channel, spectrum) in endmembers.iter().enumerate() {
+                        let abundance = texture::channel(texture, uv, channel);
+                        for (value, of_spectrum) in values.iter_mut().zip(self.get(*spectrum)) {
+                            *value += abundance * of_spectrum;
+                        }
+                    }
+                }
+                TextureKind::Number => values = vec![texture::channel(texture, uv, 0)],
+            }
+            self.textured[id] = values;
+        }
+    }
+
+    /// A reflectance that has been filled in or looked up, in channel `k`.
+    pub fn reflectance(&self, reflectance: Reflectance, k: usize) -> f64 {
+        match reflectance {
+            Reflectance::Spectrum(spectrum) => self.value(spectrum, k),
+            Reflectance::Texture(texture) => self.textured[texture][k],
+        }
+    }
+
+    /// The number of a texture that has been looked up.
+    pub fn number(&self, texture: TextureId) -> f64 {
+        self.textured[texture][0]
     }
 
     /// The value of a spectrum that has been filled in, in channel `k`.

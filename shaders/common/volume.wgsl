@@ -1,0 +1,20 @@
+// Media in their places, as `render::media` lays them out: metres per device unit, the volumes around the camera (two words), then
+// VOLUME_WORDS words each, then lists of absorbers.
+//      0 bits            1 absorption        2 source, or NONE   (spectra, without grids)
+//      3, 4 first voxel of temperature, density, or NONE         5, 6 their values where constant
+//      7 … 9 voxels along x, y, z       10 … 21 device units to voxels, rows and offset       22 first word of its absorbers
+// Absorbers: how many; then of each strength, number of columns, and of each column temperature and spectrum.
+
+@group(0) @binding(61) var<storage, read> volumes: array<u32>;
+const VOLUMES_HEAD: u32 = 4u;
+const VOLUME_WORDS: u32 = 24u;
+const VOLUME_GRID: u32 = 1u;
+const VOLUME_EMITS: u32 = 2u;
+
+fn volume_at(number: u32) -> u32 {
+    return VOLUMES_HEAD + number * VOLUME_WORDS;
+}
+
+fn volume_vector(at: u32) -> vec3<f32> {
+    return vec3<f32>(bitcast<f32>(volumes[at]), bitcast<f32>(volumes[at + 1u]), bitcast<f32>(volumes[at + 2u]));
+}

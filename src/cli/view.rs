@@ -1,0 +1,101 @@
+//! `spectile view`: the page of `render --listen` on a cube that is there.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+use super::Output;
+use crate::Result;
+
+/// Look at a cube in a browser: its picture, channels and spectra
+///
+/// Serves one page until Ctrl-C: the picture in true colour, in a single channel, in false colour or, in the thermal infrared,
+/// as brightness temperature; a click shows the spectrum of a pixel. The cube may be one that is being rendered, or larger than
+/// memory: zoomed out only its overview is read. docs/http.md describes what else can be asked of the server.
+#[derive(Debug, clap::Args)]
+#[command(after_long_help = "\
+Examples:
+  spectile view cube.zarr
+  spectile view cube.zarr --listen 127.0.0.1:9000
+  spectile view cube.zarr --listen 0.0.0.0:8090        for other machines, with the token that is printed")]
+pub struct Args {
+    /// The cube, a folder
+    pub cube: PathBuf,
+
+    /// Where to serve the page: IP:PORT, port 0 for any that is free
+    ///
+    /// On an address of this machine alone (127.0.0.1) whoever works on it may look. Where others can connect, the address
+    /// that is printed holds a token, without which nothing is answered.
+    #[arg(long, value_name = "IP:PORT", default_value = "127.0.0.1:8090", value_parser = parse_address)]
+    pub listen: SocketAddr,
+
+    /// Exposure that the page begins with, in EV; otherwise automatic
+    #[arg(long, value_name = "EV", value_parser = super::parse_exposure, allow_hyphen_values = true)]
+    pub exposure: Option<f64>,
+
+    /// One JSON object a line on stdout, instead of text
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// The end of a cube's path, which is all that viewers are told.
+pub fn name_of(cube: &std::path::Path) -> String {
+    let whole = std::fs::canonicalize(cube).unwrap_or_else(|_| cube.to_owned());
+    whole.file_name().map_or_else(|| "cube".into(), |name| name.to_string_lossy().into_owned())
+}
+
+#[cfg(feature = "web")]
+pub fn run(args: &Args, output: &Output) -> Result<()> {
+    use std::sync::atomic::Ordering;
+    use std::time::Duration;
+
+    use serde_json::json;
+
+    use crate::cube::Cube;
+    use crate::preview::{Feed, follow, web};
+
+    let interrupt = super::interrupt::watch()?;
+    let feed = Feed::of_cube(Cube::open(&args.cube)?);
+    follow(Cube::open(&args.cube)?, &feed)?;
+    let about = web::About { name: name_of(&args.cube), exposure: args.exposure, controls: false };
+    let server = web::Server::start(args.listen, feed, about)?;
+    output.event("listening", json!({ "url": server.url(), "token": server.token() }))?;
+    output.text(&format!("{}: look at {} (Ctrl-C ends it)\n", args.cube.display(), server.url()))?;
+    loop {
+        match interrupt.end.load(Ordering::SeqCst) {
+            0 => std::thread::sleep(Duration::from_millis(50)),
+            signal => return Err(crate::Error::Interrupted { signal: signal as i32 }),
+        }
+    }
+}
+
+#[cfg(not(feature = "web"))]
+pub fn run(_: &Args, _: &Output) -> Result<()> {
+    Err(without_web())
+}
+
+/// What a build without the feature `web` says.
+#[cfg(not(feature = "web"))]
+pub fn without_web() -> crate::Error {
+    crate::Error::Usage("this program was built without its web page (cargo feature `web`)".into())
+}
+
+/// An address to listen on.
+pub fn parse_address(text: &str) -> std::result::Result<SocketAddr, String> {
+    let text = text.strip_prefix("localhost:").map_or_else(|| text.to_owned(), |port| format!("127.0.0.1:{port}"));
+    text.parse().map_err(|_| "an address to listen on is IP:PORT, such as 127.0.0.1:8090".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn addresses() {
+        assert_eq!(parse_address("localhost:80"), Ok(SocketAddr::from(([127, 0, 0, 1], 80))));
+        assert_eq!(parse_address("0.0.0.0:8090"), Ok(SocketAddr::from(([0; 4], 8090))));
+        assert!(parse_address("[::1]:8090").expect("an address").is_ipv6());
+        for bad in ["", "8090", ":8090", "127.0.0.1", "example.com:80", "127.0.0.1:70000"] {
+            assert!(parse_address(bad).unwrap_err().contains("127.0.0.1:8090"), "{bad}");
+        }
+    }
+}

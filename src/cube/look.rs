@@ -1,0 +1,361 @@
+//! Looking at a cube while it grows: pictures of a part of it at the resolution of a screen, spectra, means of regions.
+//!
+//! True colour is read from `preview`, 12 bytes a pixel whatever K. Channels by themselves are read from `overview` when
+//! eight or more pixels are one, and only closer up from `radiance`, where one of them costs the reading of all.
+
+use std::fs::{self, File};
+use std::io::{ErrorKind, Read, Seek, SeekFrom};
+use std::time::{Duration, SystemTime};
+
+use super::grid::Rect;
+use super::map::Chunk;
+use super::store::{Cube, Part};
+use super::writer::Writer;
+use super::{BLOCK, Grid};
+use crate::spectral::colour::Picture;
+use crate::{Error, Result};
+
+/// Bytes of radiance that one call may go through; more is refused.
+const MOST_RADIANCE: u64 = 4 << 30;
+
+/// A cube as it is at this moment: as its last commits left it, or with every unit that a writer has merged so far.
+#[derive(Clone, Copy)]
+pub struct Look<'a> {
+    cube: &'a Cube,
+    writer: Option<&'a Writer>,
+}
+
+/// Values of some pixels, or blocks of pixels: rows from the top, `planes` values each; NaN where nothing is rendered.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Window {
+    /// Columns and rows.
+    pub size: [u32; 2],
+    pub planes: usize,
+    pub values: Vec<f32>,
+}
+
+/// The mean over the pixels of a rectangle that have samples.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RegionMean {
+    pub pixels: u64,
+    pub radiance: Vec<f64>,
+    /// Of the mean; pixels are independent. `None` without the array `standard_error`.
+    pub standard_error: Option<Vec<f64>>,
+}
+
+impl Cube {
+    pub fn look(&self) -> Look<'_> {
+        Look { cube: self, writer: None }
+    }
+}
+
+impl Writer {
+    pub fn look(&self) -> Look<'_> {
+        Look { cube: self.cube(), writer: Some(self) }
+    }
+}
+
+impl<'a> Look<'a> {
+    pub fn cube(&self) -> &'a Cube {
+        self.cube
+    }
+
+    /// The newest file of a tile in one of the arrays; `None` before its first unit.
+    fn open(&self, part: Part, tile: u32) -> Result<Option<File>> {
+        if let Some(writer) = self.writer
+            && let Some(suffix) = writer.pending(tile)
+            // By now it may have taken its place, or a newer one is about to.
+            && let Ok(file) = File::open(self.cube.aside_path(part, tile, suffix))
+        {
+            return Ok(Some(file));
+        }
+        let path = self.cube.part_path(part, tile);
+        match File::open(&path) {
+            Ok(file) => Ok(Some(file)),
+            Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+            Err(error) => Err(Error::storage(&path, error)),
+        }
+    }
+
+    /// Reads `values` from the file of a tile, `offset` bytes from its start; false before its first unit.
+    fn read<T: bytemuck::Pod>(&self, part: Part, tile: u32, offset: u64, values: &mut [T]) -> Result<bool> {
+        let Some(mut file) = self.open(part, tile)? else { return Ok(false) };
+        let read = file.seek(SeekFrom::Start(offset)).and_then(|_| file.read_exact(bytemuck::cast_slice_mut(values)));
+        let damaged = |error| Error::storage(&self.cube.part_path(part, tile), format!("is damaged: {error}"));
+        read.map(|()| true).map_err(damaged)
+    }
+
+    /// Samples per pixel of a tile.
+    pub fn samples(&self, tile: u32) -> Result<u32> {
+        let mut samples = [0u32];
+        Ok(if self.read(Part::Samples, tile, 0, &mut samples)? { samples[0] } else { 0 })
+    }
+
+    fn chunk(&self, part: Part, tile: u32) -> Result<Option<Chunk>> {
+        let (cube, grid) = (self.cube, self.cube.grid());
+        let Some(file) = self.open(part, tile)? else { return Ok(None) };
+        Chunk::map(&file, &cube.part_path(part, tile), grid.rect(tile), grid.tile, cube.channels().len()).map(Some)
+    }
+
+    /// The K channels of a pixel, in one contiguous read; `None` before the first unit of its tile. The pixel must lie in
+    /// the picture.
+    pub fn spectrum(&self, x: u32, y: u32) -> Result<Option<Vec<f32>>> {
+        let (grid, channels) = (self.cube.grid(), self.cube.channels().len());
+        let tile = grid.tile_at(x, y);
+        let rect = grid.rect(tile);
+        let pixel = u64::from(y - rect.y0) * u64::from(grid.tile[0]) + u64::from(x - rect.x0);
+        let mut spectrum = vec![0.0f32; channels];
+        let there = self.read::<f32>(Part::Radiance, tile, pixel * channels as u64 * 4, &mut spectrum)?;
+        Ok(there.then_some(spectrum))
+    }
+
+    /// Linear R, G, B of `preview`, in means of `factor` x `factor` pixels counted from the picture's top left; those that
+    /// share pixels with `rect`.
+    pub fn colour(&self, rect: Rect, factor: u32) -> Result<Window> {
+        let grid = self.cube.grid();
+        let mut sums = Sums::new(rect, factor, 3);
+        let mut values = vec![0.0f32; grid.tile_pixels() * 3];
+        for tile in grid.tiles_in(sums.pixels(grid)) {
+            let part = grid.rect(tile);
+            let Some(shared) = part.intersection(&sums.pixels(grid)) else { continue };
+            // The rows that are needed, from the first to the last.
+            let row = grid.tile[0] as usize * 3;
+            let rows = &mut values[..shared.height() as usize * row];
+            if !self.read(Part::Preview, tile, u64::from(shared.y0 - part.y0) * row as u64 * 4, rows)? {
+                continue;
+            }
+            for (y, row) in (shared.y0..shared.y1).zip(rows.chunks_exact(row)) {
+                let first = (shared.x0 - part.x0) as usize;
+                let pixels = row.chunks_exact(3).skip(first).take(shared.width() as usize);
+                for (x, pixel) in (shared.x0..).zip(pixels) {
+                    sums.add(x, y, 1, pixel);
+                }
+            }
+        }
+        Ok(sums.means())
+    }
+
+    /// The radiance in `channels`, in means of `factor` x `factor` pixels counted from the picture's top left; those that
+    /// share pixels with `rect`. From 8 on, a multiple of 8, only `overview` is read.
+    pub fn channels(&self, channels: &[usize], rect: Rect, factor: u32) -> Result<Window> {
+        let mut sums = Sums::new(rect, factor, channels.len());
+        let pixels = sums.pixels(self.cube.grid());
+        match factor.is_multiple_of(BLOCK) {
+            true => self.blocks(channels, pixels, &mut sums)?,
+            false => self.single_pixels(channels, pixels, &mut sums)?,
+        }
+        Ok(sums.means())
+    }
+
+    fn single_pixels(&self, channels: &[usize], pixels: Rect, sums: &mut Sums) -> Result<()> {
+        self.check_radiance(pixels)?;
+        let mut values = vec![0.0; channels.len()];
+        for tile in self.cube.grid().tiles_in(pixels) {
+            let Some(chunk) = self.chunk(Part::Radiance, tile)? else { continue };
+            let Some(shared) = chunk.rect().intersection(&pixels) else { continue };
+            for y in shared.y0..shared.y1 {
+                for x in shared.x0..shared.x1 {
+                    let spectrum = chunk.spectrum(x, y);
+                    values.iter_mut().zip(channels).for_each(|(value, &k)| *value = spectrum[k]);
+                    sums.add(x, y, 1, &values);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn blocks(&self, channels: &[usize], pixels: Rect, sums: &mut Sums) -> Result<()> {
+        let grid = self.cube.grid();
+        let [columns, rows] = grid.tile_blocks();
+        let plane = columns as usize * rows as usize;
+        let mut planes = vec![0.0f32; plane * channels.len()];
+        let mut values = vec![0.0; channels.len()];
+        for tile in grid.tiles_in(pixels) {
+            let mut there = true;
+            for (&k, values) in channels.iter().zip(planes.chunks_exact_mut(plane)) {
+                there &= self.read(Part::Overview, tile, (k * plane * 4) as u64, values)?;
+            }
+            if !there {
+                continue;
+            }
+            let part = grid.rect(tile);
+            for (i, (y, x)) in (0..rows).flat_map(|y| (0..columns).map(move |x| (y, x))).enumerate() {
+                let (x0, y0) = (part.x0 + x * BLOCK, part.y0 + y * BLOCK);
+                let block = Rect { x0, y0, x1: x0 + BLOCK, y1: y0 + BLOCK };
+                // At the picture's edge a block has fewer pixels.
+                let Some(block) = block.intersection(&part).filter(|b| b.intersection(&pixels).is_some()) else {
+                    continue;
+                };
+                values.iter_mut().zip(planes.chunks_exact(plane)).for_each(|(value, plane)| *value = plane[i]);
+                sums.add(x0, y0, block.pixels() as u32, &values);
+            }
+        }
+        Ok(())
+    }
+
+    /// The mean spectrum of the pixels in `rect` that have samples, where there are any.
+    pub fn region(&self, rect: Rect) -> Result<Option<RegionMean>> {
+        self.check_radiance(rect)?;
+        let channels = self.cube.channels().len();
+        let mut pixels = 0;
+        let mut radiance = vec![0.0; channels];
+        let mut variance = Some(vec![0.0; channels]);
+        for tile in self.cube.grid().tiles_in(rect) {
+            let Some(chunk) = self.chunk(Part::Radiance, tile)? else { continue };
+            let errors = self.standard_errors(tile)?;
+            let Some(shared) = chunk.rect().intersection(&rect) else { continue };
+            for y in shared.y0..shared.y1 {
+                for x in shared.x0..shared.x1 {
+                    pixels += 1;
+                    radiance.iter_mut().zip(chunk.spectrum(x, y)).for_each(|(sum, &v)| *sum += f64::from(v));
+                    if let (Some(variance), Some(errors)) = (&mut variance, &errors) {
+                        let errors = errors.spectrum(x, y);
+                        variance.iter_mut().zip(errors).for_each(|(sum, &e)| *sum += f64::from(e) * f64::from(e));
+                    }
+                }
+            }
+            if errors.is_none() {
+                variance = None;
+            }
+        }
+        let n = pixels as f64;
+        radiance.iter_mut().for_each(|sum| *sum /= n);
+        let standard_error = variance.map(|sums| sums.into_iter().map(|sum| sum.sqrt() / n).collect());
+        Ok((pixels > 0).then_some(RegionMean { pixels, radiance, standard_error }))
+    }
+
+    /// Going through the radiance of these pixels must not take for ever.
+    fn check_radiance(&self, rect: Rect) -> Result<()> {
+        let bytes = rect.pixels().saturating_mul(self.cube.channels().len() as u64 * 4);
+        if bytes <= MOST_RADIANCE {
+            return Ok(());
+        }
+        let (bytes, most) = (crate::files::format_bytes(bytes), crate::files::format_bytes(MOST_RADIANCE));
+        Err(Error::Usage(format!("these pixels hold {bytes} of radiance, more than {most}: take fewer, or scale >= 8")))
+    }
+
+    /// The standard errors of a tile, laid out like its radiance, where the cube has them. They are read as the last commit
+    /// left them.
+    fn standard_errors(&self, tile: u32) -> Result<Option<Chunk>> {
+        self.cube.error_chunk(tile)
+    }
+
+    /// The standard error of every channel of a pixel, where the cube has them.
+    pub fn standard_error(&self, x: u32, y: u32) -> Result<Option<Vec<f32>>> {
+        let errors = self.standard_errors(self.cube.grid().tile_at(x, y))?;
+        Ok(errors.map(|chunk| chunk.spectrum(x, y).to_vec()))
+    }
+}
+
+/// Weighted sums over blocks of `factor` x `factor` pixels.
+struct Sums {
+    factor: u32,
+    /// Column and row of the first block, and how many there are.
+    first: [u32; 2],
+    size: [u32; 2],
+    planes: usize,
+    sums: Vec<f32>,
+    weights: Vec<u32>,
+}
+
+impl Sums {
+    fn new(rect: Rect, factor: u32, planes: usize) -> Sums {
+        let first = [rect.x0 / factor, rect.y0 / factor];
+        let size = [rect.x1.div_ceil(factor) - first[0], rect.y1.div_ceil(factor) - first[1]];
+        let blocks = size[0] as usize * size[1] as usize;
+        Sums { factor, first, size, planes, sums: vec![0.0; blocks * planes], weights: vec![0; blocks] }
+    }
+
+    /// The pixels of the picture in these blocks.
+    fn pixels(&self, grid: Grid) -> Rect {
+        let [x0, y0] = self.first.map(|block| block * self.factor);
+        let end = |axis: usize| ((self.first[axis] + self.size[axis]) * self.factor).min(grid.size[axis]);
+        Rect { x0, y0, x1: end(0), y1: end(1) }
+    }
+
+    fn add(&mut self, x: u32, y: u32, weight: u32, values: &[f32]) {
+        let [column, row] = [x / self.factor - self.first[0], y / self.factor - self.first[1]];
+        let block = row as usize * self.size[0] as usize + column as usize;
+        let sums = &mut self.sums[block * self.planes..][..self.planes];
+        if self.weights[block] == 0 && weight == 1 {
+            // A pixel by itself stays what it is, to the last bit.
+            sums.copy_from_slice(values);
+        } else {
+            sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += value * weight as f32);
+        }
+        self.weights[block] += weight;
+    }
+
+    fn means(mut self) -> Window {
+        for (sums, &weight) in self.sums.chunks_exact_mut(self.planes).zip(&self.weights) {
+            match weight {
+                0 => sums.fill(f32::NAN),
+                1 => {}
+                _ => sums.iter_mut().for_each(|sum| *sum /= weight as f32),
+            }
+        }
+        Window { size: self.size, planes: self.planes, values: self.sums }
+    }
+}
+
+impl Window {
+    /// As a picture: three planes are R, G, B, one is grey.
+    pub fn into_picture(self) -> Picture {
+        let rgb = match self.planes {
+            3 => self.values,
+            planes => self.values.iter().step_by(planes).flat_map(|&v| [v; 3]).collect(),
+        };
+        Picture { size: self.size, rgb }
+    }
+}
+
+/// What [`Cube::changes`] knows from the last time.
+pub struct Seen {
+    /// When each row of tiles was looked at, and its folder's time then.
+    rows: Vec<Option<(SystemTime, SystemTime)>>,
+    samples: Vec<u32>,
+}
+
+impl Seen {
+    pub fn nothing(cube: &Cube) -> Seen {
+        let grid = cube.grid();
+        Seen { rows: vec![None; grid.tiles()[1] as usize], samples: vec![0; grid.count() as usize] }
+    }
+
+    /// Samples per pixel of every tile.
+    pub fn samples(&self) -> &[u32] {
+        &self.samples
+    }
+}
+
+impl Cube {
+    /// The tiles whose samples have changed since `seen`, which is brought up to date. Of a large cube at rest only the times
+    /// of a folder for each row of tiles are read.
+    pub fn changes(&self, seen: &mut Seen) -> Result<Vec<u32>> {
+        // The clocks of file systems tick, and a shared one has a clock of its own.
+        const DOUBT: Duration = Duration::from_secs(5);
+        let [columns, _] = self.grid().tiles();
+        let mut changed = Vec::new();
+        for (row, known) in (0..).zip(&mut seen.rows) {
+            let path = self.part_path(Part::Samples, row * columns);
+            let folder = crate::files::parent(&path);
+            let modified = match fs::metadata(folder).and_then(|found| found.modified()) {
+                Ok(modified) => modified,
+                Err(error) if error.kind() == ErrorKind::NotFound => continue,
+                Err(error) => return Err(Error::storage(folder, error)),
+            };
+            let now = SystemTime::now();
+            if known.is_some_and(|(looked, then)| then == modified && looked > modified + DOUBT) {
+                continue;
+            }
+            *known = Some((now, modified));
+            for tile in row * columns..(row + 1) * columns {
+                let samples = self.samples(tile)?;
+                if samples != std::mem::replace(&mut seen.samples[tile as usize], samples) {
+                    changed.push(tile);
+                }
+            }
+        }
+        Ok(changed)
+    }
+}

@@ -1,0 +1,14 @@
+//! Looking at a cube while it is rendered, or afterwards.
+//!
+//! A render publishes to a [`Feed`] and never waits for anybody; the web page and tev are sinks that read from it, on
+//! threads of their own. What they show they read from the cube itself.
+
+mod disk;
+mod feed;
+mod tev;
+#[cfg(feature = "web")]
+pub mod web;
+
+pub use disk::follow;
+pub use feed::{ErrorPoint, Feed, Progress, Snapshot, Source, Stage, Work};
+pub use tev::Tev;

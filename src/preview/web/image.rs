@@ -1,0 +1,193 @@
+//! `/api/image`: a part of the picture at the resolution of a screen, as PNG or as numbers.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex};
+
+use axum::body::Body;
+use axum::extract::rejection::QueryRejection;
+use axum::extract::{Query, State};
+use axum::http::HeaderName;
+use axum::http::header::CONTENT_TYPE;
+use axum::response::{IntoResponse, Response};
+use serde::Deserialize;
+
+use super::App;
+use super::api::Refused;
+use crate::cube::{BLOCK, Look, Rect, Window};
+use crate::format::png;
+use crate::spectral::planck::Thermometer;
+use crate::{Error, Result};
+
+/// From this wavelength on a channel counts as thermal: bodies at room temperature glow in it, and the sun hardly does.
+pub const THERMAL_NM: f64 = 2500.0;
+/// Pixels of an answer.
+const MOST_PIXELS: u64 = 4 << 20;
+/// Pixels of one side that may become one.
+const LARGEST_SCALE: u32 = 1 << 16;
+
+/// Tables of brightness temperatures by channel, made when first asked for.
+#[derive(Default)]
+pub struct Thermometers(Mutex<HashMap<usize, Arc<Thermometer>>>);
+
+impl Thermometers {
+    fn of(&self, k: usize, bounds: [f64; 2]) -> Arc<Thermometer> {
+        const KEPT: usize = 64;
+        let mut kept = self.0.lock().unwrap_or_else(|e| e.into_inner());
+        if kept.len() >= KEPT && !kept.contains_key(&k) {
+            kept.clear();
+        }
+        Arc::clone(kept.entry(k).or_insert_with(|| Arc::new(Thermometer::new(bounds))))
+    }
+}
+
+#[derive(Deserialize, Clone, Copy)]
+pub struct Asked {
+    #[serde(default)]
+    show: Show,
+    /// The channel, or those shown as red, green and blue.
+    k: Option<usize>,
+    r: Option<usize>,
+    g: Option<usize>,
+    b: Option<usize>,
+    x0: Option<u32>,
+    y0: Option<u32>,
+    x1: Option<u32>,
+    y1: Option<u32>,
+    scale: Option<u32>,
+    #[serde(default)]
+    format: Format,
+    ev: Option<f64>,
+    /// Kelvins that are black and white.
+    low: Option<f64>,
+    high: Option<f64>,
+}
+
+#[derive(Deserialize, Default, Clone, Copy, PartialEq)]
+#[serde(rename_all = "lowercase")]
+enum Show {
+    #[default]
+    Colour,
+    Channel,
+    False,
+    Temperature,
+}
+
+#[derive(Deserialize, Default, Clone, Copy, PartialEq)]
+#[serde(rename_all = "lowercase")]
+enum Format {
+    #[default]
+    Png,
+    F32,
+}
+
+pub async fn image(
+    State(app): State<Arc<App>>,
+    asked: std::result::Result<Query<Asked>, QueryRejection>,
+) -> std::result::Result<Response, Refused> {
+    let Query(asked) = asked.map_err(|error| Refused::bad(error.body_text()))?;
+    let thermometers = Arc::clone(&app);
+    let (window, png) = app
+        .read(move |look| {
+            let window = asked.window(look, &thermometers.thermometers)?;
+            let png = (asked.format == Format::Png).then(|| asked.png(window.clone())).transpose()?;
+            Ok((window, png))
+        })
+        .await?;
+    let header = |name: &'static str, value: String| (HeaderName::from_static(name), value);
+    let size = header("x-size", format!("{},{}", window.size[0], window.size[1]));
+    let planes = header("x-planes", window.planes.to_string());
+    Ok(match png {
+        Some((bytes, ev)) => {
+            let ev = header("x-exposure-ev", ev.to_string());
+            ([(CONTENT_TYPE, "image/png".into()), size, planes, ev], Body::from(bytes)).into_response()
+        }
+        None => {
+            let bytes = bytemuck::cast_slice::<f32, u8>(&window.values).to_vec();
+            ([(CONTENT_TYPE, "application/octet-stream".into()), size, planes], Body::from(bytes)).into_response()
+        }
+    })
+}
+
+impl Asked {
+    fn window(&self, look: Look<'_>, thermometers: &Thermometers) -> Result<Window> {
+        let refuse = |what: String| Err(Error::Usage(what));
+        let ([width, height], channels) = (look.cube().header().size, look.cube().channels());
+        let [x0, y0] = [self.x0, self.y0].map(|v| v.unwrap_or(0));
+        let rect = Rect { x0, y0, x1: self.x1.unwrap_or(width), y1: self.y1.unwrap_or(height) };
+        if rect.x0 >= rect.x1 || rect.y0 >= rect.y1 || rect.x1 > width || rect.y1 > height {
+            return refuse(format!("x0, y0, x1, y1 are no part of the picture, which has {width} x {height} pixels"));
+        }
+        let side = |from: u32, to: u32, scale: u32| u64::from(to.div_ceil(scale) - from / scale);
+        let pixels = |scale: u32| side(rect.x0, rect.x1, scale) * side(rect.y0, rect.y1, scale);
+        let powers = || (0..=LARGEST_SCALE.ilog2()).map(|n| 1 << n);
+        // Without a wish, as fine as it may be; of single channels nothing between pixels and blocks.
+        let allowed = |scale: u32| self.show == Show::Colour || scale == 1 || scale >= BLOCK;
+        let default = || powers().find(|&s| allowed(s) && pixels(s) <= MOST_PIXELS).unwrap_or(LARGEST_SCALE);
+        let scale = self.scale.unwrap_or_else(default);
+        if !scale.is_power_of_two() || scale > LARGEST_SCALE {
+            return refuse(format!("scale={scale}: a power of two from 1 to {LARGEST_SCALE}"));
+        }
+        if pixels(scale) > MOST_PIXELS {
+            return refuse(format!(
+                "{} pixels are asked for; at most {MOST_PIXELS}: take a larger scale",
+                pixels(scale)
+            ));
+        }
+        let channel = |name: &str, k: Option<usize>| match k {
+            Some(k) if k < channels.len() => Ok(k),
+            _ => Err(Error::Usage(format!("{name}: a channel from 0 to {} is needed", channels.len() - 1))),
+        };
+        match self.show {
+            Show::Colour => look.colour(rect, scale),
+            Show::Channel => look.channels(&[channel("k", self.k)?], rect, scale),
+            Show::False => {
+                let rgb = [channel("r", self.r)?, channel("g", self.g)?, channel("b", self.b)?];
+                look.channels(&rgb, rect, scale)
+            }
+            Show::Temperature => {
+                let k = channel("k", self.k)?;
+                if channels.centre(k) < THERMAL_NM {
+                    return refuse(format!(
+                        "k={k}: its centre is below {THERMAL_NM} nm, where nothing glows by itself"
+                    ));
+                }
+                let thermometer = thermometers.of(k, channels.bounds[k]);
+                let mut window = look.channels(&[k], rect, scale)?;
+                window.values.iter_mut().for_each(|v| *v = thermometer.kelvin(f64::from(*v)) as f32);
+                Ok(window)
+            }
+        }
+    }
+
+    /// The PNG, and the exposure it has.
+    fn png(&self, mut window: Window) -> Result<(Vec<u8>, f64)> {
+        let mut ev = self.ev;
+        if self.show == Show::Temperature {
+            let (low, high) = range(&window.values);
+            let (low, high) = (self.low.unwrap_or(low), self.high.unwrap_or(high));
+            // What is linear in kelvins is to look linear: the transfer function is undone.
+            window.values.iter_mut().for_each(|v| {
+                let t = ((f64::from(*v) - low) / (high - low).max(1e-6)).clamp(0.0, 1.0);
+                *v = if t <= 0.040_45 { t / 12.92 } else { ((t + 0.055) / 1.055).powf(2.4) } as f32;
+            });
+            ev = Some(0.0);
+        }
+        let picture = window.into_picture();
+        let ev = ev.unwrap_or_else(|| picture.auto_exposure());
+        let made = png::encode(&picture, ev);
+        made.map(|bytes| (bytes, ev)).map_err(|error| Error::Internal(format!("PNG: {error}")))
+    }
+}
+
+/// The 1st and the 99th percentile of what is there and not zero.
+fn range(values: &[f32]) -> (f64, f64) {
+    let mut there: Vec<f32> = values.iter().copied().filter(|v| v.is_finite() && *v > 0.0).collect();
+    if there.is_empty() {
+        return (0.0, 1.0);
+    }
+    let mut at = |percent: usize| {
+        let rank = (there.len() - 1) * percent / 100;
+        f64::from(*there.select_nth_unstable_by(rank, f32::total_cmp).1)
+    };
+    (at(1), at(99))
+}

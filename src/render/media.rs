@@ -1,0 +1,339 @@
+//! Media of a scene as devices get them: volumes in their places, and what lies behind each primitive.
+
+use glam::{DAffine3, DVec3};
+
+use crate::accel::Accel;
+use crate::gpu::layout::{NONE, Primitive};
+use crate::scene::{Field, Interior, Medium, Projection, Scene, SpectrumId};
+use crate::spectral::Curve;
+use crate::{Error, Result};
+
+use super::surfaces::Needed;
+
+/// Numbers of volumes have 8 bits in a path's state, of which 0 is none.
+const MOST_VOLUMES: usize = 254;
+/// Words before the first volume, and of each: `shaders/common/volume.wgsl`.
+const HEAD: usize = 4;
+const WORDS: usize = 24;
+const GRID: u32 = 1;
+const EMITS: u32 = 2;
+/// Bit of a boundary without material.
+const NULL_BOUNDARY: u32 = 0x8000_0000;
+/// Stretches through media that one straight way may have.
+const MOST_STRETCHES: u32 = 16;
+
+/// Everything about media that a device needs. Spectra are positions in `spectra` until [`Media::name_spectra`].
+pub struct Media {
+    pub volumes: Vec<u32>,
+    pub voxels: Vec<f32>,
+    /// One for each primitive.
+    pub boundaries: Vec<u32>,
+    pub spectra: Vec<Needed>,
+    /// The number of the medium outside all interiors, or [`NONE`].
+    pub outer: u32,
+    pub most_absorbers: u32,
+    pub most_columns: u32,
+    /// Stretches of one way, and voxels that it may go through.
+    pub stretches: u32,
+    pub cells: u32,
+    /// Position of the wavelength among `spectra`, where there are grids.
+    pub wavelength: Option<usize>,
+    /// Words of `volumes` that are positions in `spectra`.
+    spectrum_words: Vec<usize>,
+}
+
+/// A medium in a place: of one body, or of all space.
+struct Volume<'a> {
+    medium: &'a Medium,
+    interior: Option<Interior>,
+}
+
+impl Media {
+    /// `None` where the scene has no media. Errors: more volumes than numbers; a camera whose rays do not all start in the
+    /// same media.
+    pub fn new(scene: &Scene, accel: &Accel) -> Result<Option<Media>> {
+        if scene.media.is_empty() {
+            return Ok(None);
+        }
+        let mut volumes: Vec<Volume> = Vec::new();
+        let mut of_object = vec![0u32; scene.objects.len()];
+        for (object, number) in scene.objects.iter().zip(&mut of_object) {
+            let Some(interior) = object.interior else { continue };
+            let known = volumes.iter().position(|v| v.interior.is_some_and(|i| i.body == interior.body));
+            let index = known.unwrap_or_else(|| {
+                volumes.push(Volume { medium: &scene.media[interior.medium], interior: Some(interior) });
+                volumes.len() - 1
+            });
+            *number = index as u32 + 1;
+        }
+        let mut outer = NONE;
+        if let Some(medium) = scene.camera_medium {
+            outer = volumes.len() as u32;
+            volumes.push(Volume { medium: &scene.media[medium], interior: None });
+        }
+        if volumes.len() > MOST_VOLUMES {
+            let message = format!("{} interiors with media, at most {MOST_VOLUMES} are supported", volumes.len());
+            return Err(Error::input(&scene.file, message));
+        }
+        let boundary = |&object: &u32| {
+            let null = scene.objects[object as usize].material.is_none();
+            of_object[object as usize] | if null { NULL_BOUNDARY } else { 0 }
+        };
+        let mut media = Media {
+            volumes: vec![0; HEAD],
+            voxels: Vec::new(),
+            boundaries: accel.objects.iter().map(boundary).collect(),
+            spectra: Vec::new(),
+            outer,
+            most_absorbers: 0,
+            most_columns: 0,
+            stretches: (2 * volumes.len() as u32 + 1).clamp(4, MOST_STRETCHES),
+            cells: 0,
+            wavelength: None,
+            spectrum_words: Vec::new(),
+        };
+        media.volumes.resize(HEAD + WORDS * volumes.len(), 0);
+        media.volumes[0] = (1.0 / accel.space.scale as f32).to_bits();
+        for (index, volume) in volumes.iter().enumerate() {
+            media.fill(scene, accel, index, volume);
+        }
+        let around = media.around_camera(scene, accel)?;
+        media.volumes[1..3].copy_from_slice(&around);
+        Ok(Some(media))
+    }
+
+    pub fn has_grids(&self) -> bool {
+        self.wavelength.is_some()
+    }
+
+    /// Records of one way: a stretch takes three where it has a grid.
+    pub fn way_records(&self) -> u32 {
+        self.stretches * if self.has_grids() { 3 } else { 1 }
+    }
+
+    /// Replaces positions in `spectra` by the ids that the device's tables gave them.
+    pub fn name_spectra(&mut self, id: impl Fn(usize) -> u32) {
+        for &word in &self.spectrum_words {
+            self.volumes[word] = id(self.volumes[word] as usize);
+        }
+    }
+
+    fn fill(&mut self, scene: &Scene, accel: &Accel, index: usize, volume: &Volume) {
+        let first = HEAD + WORDS * index;
+        let medium = volume.medium;
+        let constant = |field: &Field| match field {
+            Field::Constant(value) => Some(*value),
+            Field::Grid(_) => None,
+        };
+        let mut words = [0u32; WORDS];
+        words[2] = NONE;
+        words[0] = if medium.temperature.is_some() { EMITS } else { 0 };
+        let Some(size) = medium.grid_size() else {
+            let kelvin = medium.temperature.as_ref().and_then(constant);
+            let density = constant(&medium.density).unwrap_or(1.0);
+            let (curves, factors) = terms(medium, kelvin, density);
+            let tables: Vec<&Curve> = curves.iter().map(|&s| &scene.spectra[s].curve).collect();
+            let sum = |v: &[f64]| v.iter().zip(&factors).map(|(v, f)| v * f).sum::<f64>();
+            let absorption = Curve::derived(&tables, &scene.channels, sum);
+            words[1] = self.spectrum(first + 1, format!("medium \"{}\"", medium.name), absorption, true);
+            if let Some(kelvin) = kelvin.filter(|kelvin| *kelvin > 0.0) {
+                let source = Curve::Blackbody { kelvin, scale: 1.0 };
+                words[2] = self.spectrum(first + 2, format!("black body at {kelvin} K"), source, false);
+            }
+            self.volumes[first..first + WORDS].copy_from_slice(&words);
+            return;
+        };
+        words[0] |= GRID;
+        let mut grid = |field: Option<&Field>| match field {
+            Some(Field::Grid(grid)) => {
+                self.voxels.extend_from_slice(&grid.values);
+                ((self.voxels.len() - grid.values.len()) as u32, 0.0)
+            }
+            Some(Field::Constant(value)) => (NONE, *value),
+            None => (NONE, 0.0),
+        };
+        let (temperature, density) = (grid(medium.temperature.as_ref()), grid(Some(&medium.density)));
+        (words[3], words[5]) = (temperature.0, (temperature.1 as f32).to_bits());
+        (words[4], words[6]) = (density.0, (density.1 as f32).to_bits());
+        words[7..10].copy_from_slice(&size);
+        let interior = volume.interior.expect("grids fill interiors");
+        let from_device =
+            DAffine3::from_translation(accel.space.center) * DAffine3::from_scale(DVec3::splat(1.0 / accel.space.scale));
+        let scaled = DAffine3::from_scale(DVec3::from(size.map(f64::from))) * interior.to_grid * from_device;
+        let rows = scaled.matrix3.transpose();
+        for (i, value) in [rows.x_axis, rows.y_axis, rows.z_axis, scaled.translation].iter().enumerate() {
+            let bits = value.as_vec3().to_array().map(f32::to_bits);
+            words[10 + 3 * i..13 + 3 * i].copy_from_slice(&bits);
+        }
+        words[22] = self.volumes.len() as u32;
+        self.volumes[first..first + WORDS].copy_from_slice(&words);
+        self.volumes.push(medium.absorbers.len() as u32);
+        for absorber in &medium.absorbers {
+            self.volumes.extend([(absorber.strength as f32).to_bits(), absorber.columns.len() as u32]);
+            for &(kelvin, spectrum) in &absorber.columns {
+                self.volumes.push((kelvin as f32).to_bits());
+                let word = self.volumes.len();
+                let curve = scene.spectra[spectrum].curve.clone();
+                let position = self.spectrum(word, scene.spectra[spectrum].name.clone(), curve, true);
+                self.volumes.push(position);
+            }
+            self.most_columns = self.most_columns.max(absorber.columns.len() as u32);
+        }
+        self.most_absorbers = self.most_absorbers.max(medium.absorbers.len() as u32);
+        self.cells += size.iter().sum::<u32>() + 3;
+        if self.wavelength.is_none() {
+            // µm, linear in every channel.
+            let bounds = scene.channels.bounds.iter().flatten();
+            let [low, high] =
+                bounds.fold([f64::INFINITY, 0.0f64], |[low, high], &nm| [low.min(nm), high.max(nm)]);
+            let curve = Curve::Linear {
+                nm: vec![low, high],
+                value: vec![low * 1e-3, high * 1e-3],
+                outside: crate::spectral::Outside::Hold,
+            };
+            self.wavelength = Some(self.spectra.len());
+            self.spectra.push(Needed::Derived("wavelength".into(), curve));
+        }
+    }
+
+    /// Notes a spectrum for word `word` and gives its position. `pointwise`: wherever it is small it is as exact as elsewhere.
+    fn spectrum(&mut self, word: usize, name: String, curve: Curve, pointwise: bool) -> u32 {
+        self.spectrum_words.push(word);
+        let needed = if pointwise { Needed::Pointwise(name, curve) } else { Needed::Derived(name, curve) };
+        let known = self.spectra.iter().position(|s| *s == needed);
+        known.unwrap_or_else(|| {
+            self.spectra.push(needed);
+            self.spectra.len() - 1
+        }) as u32
+    }
+
+    /// The volumes around the camera, the innermost in the low byte.
+    fn around_camera(&self, scene: &Scene, accel: &Accel) -> Result<[u32; 2]> {
+        let at = |world: DVec3| self.around((world - accel.space.center) * accel.space.scale, &accel.primitives);
+        let camera = &scene.camera;
+        let around = at(camera.position);
+        let [x, y] = match camera.projection {
+            Projection::Perspective { .. } => [0.0; 2],
+            Projection::ThinLens { aperture_radius, .. } => [aperture_radius; 2],
+            Projection::Orthographic { half_size } => half_size.to_array(),
+        };
+        if x > 0.0 {
+            const STEPS: i32 = 8;
+            let places = (-STEPS..=STEPS).flat_map(|i| (-STEPS..=STEPS).map(move |j| (i, j)));
+            let off = |(i, j): (i32, i32)| {
+                let [i, j] = [i, j].map(|n| f64::from(n) / f64::from(STEPS));
+                camera.position + i * x * camera.right + j * y * camera.up
+            };
+            if places.map(off).any(|place| at(place) != around) {
+                let message = "camera rays start in different media, which is not supported: move the camera so that all \
+                               of its lens or window lies in one";
+                return Err(Error::input(&scene.file, message));
+            }
+        }
+        let Some(around) = around else {
+            return Err(Error::input(&scene.file, "the camera is inside more than 8 nested media"));
+        };
+        Ok([around as u32, (around >> 32) as u32])
+    }
+
+    /// The volumes around a point in device units; `None` where they are more than a path can hold.
+    fn around(&self, point: DVec3, primitives: &[Primitive]) -> Option<u64> {
+        // No edge of a model is likely to lie in this direction.
+        let direction = DVec3::new(0.367_879_441, 0.577_215_664, 0.728_913_7).normalize();
+        let mut crossings: Vec<(f64, u32, bool)> = Vec::new();
+        for (primitive, boundary) in primitives.iter().zip(&self.boundaries) {
+            let number = boundary & 0xff;
+            if number != 0 {
+                meet(primitive, point, direction, &mut |t, leaving| crossings.push((t, number, leaving)));
+            }
+        }
+        crossings.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // What is left before it is entered is around the point; what is left first is innermost.
+        let mut around: Vec<u32> = Vec::new();
+        let mut entered: Vec<u32> = Vec::new();
+        for (_, number, leaving) in crossings {
+            if !leaving {
+                entered.push(number);
+            } else if let Some(at) = entered.iter().rposition(|n| *n == number) {
+                entered.remove(at);
+            } else {
+                around.push(number);
+            }
+        }
+        around.extend((self.outer != NONE).then_some(self.outer + 1));
+        (around.len() <= 8).then(|| around.iter().rev().fold(0, |word, &n| word << 8 | u64::from(n)))
+    }
+}
+
+/// Spectra and factors whose sum is the absorption of a homogeneous medium, m⁻¹.
+fn terms(medium: &Medium, kelvin: Option<f64>, density: f64) -> (Vec<SpectrumId>, Vec<f64>) {
+    let mut all = Vec::new();
+    for absorber in &medium.absorbers {
+        let (columns, strength) = (&absorber.columns, absorber.strength * density);
+        let above = kelvin.map_or(0, |kelvin| columns.partition_point(|column| column.0 < kelvin));
+        let high = above.min(columns.len() - 1);
+        let low = above.max(1) - 1;
+        if low == high || columns.len() == 1 {
+            all.push((columns[high].1, strength));
+            continue;
+        }
+        let kelvin = kelvin.expect("a table over temperature has one to look up");
+        let place = (kelvin - columns[low].0) / (columns[high].0 - columns[low].0);
+        all.extend([(columns[low].1, strength * (1.0 - place)), (columns[high].1, strength * place)]);
+    }
+    all.into_iter().unzip()
+}
+
+/// Tells `crossing` where a ray meets a primitive, and whether it leaves what is behind it.
+fn meet(p: &Primitive, origin: DVec3, direction: DVec3, crossing: &mut impl FnMut(f64, bool)) {
+    let [a, b, c] = [p.a, p.b, p.c].map(|v| DVec3::from(v.map(f64::from)));
+    let mut found = |t: f64, normal: DVec3| {
+        if t > 0.0 {
+            crossing(t, normal.dot(direction) > 0.0);
+        }
+    };
+    let f = origin - a;
+    match p.tag >> 24 {
+        1 => {
+            let (half, rest) = (f.dot(direction), f.length_squared() - b.x * b.x);
+            let square = half * half - rest;
+            if square > 0.0 {
+                for t in [-half - square.sqrt(), -half + square.sqrt()] {
+                    found(t, f + t * direction);
+                }
+            }
+        }
+        2 => {
+            let t = -f.dot(b) / direction.dot(b);
+            if (f + t * direction).length() <= c.x {
+                found(t, b);
+            }
+        }
+        3 => {
+            let axis = (b - a).normalize();
+            let across = |v: DVec3| v - v.dot(axis) * axis;
+            let (g, d) = (across(f), across(direction));
+            let (half, dd) = (g.dot(d), d.length_squared());
+            let square = half * half - dd * (g.length_squared() - c.x * c.x);
+            if square > 0.0 && dd > 0.0 {
+                for t in [(-half - square.sqrt()) / dd, (-half + square.sqrt()) / dd] {
+                    if (0.0..=(b - a).length()).contains(&(f + t * direction).dot(axis)) {
+                        found(t, g + t * d);
+                    }
+                }
+            }
+        }
+        _ => {
+            // Möller and Trumbore 1997.
+            let (e1, e2) = (b - a, c - a);
+            let h = direction.cross(e2);
+            let determinant = e1.dot(h);
+            let u = f.dot(h) / determinant;
+            let q = f.cross(e1);
+            let v = direction.dot(q) / determinant;
+            if determinant != 0.0 && u >= 0.0 && v >= 0.0 && u + v <= 1.0 {
+                found(e2.dot(q) / determinant, e1.cross(e2));
+            }
+        }
+    }
+}

@@ -1,0 +1,101 @@
+//! Which shapes have an inside, and the box around them.
+
+use std::collections::HashMap;
+
+use glam::DVec3;
+
+use super::{Mesh, Shape};
+
+/// What keeps `shape` from having an inside, in words; `None` if it has one.
+pub fn opening(shape: &Shape) -> Option<String> {
+    match shape {
+        Shape::Sphere { .. } => None,
+        Shape::Disk { .. } => Some("a disk has no inside".to_owned()),
+        Shape::Cylinder { .. } => Some("a cylinder is open at both ends".to_owned()),
+        Shape::Mesh(mesh) => {
+            let open = open_edges(mesh);
+            let &[a, b] = open.first()?;
+            Some(format!(
+                "its mesh is not closed: {} edges have no triangle on their other side, one of them from {a} to {b}",
+                open.len()
+            ))
+        }
+    }
+}
+
+/// Edges that do not run once in each direction for every time they run in the other: a surface without them bounds
+/// a body, as far as every ray crosses it outward as often as inward. Corners at one point are one corner.
+fn open_edges(mesh: &Mesh) -> Vec<[DVec3; 2]> {
+    let mut corners: HashMap<[u64; 3], u32> = HashMap::new();
+    let mut welded = Vec::with_capacity(mesh.positions.len());
+    for position in &mesh.positions {
+        // 0 and -0 are one place.
+        let bits = position.to_array().map(|x| (x + 0.0).to_bits());
+        let next = corners.len() as u32;
+        welded.push(*corners.entry(bits).or_insert(next));
+    }
+    // Times forward less times backward, of edges from the lower corner to the higher.
+    let mut balance: HashMap<[u32; 2], (i32, [u32; 2])> = HashMap::new();
+    for triangle in &mesh.triangles {
+        for i in 0..3 {
+            let edge = [triangle[i], triangle[(i + 1) % 3]];
+            let [a, b] = edge.map(|corner| welded[corner as usize]);
+            let (key, step) = if a < b { ([a, b], 1) } else { ([b, a], -1) };
+            balance.entry(key).or_insert((0, edge)).0 += step;
+        }
+    }
+    let mut open: Vec<[u32; 2]> = balance.into_values().filter(|(n, _)| *n != 0).map(|(_, edge)| edge).collect();
+    open.sort_unstable();
+    open.into_iter().map(|edge| edge.map(|corner| mesh.positions[corner as usize])).collect()
+}
+
+/// The least and the greatest coordinates of a closed shape.
+pub fn bounds(shape: &Shape) -> [DVec3; 2] {
+    match shape {
+        Shape::Sphere { center, radius } => [*center - *radius, *center + *radius],
+        Shape::Mesh(mesh) => {
+            let used = || mesh.triangles.iter().flatten().map(|&corner| mesh.positions[corner as usize]);
+            [used().fold(DVec3::INFINITY, DVec3::min), used().fold(DVec3::NEG_INFINITY, DVec3::max)]
+        }
+        Shape::Disk { .. } | Shape::Cylinder { .. } => unreachable!("has no inside"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tetrahedron() -> Mesh {
+        let positions = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+        Mesh { positions, triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]] }
+    }
+
+    #[test]
+    fn closed_meshes_have_no_open_edges() {
+        let whole = tetrahedron();
+        assert!(open_edges(&whole).is_empty() && opening(&Shape::Mesh(whole.clone())).is_none());
+        // Corners of its own for every triangle, one of them with another zero.
+        let mut positions: Vec<DVec3> =
+            whole.triangles.iter().flatten().map(|&i| whole.positions[i as usize]).collect();
+        positions[0] = -positions[0];
+        let apart = Mesh { positions, triangles: (0..4).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect() };
+        assert!(open_edges(&apart).is_empty());
+        // Two bodies, and one twice.
+        let twice = Mesh { triangles: whole.triangles.repeat(2), ..whole };
+        assert!(open_edges(&twice).is_empty());
+    }
+
+    #[test]
+    fn what_is_open_says_where() {
+        let mut mesh = tetrahedron();
+        mesh.triangles.pop();
+        assert_eq!(open_edges(&mesh).len(), 3);
+        // One triangle the wrong way round.
+        let mut mesh = tetrahedron();
+        mesh.triangles[2].swap(0, 1);
+        assert_eq!(open_edges(&mesh).len(), 3);
+        let words = opening(&Shape::Mesh(mesh)).unwrap();
+        assert!(words.contains("3 edges") && words.contains("one of them from [0, 1, 0] to [1, 0, 0]"), "{words}");
+        assert!(opening(&Shape::Disk { center: DVec3::ZERO, normal: DVec3::X, radius: 1.0 }).is_some());
+    }
+}

@@ -1,0 +1,245 @@
+//! `[media]`: gases that absorb and emit.
+
+use std::collections::HashMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::decode::{Fields, Item, Keys, did_you_mean, list};
+use super::material::kelvin;
+use super::spectrum::{Handle, Quantity, Spectra, report_in_file};
+use super::tree::Value;
+use super::{Absorber, Field, Grid, Medium, MediumId};
+use crate::format::volume::{self, Volume};
+
+const KEYS: Keys =
+    Keys::new(&["absorption", "species", "pressure", "temperature", "density"]).later(&["scattering", "phase_g"]);
+const SPECIES: Keys = Keys::new(&["table", "fraction"]);
+
+/// Strength, and columns of a temperature and a spectrum each.
+type Terms = Vec<(f64, Vec<(f64, Handle)>)>;
+
+/// A medium as the file defines it.
+struct Declared {
+    absorbers: Terms,
+    temperature: Option<Field>,
+    density: Field,
+    taken: Option<MediumId>,
+}
+
+/// The media of the file, and those in use.
+pub struct Media<'a> {
+    /// `None` where the definition is wrong, which has been said.
+    declared: Vec<(&'a str, Option<Declared>)>,
+    scene: Vec<Medium>,
+}
+
+impl<'a> Media<'a> {
+    pub fn new(item: Option<Item<'a>>, spectra: &mut Spectra<'a>) -> Self {
+        let items = item.and_then(|item| item.named_items()).unwrap_or_default();
+        let mut grids = Grids::default();
+        let declared = items.iter().map(|(name, item)| (*name, decode(item, spectra, &mut grids))).collect();
+        Media { declared, scene: Vec::new() }
+    }
+
+    /// The medium that `item` names, in the scene.
+    pub fn take(&mut self, item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<MediumId> {
+        let name = item.text()?;
+        let Some((_, declared)) = self.declared.iter_mut().find(|(known, _)| *known == name) else {
+            let names = self.declared.iter().map(|(name, _)| *name);
+            let help = did_you_mean(name, names.clone()).unwrap_or_else(|| match self.declared.len() {
+                0 => format!("define it: [media.{name}]"),
+                _ => format!("[media] has {}", list(names)),
+            });
+            item.error_help(format!("no medium is named \"{name}\""), help);
+            return None;
+        };
+        let declared = declared.as_mut()?;
+        if declared.taken.is_none() {
+            let absorbers = (declared.absorbers.iter())
+                .map(|(strength, columns)| {
+                    let columns = columns.iter().map(|(kelvin, handle)| (*kelvin, spectra.take(*handle))).collect();
+                    Absorber { strength: *strength, columns }
+                })
+                .collect();
+            let (temperature, density) = (declared.temperature.clone(), declared.density.clone());
+            self.scene.push(Medium { name: name.to_owned(), absorbers, temperature, density });
+            declared.taken = Some(self.scene.len() - 1);
+        }
+        declared.taken
+    }
+
+    /// The medium that `item` names, to fill all space: it has no grids, for want of a box.
+    pub fn take_outer(&mut self, item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<MediumId> {
+        let id = self.take(item, spectra)?;
+        if self.scene[id].grid_size().is_some() {
+            item.error_help(
+                format!("\"{}\" has a grid, which fills the box of an object, not all space", self.scene[id].name),
+                "use numbers, or give the medium to an object as its `interior`",
+            );
+            return None;
+        }
+        Some(id)
+    }
+
+    pub fn finish(self) -> Vec<Medium> {
+        self.scene
+    }
+}
+
+fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>, grids: &mut Grids) -> Option<Declared> {
+    let fields = item.table(KEYS)?;
+    let later = |key: &&str| fields.has(key);
+    let refused = KEYS.later.iter().any(later);
+    let given = fields.exactly_one(&["absorption", "species"], "absorption");
+    let temperature = field(&fields, "temperature", grids, kelvin, |kelvin| kelvin >= 0.0, "temperatures in K");
+    let density = field(&fields, "density", grids, Item::not_negative, |d| d >= 0.0, "densities");
+    let pressure = match fields.get("pressure") {
+        Some(item) if fields.has("absorption") => {
+            item.error_help("goes with `species` only", "remove it; `density` scales an absorption");
+            None
+        }
+        Some(item) => item.not_negative(),
+        None => Some(1.0),
+    };
+    let absorbers = given.and_then(|given| {
+        if given.path.ends_with(".absorption") {
+            let handle = spectra.resolve(&given, Quantity::Absorption)?;
+            return Some(vec![(1.0, vec![(0.0, handle)])]);
+        }
+        species(&given, spectra)
+    });
+    let (temperature, density, pressure, mut absorbers) = (temperature?, density?, pressure?, absorbers?);
+    let density = density.unwrap_or(Field::Constant(1.0));
+    absorbers.iter_mut().for_each(|(strength, _)| *strength *= pressure);
+    if let (Some(Field::Grid(a)), Field::Grid(b)) = (&temperature, &density)
+        && a.size != b.size
+    {
+        let size = |[x, y, z]: [u32; 3]| format!("[{z}, {y}, {x}]");
+        let message = format!(
+            "the grids of a medium must have one shape, but temperature has {} and density {}",
+            size(a.size),
+            size(b.size)
+        );
+        fields.error_help(message, "resample one of them");
+        return None;
+    }
+    check_temperatures(&fields, temperature.as_ref(), &absorbers)?;
+    (!refused).then_some(Declared { absorbers, temperature, density, taken: None })
+}
+
+/// What tables over temperature say about the medium's: one is needed to choose a column, and where it lies beyond them,
+/// the last column is held, which is said.
+fn check_temperatures(fields: &Fields, temperature: Option<&Field>, absorbers: &Terms) -> Option<()> {
+    for (i, (_, columns)) in absorbers.iter().enumerate().filter(|(_, (_, columns))| columns.len() > 1) {
+        let (first, last) = (columns[0].0, columns[columns.len() - 1].0);
+        let [low, high] = match temperature {
+            None => {
+                fields.error_help(
+                    format!("has no `temperature`, but the table of species {i} has columns for {first} to {last} K"),
+                    "add e.g. temperature = 300.0",
+                );
+                return None;
+            }
+            Some(Field::Constant(kelvin)) => [*kelvin; 2],
+            Some(Field::Grid(grid)) => {
+                let range = |[low, high]: [f32; 2], value: &f32| [low.min(*value), high.max(*value)];
+                grid.values.iter().fold([f32::INFINITY, f32::NEG_INFINITY], range).map(f64::from)
+            }
+        };
+        let range = |low: f64, high: f64| if low == high { format!("{low} K") } else { format!("{low}-{high} K") };
+        let mut beyond = Vec::new();
+        if low < first {
+            beyond.push(range(low, high.min(first)));
+        }
+        if high > last {
+            beyond.push(range(low.max(last), high));
+        }
+        if !beyond.is_empty() {
+            fields.cx.warn(format!(
+                "`{}.species.{i}`: its table covers {first}-{last} K, not the medium's {}: the nearest column is held there",
+                fields.path,
+                beyond.join(" and ")
+            ));
+        }
+    }
+    Some(())
+}
+
+fn species<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Terms> {
+    const EXAMPLE: &str = "[{ table = \"co2.csv\", fraction = 0.05 }]";
+    let items = item.array()?;
+    if items.is_empty() {
+        item.error_help("has no species", format!("write e.g. species = {EXAMPLE}"));
+        return None;
+    }
+    let mut all = Vec::new();
+    let mut total = 0.0;
+    for item in &items {
+        let one = item.table(SPECIES).and_then(|fields| {
+            let table = fields.require("table", "table = \"co2.csv\"").and_then(|item| spectra.species(&item));
+            let fraction = fields.require("fraction", "fraction = 0.05, the share of volume").and_then(|item| {
+                item.number_where(|share| (0.0..=1.0).contains(&share), "a share of volume in [0, 1]")
+            });
+            Some((fraction?, table?))
+        });
+        total += one.as_ref().map_or(0.0, |(fraction, _)| *fraction);
+        all.push(one);
+    }
+    let all: Option<Vec<_>> = all.into_iter().collect();
+    // Shares such as 0.1 ten times sum to 1 but for rounding.
+    if total > 1.0 + 1e-9 {
+        item.error_help(format!("the fractions sum to {total}, more than 1"), "they are shares of volume");
+        return None;
+    }
+    all
+}
+
+/// A number, or `{ grid = "t.zarr" }`; the inner `None` where the key is absent.
+#[expect(clippy::option_option, reason = "a mistake differs from a key that is absent")]
+fn field<'a>(
+    fields: &Fields<'a>,
+    key: &str,
+    grids: &mut Grids,
+    number: impl Fn(&Item<'a>) -> Option<f64>,
+    allowed: impl Fn(f32) -> bool,
+    what: &str,
+) -> Option<Option<Field>> {
+    let Some(item) = fields.get(key) else { return Some(None) };
+    if !matches!(item.node.value, Value::Table(_)) {
+        return number(&item).map(|value| Some(Field::Constant(value)));
+    }
+    let grid = item.table(Keys::new(&["grid"]))?.require("grid", "grid = \"t.zarr\"")?;
+    let values = grids.read(&grid)?;
+    if let Some(wrong) = values.values.iter().position(|value| !(value.is_finite() && allowed(*value))) {
+        let [nx, ny, _] = values.size.map(|n| n as usize);
+        let [z, y, x] = [wrong / (nx * ny), wrong / nx % ny, wrong % nx];
+        grid.error_help(
+            format!("must hold {what}, not negative, but is {} at [{z}, {y}, {x}]", values.values[wrong]),
+            "correct the array",
+        );
+        return None;
+    }
+    Some(Some(Field::Grid(values)))
+}
+
+/// Grids by their path: each is read once.
+#[derive(Default)]
+struct Grids(HashMap<PathBuf, Option<Arc<Grid>>>);
+
+impl Grids {
+    fn read(&mut self, item: &Item) -> Option<Arc<Grid>> {
+        let path = item.cx.path(item.text()?);
+        if let Some(known) = self.0.get(&path) {
+            return known.clone();
+        }
+        let grid = match volume::read(&path) {
+            Ok(Volume { size, values }) => Some(Arc::new(Grid { size, values })),
+            Err(problem) => {
+                report_in_file(item, *problem);
+                None
+            }
+        };
+        self.0.insert(path, grid.clone());
+        grid
+    }
+}

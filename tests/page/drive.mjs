@@ -1,0 +1,135 @@
+// Drives the page as somebody who looks at it would, and prints what it saw as one JSON object.
+//   node drive.mjs render|view|heat URL X Y [FOLDER FOR SCREENSHOTS]
+
+import fs from "node:fs";
+import { open } from "./browser.mjs";
+
+const [what, url, x, y, shots] = process.argv.slice(2);
+const browser = await open(url);
+const { page } = browser;
+const seen = { complaints: browser.complaints, elsewhere: browser.elsewhere };
+
+const shot = async (name) => shots && (await page.screenshot({ path: `${shots}/${name}.png` }));
+const stage = () => page.locator("#stage").getAttribute("data-stage");
+const becomes = (wanted) => page.waitForFunction((wanted) => document.getElementById("stage").dataset.stage === wanted, wanted);
+const change = async (act) => {
+  const before = await browser.look();
+  await act();
+  await page.waitForTimeout(100);
+  await browser.settled();
+  await page.waitForTimeout(100);
+  const after = await browser.look();
+  return { changed: before.hash !== after.hash, before: before.mean, after: after.mean };
+};
+const download = async (act) => {
+  const [file] = await Promise.all([page.waitForEvent("download"), act()]);
+  return { name: file.suggestedFilename(), text: fs.readFileSync(await file.path(), "utf8") };
+};
+
+await page.waitForFunction(() => window.spectile.picture.drawn > 0);
+seen.first_picture_ms = Date.now() - browser.began;
+await browser.settled();
+seen.start = await browser.look();
+seen.title = await page.title();
+
+if (what === "render") {
+  // It fills in by itself.
+  const first = seen.start.hash;
+  for (let i = 0; i < 100 && !seen.updates; i++) {
+    await page.waitForTimeout(100);
+    seen.updates = (await browser.look()).hash !== first;
+  }
+  await page.waitForFunction(() => window.spectile.progress.curve.length >= 3);
+  seen.curve = await page.evaluate(() => ({ points: window.spectile.progress.curve.length, drawn: !!window.spectile.progress.plot }));
+  seen.devices = await page.locator("#devices tbody tr").count();
+  await page.locator("#pause").click();
+  await becomes("paused");
+  // What is under way when the pause begins still comes.
+  await page.waitForTimeout(1500);
+  const paths = () => page.evaluate(() => window.spectile.page.state.paths);
+  const rests = await paths();
+  await page.waitForTimeout(1000);
+  seen.rests = rests === (await paths());
+  await page.locator("#picture").focus();
+  await page.keyboard.press(" ");
+  await becomes("rendering");
+  await page.waitForFunction((rests) => window.spectile.page.state.paths > rests, rests);
+  await page.keyboard.press(" ");
+  await becomes("paused");
+  await page.waitForTimeout(1500);
+  await page.locator("#save").click();
+  await page.waitForTimeout(1000);
+}
+
+if (what === "heat") {
+  await page.keyboard.press("4");
+  await browser.settled();
+  await page.mouse.move(...(await browser.at(Number(x), Number(y))));
+  await page.waitForFunction(() => document.getElementById("cursor").textContent.includes(" K"));
+  seen.cursor = await page.locator("#cursor").textContent();
+  seen.range = [await page.locator("#low").inputValue(), await page.locator("#high").inputValue()];
+  await shot("heat");
+} else {
+  // A click pins a pixel; its spectrum can be had as a file.
+  await page.mouse.click(...(await browser.at(Number(x), Number(y))));
+  await page.waitForFunction(() => window.spectile.spectra.pins.length === 1);
+  seen.pin = await page.evaluate(() => {
+    const { x, y, samples } = window.spectile.spectra.pins[0];
+    return { x, y, samples, plotted: window.spectile.spectra.plot.data[1].some((v) => v !== null) };
+  });
+  seen.csv = await download(() => page.locator("#csv").click());
+  // The same by keys: the cursor begins where the pointer was.
+  await page.locator("#picture").focus();
+  await page.keyboard.press("ArrowRight");
+  await page.keyboard.press("ArrowDown");
+  await page.keyboard.press("Enter");
+  await page.waitForFunction(() => window.spectile.spectra.pins.length === 2);
+  // A region.
+  const [a, b] = [await browser.at(3, 4), await browser.at(8, 6)];
+  await page.keyboard.down("Shift");
+  await page.mouse.move(...a);
+  await page.mouse.down();
+  await page.mouse.move(...b, { steps: 4 });
+  await page.mouse.up();
+  await page.keyboard.up("Shift");
+  await page.waitForFunction(() => window.spectile.spectra.pins.length === 3);
+  seen.pins = await page.evaluate(() => window.spectile.spectra.pins.map(({ x, y, x1, y1, pixels, radiance }) => ({ x, y, x1, y1, pixels, radiance })));
+  seen.all_csv = (await download(() => page.keyboard.press("c"))).text;
+  await shot(`${what}-spectra`);
+
+  // Other pictures of it.
+  seen.brighter = await change(() => page.keyboard.press("E"));
+  seen.automatic = await change(() => page.keyboard.press("a"));
+  seen.channel = await change(() => page.keyboard.press("2"));
+  const name = () => page.locator("#channel-name").textContent();
+  const before = await name();
+  seen.slider = await change(async () => {
+    await page.locator("#channel").focus();
+    for (let i = 0; i < 3; i++) await page.keyboard.press("ArrowRight");
+  });
+  seen.slider.label = before !== (await name());
+  seen.step = await change(() => page.keyboard.press(","));
+  await shot(`${what}-channel`);
+  seen.false_colour = await change(() => page.keyboard.press("3"));
+  seen.closer = await change(async () => {
+    await page.mouse.move(...(await browser.at(Number(x), Number(y))));
+    await page.mouse.wheel(0, -480);
+  });
+  seen.fit = await change(() => page.keyboard.press("0"));
+  await page.keyboard.press("1");
+  await page.keyboard.press("Escape");
+  seen.pins_left = await page.evaluate(() => window.spectile.spectra.pins.length);
+  await page.keyboard.press("?");
+  seen.help = await page.locator("#keys").isVisible();
+  await page.keyboard.press("Escape");
+}
+
+if (what === "render") {
+  // While it rests: so the cube that is left is the one that was looked at.
+  page.on("dialog", (dialog) => dialog.accept());
+  await page.locator("#stop").click();
+  await becomes("stopped");
+}
+seen.stage = await stage();
+await browser.close();
+console.log(JSON.stringify(seen));

@@ -1,0 +1,163 @@
+//! What a server says about a cube is what is in it.
+
+use std::io::Cursor;
+
+use spectile::cube::{Cube, Header};
+use spectile::spectral::{Channels, planck};
+use tempfile::tempdir;
+
+use crate::client::{Events, ask, command, get, serve};
+use crate::common::{create, header, pattern, patterned, unit};
+
+const SIZE: [u32; 2] = [100, 70];
+
+#[test]
+fn pictures_hold_every_bit_of_the_cube() {
+    let folder = tempdir().expect("folder");
+    let cube = patterned(folder.path(), "cube.zarr", header(SIZE, [32, 24], 40));
+    let (_server, address) = serve(cube.path(), "127.0.0.1:0");
+    let floats = |target: &str| {
+        let answer = get(address, &format!("/api/image?{target}&format=f32"));
+        (answer.header("x-size").expect("a size").to_owned(), answer.floats())
+    };
+    let preview = cube.preview().expect("preview");
+    assert_eq!(floats("show=colour"), ("100,70".into(), preview.rgb.clone()));
+    // A part of it, across tiles.
+    let (size, part) = floats("show=colour&x0=30&y0=20&x1=70&y1=50");
+    let expected: Vec<f32> =
+        (20..50).flat_map(|y| preview.rgb[3 * (y * 100 + 30)..3 * (y * 100 + 70)].to_vec()).collect();
+    assert_eq!((size.as_str(), part), ("40,30", expected));
+    let channel = |k: usize| (0..70).flat_map(move |y| (0..100).map(move |x| pattern(x, y, k))).collect::<Vec<f32>>();
+    for k in [0, 17, 39] {
+        assert_eq!(floats(&format!("show=channel&k={k}")).1, channel(k));
+    }
+    let rgb: Vec<f32> = (0..7000).flat_map(|i| [3, 0, 39].map(|k| pattern(i % 100, i / 100, k))).collect();
+    assert_eq!(floats("show=false&r=3&g=0&b=39").1, rgb);
+    // Means of blocks, those at the edges smaller: of up to 256 values below 4.1e5 in f32, summed one after the other.
+    for (target, scale) in [("show=channel&k=17", 8), ("show=channel&k=17", 16), ("show=channel&k=17", 2)] {
+        let (size, got) = floats(&format!("{target}&scale={scale}"));
+        let columns = 100u32.div_ceil(scale);
+        assert_eq!(size, format!("{columns},{}", 70u32.div_ceil(scale)));
+        for (i, got) in (0u32..).zip(got) {
+            let (x, y) = (i % columns * scale, i / columns * scale);
+            let pixels =
+                (y..(y + scale).min(70)).flat_map(|y| (x..(x + scale).min(100)).map(move |x| pattern(x, y, 17)));
+            let (sum, n) = pixels.fold((0.0, 0.0), |(sum, n), v| (sum + f64::from(v), n + 1.0));
+            let bound = (sum / n) * n * f64::from(f32::EPSILON);
+            assert!((f64::from(got) - sum / n).abs() <= bound, "{scale} {x} {y}: {got} {}", sum / n);
+        }
+    }
+    // PNG as `export` makes it.
+    let png = get(address, "/api/image?show=colour&ev=-12");
+    let mut reader = png::Decoder::new(Cursor::new(&png.body)).read_info().expect("a PNG");
+    let mut pixels = vec![0; reader.output_buffer_size().expect("size")];
+    reader.next_frame(&mut pixels).expect("pixels");
+    assert_eq!(pixels, preview.to_srgb8(-12.0));
+}
+
+#[test]
+fn spectra_are_those_of_the_command_line() {
+    let folder = tempdir().expect("folder");
+    let cube = patterned(folder.path(), "cube.zarr", header(SIZE, [32, 24], 40));
+    let (_server, address) = serve(cube.path(), "127.0.0.1:0");
+    for [x, y] in [[0, 0], [99, 69], [31, 24], [64, 23]] {
+        let printed = command(folder.path(), &["spectrum", "cube.zarr", &x.to_string(), &y.to_string()]).output();
+        let printed = String::from_utf8(printed.expect("runs").stdout).expect("UTF-8");
+        assert_eq!(get(address, &format!("/api/spectrum?x={x}&y={y}&format=csv")).text(), printed);
+        let json = get(address, &format!("/api/spectrum?x={x}&y={y}")).json();
+        let numbers: Vec<f32> =
+            json["radiance"].as_array().expect("a list").iter().map(|v| v.as_f64().expect("a number") as f32).collect();
+        assert_eq!(numbers, cube.spectrum(x, y).expect("read").expect("there"));
+        assert_eq!((json["samples"].as_u64(), json["standard_error"].is_null()), (Some(1), true));
+    }
+    let mean = get(address, "/api/spectrum?x=30&y=20&x1=70&y1=50").json();
+    assert_eq!(mean["pixels"], 1200);
+    for k in [0, 39] {
+        let sum: f64 = (20..50).flat_map(|y| (30..70).map(move |x| f64::from(pattern(x, y, k)))).sum();
+        let got = mean["radiance"][k].as_f64().expect("a number");
+        assert!((got / (sum / 1200.0) - 1.0).abs() < 1200.0 * f64::EPSILON, "{got}");
+    }
+}
+
+/// What a cube with `--uncertainty` has beside its radiance, laid out alike.
+#[test]
+fn standard_errors_are_served_where_the_cube_has_them() {
+    let folder = tempdir().expect("folder");
+    let cube = patterned(folder.path(), "cube.zarr", header([16, 8], [8, 8], 5).with_uncertainty());
+    for column in 0..2 {
+        let place = |array: &str| cube.path().join(format!("{array}/c/0/0/{column}"));
+        let radiance = std::fs::read(place("radiance")).expect("read");
+        let tenth: Vec<u8> =
+            radiance.as_chunks().0.iter().flat_map(|bytes| (f32::from_le_bytes(*bytes) / 10.0).to_le_bytes()).collect();
+        std::fs::create_dir_all(place("standard_error").parent().expect("a folder")).expect("made");
+        std::fs::write(place("standard_error"), tenth).expect("written");
+    }
+    let (_server, address) = serve(cube.path(), "127.0.0.1:0");
+    let csv = get(address, "/api/spectrum?x=9&y=3&format=csv");
+    let line = csv.text().lines().nth(3).expect("channel 2");
+    let value = pattern(9, 3, 2);
+    assert_eq!(line, format!("{},{value:?},{:?}", cube.channels().centre(2), value / 10.0));
+    assert!(csv.text().starts_with("wavelength_nm,radiance,standard_error\n"));
+    let mean = get(address, "/api/spectrum?x=6&y=0&x1=10&y1=8").json();
+    let squares: f64 = (0..8).flat_map(|y| (6..10).map(move |x| f64::from(pattern(x, y, 4) / 10.0).powi(2))).sum();
+    let got = mean["standard_error"][4].as_f64().expect("a number");
+    assert!((got / (squares.sqrt() / 32.0) - 1.0).abs() < 1e-12, "{got}");
+}
+
+#[test]
+fn thermal_channels_have_brightness_temperatures() {
+    let folder = tempdir().expect("folder");
+    let bounds = vec![[500.0, 510.0], [3e3, 5e3], [8e3, 12e3]];
+    let channels = Channels::from_bounds(bounds.clone(), None);
+    let cube = create(folder.path(), "cube.zarr", Header { channels, ..header([16, 8], [8, 8], 3) });
+    let kelvin = |x: u32| 250.0 + 10.0 * f64::from(x);
+    for tile in 0..2 {
+        let mean = |[from, to]: [f64; 2], t: f64| {
+            (0..2000).map(|i| planck::radiance(from + (to - from) * (f64::from(i) + 0.5) / 2e3, t)).sum::<f64>() / 2e3
+        };
+        cube.merge_unit(tile, 1, &unit(&cube, tile, |x, _, k| mean(bounds[k], kelvin(x)) as f32)).expect("merged");
+    }
+    let (_server, address) = serve(cube.path(), "127.0.0.1:0");
+    for k in [1, 2] {
+        let got = get(address, &format!("/api/image?show=temperature&k={k}&y1=1&format=f32")).floats();
+        for (x, got) in (0..16).zip(got) {
+            // f32 of both, and the table.
+            assert!((f64::from(got) - kelvin(x)).abs() < 2e-3, "{k} {x}: {got}");
+        }
+    }
+    let refused = ask(address, "GET", "/api/image?show=temperature&k=0", &[]);
+    assert_eq!(refused.status, 400);
+    assert_eq!(get(address, "/api/channels").json()["thermal"], serde_json::json!([1, 2]));
+}
+
+/// A cube that somebody else renders: what is missing is NaN, what comes is told, and nothing twice.
+#[test]
+fn what_grows_on_disk_is_told() {
+    let folder = tempdir().expect("folder");
+    let cube = create(folder.path(), "cube.zarr", header(SIZE, [32, 24], 4));
+    let (server, address) = serve(cube.path(), "127.0.0.1:0");
+    let mut events = Events::listen(address);
+    let (name, state) = events.next().expect("a first event");
+    assert_eq!(
+        (name.as_str(), &state["stage"], &state["changed"]),
+        ("state", &"viewing".into(), &serde_json::json!([]))
+    );
+    assert!(get(address, "/api/image?show=colour&format=f32").floats().iter().all(|v| v.is_nan()));
+    assert_eq!(ask(address, "GET", "/api/spectrum?x=0&y=0", &[]).status, 404);
+    let mut told = Vec::new();
+    for tile in [5, 6, 1] {
+        cube.merge_unit(tile, 1, &unit(&cube, tile, pattern)).expect("merged");
+        let found = |(_, state): (String, serde_json::Value)| {
+            let changed = state["changed"].as_array().expect("a list").clone();
+            let range = |range: &serde_json::Value| range[0].as_u64().expect("from")..range[1].as_u64().expect("to");
+            let tiles: Vec<u64> = changed.iter().flat_map(range).collect();
+            (!tiles.is_empty()).then_some(tiles)
+        };
+        told.extend(events.find_map(found).expect("news"));
+    }
+    assert_eq!(told, [5, 6, 1]);
+    assert_eq!(get(address, "/api/status").json()["tiles_started"], 3);
+    // Nobody waits for listeners at the end.
+    drop(server);
+    assert!(Cube::open(cube.path()).is_ok());
+}
