@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 
+use super::bsdf::{Bsdf, SpectralValues, Vertex, hemisphere};
 use super::primitive::SurfacePoint;
 use super::rng::Rng;
 use super::sky::Sky;
@@ -48,12 +49,13 @@ enum Choice {
 }
 
 impl Lights {
-    pub fn new(scene: &Scene, world: &World, sky: Option<&Sky>) -> Self {
+    /// `materials`: one for each of the scene.
+    pub fn new(scene: &Scene, world: &World, sky: Option<&Sky>, materials: &[Bsdf]) -> Self {
         let mut object_area = vec![0.0; scene.objects.len()];
         for primitive in &world.primitives {
             object_area[primitive.object] += primitive.surface.area();
         }
-        let Shares { objects, lights, sky } = shares(scene, &object_area, world.radius(), sky);
+        let Shares { objects, lights, sky } = shares(scene, &object_area, world.radius(), sky, materials);
 
         let density: Vec<f64> = world
             .primitives
@@ -117,18 +119,20 @@ struct Shares {
 
 /// Powers are taken without the common factor π. What comes from far away has the power that enters a sphere of
 /// `radius` around everything.
-fn shares(scene: &Scene, area: &[f64], radius: f64, sky: Option<&Sky>) -> Shares {
+fn shares(scene: &Scene, area: &[f64], radius: f64, sky: Option<&Sky>, materials: &[Bsdf]) -> Shares {
+    let heat: Vec<Option<Vec<f64>>> = materials.iter().map(|bsdf| heat(scene, bsdf)).collect();
     let mut shares =
         Shares { objects: vec![0.0; scene.objects.len()], lights: vec![0.0; scene.lights.len()], sky: 0.0 };
     let mut channels_lit = 0.0;
     for (k, &[from, to]) in scene.channels.bounds.iter().enumerate() {
         let mean = |spectrum: usize| scene.spectra[spectrum].curve.mean(from, to);
-        let of_object = |(i, object): (usize, &Object)| match &object.emission {
-            Some(emission) => {
+        let of_object = |(i, object): (usize, &Object)| {
+            let emission = object.emission.as_ref().map_or(0.0, |emission| {
                 let sides = if emission.sides == Sides::Both { 2.0 } else { 1.0 };
-                sides * area[i] * mean(emission.radiance)
-            }
-            None => 0.0,
+                sides * mean(emission.radiance)
+            });
+            let heat = object.material.and_then(|material| heat[material].as_ref());
+            area[i] * (emission + heat.map_or(0.0, |heat| heat[k]))
         };
         let of_light = |light: &Light| {
             mean(light.spectrum())
@@ -155,6 +159,27 @@ fn shares(scene: &Scene, area: &[f64], radius: f64, sky: Option<&Sky>) -> Shares
         all.for_each(|share| *share /= channels_lit);
     }
     shares
+}
+
+/// Thermal radiance of both sides at the channels' centres, averaged over the hemisphere; `None` where there is none.
+fn heat(scene: &Scene, bsdf: &Bsdf) -> Option<Vec<f64>> {
+    if !bsdf.is_hot() {
+        return None;
+    }
+    let mut spectra = SpectralValues::new(scene);
+    spectra.begin(0.5);
+    spectra.fill(bsdf.spectra());
+    // Any place will do: what is chosen too seldom there is met instead.
+    spectra.look_up(bsdf.textures(), glam::DVec2::splat(0.5));
+    let (mut sum, mut directions) = (vec![0.0; scene.channels.len()], 0.0);
+    for o in hemisphere() {
+        directions += 1.0;
+        for inside in [false, true] {
+            bsdf.emit(&Vertex { o, inside, spectra: &spectra, alive: 0..sum.len() }, &mut sum);
+        }
+    }
+    sum.iter_mut().for_each(|radiance| *radiance /= directions);
+    Some(sum)
 }
 
 /// Solid angle of a disk of angular `radius`.

@@ -1,19 +1,21 @@
 //! One path: from the camera, surface to surface, carrying all K channels.
 
+use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 
 use super::bsdf::{Bsdf, SpectralValues, Vertex};
 use super::camera;
+use super::gas::{self, Piece};
 use super::lights::{LightPoint, Lights, Target, disk_solid_angle, emits, sample_disk};
-use super::primitive::Ray;
+use super::primitive::{Ray, SurfacePoint};
 use super::rng::Rng;
 use super::shading::Shading;
 use super::sky::Sky;
 use super::world::{Hit, World};
-use crate::scene::{Environment, Light, Scene, SpectrumId};
+use crate::scene::{Bsdf as Description, Environment, Interior, Light, Projection, Scene, SpectrumId};
 
 /// What tracing needs of a scene, prepared once and shared by all threads.
 pub struct Tracer<'a> {
@@ -24,6 +26,12 @@ pub struct Tracer<'a> {
     lights: Lights,
     /// One for each material of the scene.
     materials: Vec<Bsdf>,
+    /// Of all media, and of the bodies of glass that they fill.
+    gas_spectra: Vec<SpectrumId>,
+    /// Indices of bodies with a dielectric surface and an interior.
+    glass: HashMap<usize, (SpectrumId, Option<f64>)>,
+    /// The interiors around the camera, the innermost last.
+    around_camera: Vec<Interior>,
 }
 
 /// The K-channel state of the path under way; reused from path to path.
@@ -39,6 +47,8 @@ pub struct Path<'a> {
     factor: Vec<f64>,
     /// Radiance of what is aimed at or met, or what takes its place.
     emitted: Vec<f64>,
+    /// The interiors that the path is in, the innermost last.
+    interiors: Vec<Interior>,
 }
 
 /// A way to some light, chosen at a vertex.
@@ -53,8 +63,17 @@ struct Aim {
 
 /// Radiance in all channels; of lights without extent, irradiance over the probability of their choice.
 enum Emitted {
-    Spectrum { spectrum: SpectrumId, scale: f64 },
+    Spectrum {
+        spectrum: SpectrumId,
+        scale: f64,
+    },
     Sky(DVec3),
+    /// What a point of a surface sends the other way.
+    Surface {
+        primitive: usize,
+        point: SurfacePoint,
+        towards: DVec3,
+    },
 }
 
 impl<'a> Path<'a> {
@@ -67,6 +86,7 @@ impl<'a> Path<'a> {
             radiance: vec![0.0; channels],
             factor: vec![0.0; channels],
             emitted: vec![0.0; channels],
+            interiors: Vec::new(),
         }
     }
 
@@ -102,7 +122,7 @@ impl<'a> Path<'a> {
                     self.emitted.iter_mut().zip(values).for_each(|(e, value)| *e *= value);
                 }
             }
-            (Emitted::Sky(_), None) => self.emitted.fill(0.0),
+            (Emitted::Sky(_), None) | (Emitted::Surface { .. }, _) => self.emitted.fill(0.0),
         }
     }
 }
@@ -111,9 +131,14 @@ impl<'a> Tracer<'a> {
     pub fn new(scene: &'a Scene) -> Self {
         let world = World::new(&scene.objects);
         let sky = scene.environment.as_ref().and_then(|environment| environment.map()).map(|map| Sky::new(scene, map));
-        let lights = Lights::new(scene, &world, sky.as_ref());
-        let materials = (0..scene.materials.len()).map(|material| Bsdf::new(scene, material)).collect();
-        Tracer { scene, world, sky, lights, materials }
+        let materials: Vec<Bsdf> = (0..scene.materials.len()).map(|material| Bsdf::new(scene, material)).collect();
+        let lights = Lights::new(scene, &world, sky.as_ref(), &materials);
+        let glass = glass(scene);
+        let mut gas_spectra = gas::spectra(scene);
+        gas_spectra.extend(glass.values().map(|(eta, _)| *eta));
+        let mut tracer = Tracer { scene, world, sky, lights, materials, gas_spectra, glass, around_camera: Vec::new() };
+        tracer.around_camera = tracer.interiors_around(scene.camera.position);
+        tracer
     }
 
     /// Traces one path through `pixel` and leaves its radiance in `path`.
@@ -127,9 +152,18 @@ impl<'a> Tracer<'a> {
         // Density by solid angle with which the ray was chosen; none where lights could not have been aimed at instead:
         // for camera rays, mirrors and ideal refraction.
         let mut ray_density = None;
+        path.spectra.fill(&self.gas_spectra);
+        match self.scene.camera.projection {
+            Projection::Perspective { .. } => path.interiors.clone_from(&self.around_camera),
+            _ => path.interiors = self.interiors_around(ray.origin),
+        }
 
         for event in 0..=integrator.max_bounces {
-            let Some(hit) = self.world.closest_hit(&ray) else {
+            let mut pieces = Vec::new();
+            let hit = self.follow(&ray, &mut path.interiors, &mut pieces);
+            let Path { spectra, throughput, alive, radiance, .. } = &mut *path;
+            pieces.iter().for_each(|piece| piece.pass(spectra, alive.clone(), throughput, Some(radiance)));
+            let Some(hit) = hit else {
                 self.gather_from_afar(ray.direction, ray_density, path);
                 return;
             };
@@ -139,11 +173,11 @@ impl<'a> Tracer<'a> {
             }
 
             let object = &self.scene.objects[self.world.primitives[hit.primitive].object];
-            let bsdf = &self.materials[object.material.expect("null boundaries are refused")];
+            let bsdf = &self.materials[object.material.expect("paths pass null boundaries")];
             let aim = self.aim(&hit, rng);
             path.spectra.fill(bsdf.spectra());
             if let Some(aim) = &aim {
-                path.look_up(&aim.emitted, self.sky.as_ref());
+                self.look_up(&aim.emitted, path);
             }
 
             let inside = hit.point.normal.dot(ray.direction) > 0.0;
@@ -156,10 +190,12 @@ impl<'a> Tracer<'a> {
                 // Along the surface to the last bit.
                 return;
             }
-            let Path { spectra, throughput, alive, radiance, factor, emitted } = &mut *path;
+            let Path { spectra, throughput, alive, radiance, factor, emitted, interiors } = &mut *path;
             let Some(scattering) = bsdf.at(Vertex { o, inside, spectra, alive: alive.clone() }) else { return };
             let kept = aim.filter(|aim| shading.keeps_side(geometric, &frame, aim.direction));
-            if let Some(aim) = kept.filter(|aim| self.is_visible(&hit, aim)) {
+            let pieces = kept.as_ref().and_then(|aim| self.way_to(&hit, inside, aim, interiors));
+            if let Some((aim, pieces)) = kept.zip(pieces) {
+                pieces.iter().for_each(|piece| piece.pass(spectra, alive.clone(), emitted, None));
                 let scattered = scattering.evaluate(frame.transpose() * aim.direction, factor);
                 // The balance heuristic leaves f cosθ over the sum of both densities by solid angle.
                 let weight = aim.density.map_or(1.0, |density| 1.0 / (density + scattered));
@@ -191,15 +227,20 @@ impl<'a> Tracer<'a> {
             if !shading.keeps_side(geometric, &frame, direction) {
                 return;
             }
+            let goes_inside = hit.point.normal.dot(direction) < 0.0;
+            if goes_inside != inside {
+                cross(interiors, object.interior, goes_inside);
+            }
             ray = Ray { origin: self.world.leave(hit.primitive, &hit.point, direction), direction };
         }
     }
 
     /// Emission of the surface that a ray meets.
     fn gather_emission(&self, ray: &Ray, hit: &Hit, ray_density: Option<f64>, path: &mut Path) {
+        if !self.emit(hit.primitive, &hit.point, -ray.direction, path) {
+            return;
+        }
         let cosine = hit.point.normal.dot(ray.direction);
-        let object = &self.scene.objects[self.world.primitives[hit.primitive].object];
-        let Some(emission) = object.emission.as_ref().filter(|e| emits(e, cosine < 0.0)) else { return };
         let weight = match ray_density {
             None => 1.0,
             Some(density) => {
@@ -207,7 +248,46 @@ impl<'a> Tracer<'a> {
                 density / (density + light_density)
             }
         };
-        path.gather(emission.radiance, weight);
+        for k in path.alive.clone() {
+            path.radiance[k] += path.throughput[k] * path.emitted[k] * weight;
+        }
+    }
+
+    /// Sets `path.emitted` to what a point of a surface sends along `towards`; `false` where it sends nothing.
+    fn emit(&self, primitive: usize, point: &SurfacePoint, towards: DVec3, path: &mut Path) -> bool {
+        let object = &self.scene.objects[self.world.primitives[primitive].object];
+        let inside = point.normal.dot(towards) < 0.0;
+        let emission = object.emission.as_ref().filter(|e| emits(e, !inside)).map(|e| e.radiance);
+        let bsdf = object.material.map(|material| &self.materials[material]).filter(|bsdf| bsdf.is_hot());
+        if emission.is_none() && bsdf.is_none() {
+            return false;
+        }
+        path.spectra.fill(emission.as_slice());
+        path.spectra.fill(bsdf.map_or(&[], |bsdf| bsdf.spectra()));
+        let geometric = if inside { -point.normal } else { point.normal };
+        let shading = Shading::new(&object.attributes, &self.world.primitives[primitive], point);
+        path.spectra.look_up(bsdf.map_or(&[], |bsdf| bsdf.textures()), shading.uv);
+        let Path { spectra, alive, emitted, .. } = path;
+        for k in alive.clone() {
+            emitted[k] = emission.map_or(0.0, |spectrum| spectra.value(spectrum, k));
+        }
+        if let Some(bsdf) = bsdf {
+            let o = shading.frame(geometric, inside, towards).transpose() * towards;
+            bsdf.emit(&Vertex { o, inside, spectra, alive: alive.clone() }, emitted);
+        }
+        true
+    }
+
+    /// Sets `path.emitted`.
+    fn look_up(&self, emitted: &Emitted, path: &mut Path) {
+        match emitted {
+            Emitted::Surface { primitive, point, towards } => {
+                if !self.emit(*primitive, point, *towards, path) {
+                    path.emitted.fill(0.0);
+                }
+            }
+            other => path.look_up(other, self.sky.as_ref()),
+        }
     }
 
     /// What arrives from beyond all surfaces: the environment and the suns in that direction.
@@ -278,26 +358,127 @@ impl<'a> Tracer<'a> {
         }
         let direction = towards / distance;
         let light_cosine = light.point.normal.dot(direction);
-        let object = &self.scene.objects[self.world.primitives[light.primitive].object];
-        let emission = object.emission.as_ref()?;
-        if light_cosine == 0.0 || !emits(emission, light_cosine < 0.0) {
+        if light_cosine == 0.0 {
             return None;
         }
         Some(Aim {
             direction,
             target: Some(self.world.leave(light.primitive, &light.point, -direction)),
             density: Some(light.density * distance * distance / light_cosine.abs()),
-            emitted: Emitted::Spectrum { spectrum: emission.radiance, scale: 1.0 },
+            emitted: Emitted::Surface { primitive: light.primitive, point: light.point, towards: -direction },
         })
     }
 
-    fn is_visible(&self, hit: &Hit, aim: &Aim) -> bool {
+    /// The ways through media from a vertex to what is aimed at, if nothing but null boundaries stands between.
+    fn way_to(&self, hit: &Hit, inside: bool, aim: &Aim, interiors: &[Interior]) -> Option<Vec<Piece<'_>>> {
         let origin = self.world.leave(hit.primitive, &hit.point, aim.direction);
-        match aim.target {
-            Some(target) => !self.world.occluded(origin, target),
-            None => self.world.closest_hit(&Ray { origin, direction: aim.direction }).is_none(),
+        if self.scene.media.is_empty() {
+            let clear = match aim.target {
+                Some(target) => !self.world.occluded(origin, target),
+                None => self.world.closest_hit(&Ray { origin, direction: aim.direction }).is_none(),
+            };
+            return clear.then(Vec::new);
+        }
+        let mut interiors = interiors.to_vec();
+        let goes_inside = hit.point.normal.dot(aim.direction) < 0.0;
+        if goes_inside != inside {
+            let object = &self.scene.objects[self.world.primitives[hit.primitive].object];
+            cross(&mut interiors, object.interior, goes_inside);
+        }
+        let (mut ray, mut pieces) = (Ray { origin, direction: aim.direction }, Vec::new());
+        loop {
+            let left = aim.target.map_or(f64::INFINITY, |target| (target - ray.origin).dot(ray.direction));
+            let hit = self.world.closest_hit(&ray).filter(|hit| hit.t < left);
+            let Some(hit) = hit else {
+                match aim.target {
+                    Some(target) => pieces.extend(self.piece(&interiors, ray.origin, target)),
+                    None => pieces.retain(|piece: &Piece| !piece.outer),
+                }
+                return Some(pieces);
+            };
+            let object = &self.scene.objects[self.world.primitives[hit.primitive].object];
+            if object.material.is_some() {
+                return None;
+            }
+            pieces.extend(self.piece(&interiors, ray.origin, ray.origin + hit.t * ray.direction));
+            cross(&mut interiors, object.interior, hit.point.normal.dot(ray.direction) < 0.0);
+            ray.origin = self.world.leave(hit.primitive, &hit.point, ray.direction);
         }
     }
+
+    /// The first surface with a material along `ray`, at its distance from the start; null boundaries on the way change
+    /// what is around. `pieces`: the ways through media, but outside all interiors none that leads to infinity: what
+    /// arrives from there has been measured at the scene.
+    fn follow<'s>(&'s self, ray: &Ray, interiors: &mut Vec<Interior>, pieces: &mut Vec<Piece<'s>>) -> Option<Hit> {
+        let (mut ray, mut passed) = (*ray, 0.0);
+        loop {
+            let Some(mut hit) = self.world.closest_hit(&ray) else {
+                pieces.retain(|piece| !piece.outer);
+                return None;
+            };
+            pieces.extend(self.piece(interiors, ray.origin, ray.origin + hit.t * ray.direction));
+            let object = &self.scene.objects[self.world.primitives[hit.primitive].object];
+            if object.material.is_some() {
+                hit.t += passed;
+                return Some(hit);
+            }
+            cross(interiors, object.interior, hit.point.normal.dot(ray.direction) < 0.0);
+            passed += hit.t;
+            ray.origin = self.world.leave(hit.primitive, &hit.point, ray.direction);
+        }
+    }
+
+    fn piece(&self, interiors: &[Interior], from: DVec3, to: DVec3) -> Option<Piece<'_>> {
+        let innermost = interiors.last();
+        let medium = innermost.map(|interior| interior.medium).or(self.scene.camera_medium)?;
+        let to_grid = innermost.map_or(DAffine3::IDENTITY, |interior| interior.to_grid);
+        let indices = interiors.iter().filter_map(|interior| self.glass.get(&interior.body).copied()).collect();
+        Some(Piece { medium: &self.scene.media[medium], to_grid, outer: innermost.is_none(), from, to, indices })
+    }
+
+    /// The interiors around a point: those that a ray from it leaves without having entered, in reverse.
+    fn interiors_around(&self, point: DVec3) -> Vec<Interior> {
+        let (mut entered, mut around) = (Vec::new(), Vec::new());
+        if self.scene.objects.iter().any(|object| object.interior.is_some()) {
+            // Along nothing that scenes are made of.
+            let direction = DVec3::new(0.537_731, 0.312_649, 0.783_017).normalize();
+            let mut ray = Ray { origin: point, direction };
+            while let Some(hit) = self.world.closest_hit(&ray) {
+                let object = &self.scene.objects[self.world.primitives[hit.primitive].object];
+                let inward = hit.point.normal.dot(direction) < 0.0;
+                if !cross(&mut entered, object.interior, inward) {
+                    around.extend(object.interior);
+                }
+                ray.origin = self.world.leave(hit.primitive, &hit.point, direction);
+            }
+        }
+        around.reverse();
+        around
+    }
+}
+
+/// The index behind each dielectric surface with an interior, by body, and its mean over channels without dispersion.
+fn glass(scene: &Scene) -> HashMap<usize, (SpectrumId, Option<f64>)> {
+    let of_object = |object: &crate::scene::Object| match scene.materials[object.material?].bsdf {
+        Description::Dielectric { eta, dispersion, .. } => {
+            let (curve, bounds) = (&scene.spectra[eta].curve, &scene.channels.bounds);
+            let mean = || bounds.iter().map(|b| curve.mean(b[0], b[1])).sum::<f64>() / bounds.len() as f64;
+            Some((object.interior?.body, (eta, (!dispersion).then(mean))))
+        }
+        _ => None,
+    };
+    scene.objects.iter().filter_map(of_object).collect()
+}
+
+/// Goes through the surface of `interior`, if there is one; `false` where it leaves what it was not in.
+fn cross(interiors: &mut Vec<Interior>, interior: Option<Interior>, inward: bool) -> bool {
+    let Some(interior) = interior else { return true };
+    if inward {
+        interiors.push(interior);
+        return true;
+    }
+    let inner = interiors.iter().rposition(|other| other.body == interior.body);
+    inner.map(|inner| interiors.remove(inner)).is_some()
 }
 
 /// Radiance of a disk of angular `radius` that causes a unit irradiance facing it, sr⁻¹: ∫ cosθ over it is π sin².

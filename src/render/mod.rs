@@ -2,9 +2,11 @@
 
 #[cfg(test)]
 mod fault_tests;
+mod heat;
 pub mod integration;
 pub mod job;
 pub mod lights;
+pub mod media;
 pub mod patience;
 pub mod plan;
 pub mod pool;

@@ -117,10 +117,6 @@ impl Surfaces {
             surfaces.textures = Some(textures);
         }
         surfaces.albedos.clear();
-        // Where nothing scatters, shaders still bind a part.
-        if surfaces.parts.is_empty() {
-            surfaces.parts.push(Part::default());
-        }
         surfaces
     }
 
@@ -150,6 +146,10 @@ impl Surfaces {
                 }
                 _ => part.ab = low(part.ab),
             }
+        }
+        // Where nothing scatters, shaders still bind a part.
+        if self.parts.is_empty() {
+            self.parts.push(Part::default());
         }
     }
 

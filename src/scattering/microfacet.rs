@@ -15,9 +15,12 @@ use super::fresnel;
 
 /// Nodes along the cosine, and around the normal over a quarter turn.
 const COSINES: usize = 128;
-const AZIMUTHS: usize = 33;
+pub(super) const AZIMUTHS: usize = 33;
 /// Points of the lattice for a node of a table, and its generator: two Fibonacci numbers.
-const LATTICE: (usize, usize) = (10_946, 6_765);
+pub(super) const LATTICE: (usize, usize) = (10_946, 6_765);
+/// Four times the points of a table's node, and no common factor with them.
+#[cfg(test)]
+pub(super) const FINE: (usize, usize) = (46_368, 28_657);
 /// Largest step of a table along ln η.
 const INDEX_STEP: f64 = 0.02;
 
@@ -185,13 +188,13 @@ impl SideAlbedo {
 
 /// Position of an azimuth from 0 to π/2 among the nodes: half of it the azimuth, half that in the space in which the
 /// distribution is round.
-fn turn(azimuth: f64, alpha: [f64; 2]) -> f64 {
+pub(super) fn turn(azimuth: f64, alpha: [f64; 2]) -> f64 {
     let (sin, cos) = azimuth.sin_cos();
     (AZIMUTHS - 1) as f64 * 0.5 * (azimuth + (alpha[1] * sin).atan2(alpha[0] * cos)) / FRAC_PI_2
 }
 
 /// The azimuth at node `row`, by bisection of [`turn`].
-fn azimuth_at(row: usize, alpha: [f64; 2]) -> f64 {
+pub(super) fn azimuth_at(row: usize, alpha: [f64; 2]) -> f64 {
     let (mut low, mut high) = (0.0, FRAC_PI_2);
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
@@ -207,7 +210,7 @@ fn position(z: f64, alpha: f64) -> f64 {
 }
 
 /// The cosine at node `i`: the positive root of position(z) = i.
-fn cosine_at(i: usize, alpha: f64) -> f64 {
+pub(super) fn cosine_at(i: usize, alpha: f64) -> f64 {
     let root_t = i as f64 / (COSINES - 1) as f64;
     let t = 2.0 * root_t * root_t;
     let b = 1.0 + 2.0 * alpha - t;
@@ -230,7 +233,7 @@ fn mean(nodes: &[f64; COSINES], alpha: f64) -> f64 {
 }
 
 /// Smith's Λ: G1 = 1/(1 + Λ).
-fn lambda(alpha: [f64; 2], v: DVec3) -> f64 {
+pub(super) fn lambda(alpha: [f64; 2], v: DVec3) -> f64 {
     let slope2 = ((alpha[0] * v.x).powi(2) + (alpha[1] * v.y).powi(2)) / (v.z * v.z);
     if slope2.is_finite() { 0.5 * slope2 / (1.0 + (1.0 + slope2).sqrt()) } else { f64::INFINITY }
 }
@@ -263,7 +266,7 @@ fn boundary(alpha: f64, o: DVec3, lattice: &Lattice, eta: f64) -> DVec2 {
 }
 
 /// (1 + Λo) / (1 + Λo + Λi), also where Λo is infinite.
-fn smith_ratio(lambda_o: f64, lambda_i: f64) -> f64 {
+pub(super) fn smith_ratio(lambda_o: f64, lambda_i: f64) -> f64 {
     if lambda_o.is_infinite() { 1.0 } else { (1.0 + lambda_o) / (1.0 + lambda_o + lambda_i) }
 }
 
@@ -271,7 +274,7 @@ fn smith_ratio(lambda_o: f64, lambda_i: f64) -> f64 {
 ///
 /// They crowd (as the cube) where the cap is cut off: there slopes are steep, and all that a smooth surface loses is lost
 /// within α² of the edge. A Fibonacci lattice has no rows that the edge of total reflection could run along.
-struct Lattice(Vec<LatticePoint>);
+pub(super) struct Lattice(Vec<LatticePoint>);
 
 struct LatticePoint {
     /// Height above the cap's lower end, over that of the cap.
@@ -282,7 +285,7 @@ struct LatticePoint {
 }
 
 impl Lattice {
-    fn new((count, generator): (usize, usize)) -> Self {
+    pub(super) fn new((count, generator): (usize, usize)) -> Self {
         let point = |i: usize| {
             let x = (i as f64 + 0.5) / count as f64;
             let (sin, cos) = (TAU * ((i * generator % count) as f64 / count as f64)).sin_cos();
@@ -293,21 +296,26 @@ impl Lattice {
 
     /// Mean of `f` over the normals visible from `o`.
     fn mean(&self, alpha: [f64; 2], o: DVec3, f: impl Fn(DVec3) -> DVec2) -> DVec2 {
-        let [ax, ay] = alpha;
+        let mut sum = DVec2::ZERO;
+        self.each(alpha, o, |weight, h| sum += weight * f(h));
+        sum
+    }
+
+    /// Calls `f` with points of the normals visible from `o` and their weights, which sum to 1.
+    pub(super) fn each(&self, [ax, ay]: [f64; 2], o: DVec3, mut f: impl FnMut(f64, DVec3)) {
         let round = DVec3::new(ax * o.x, ay * o.y, o.z).normalize();
-        let term = |point: &LatticePoint| {
+        for point in &self.0 {
             let height = point.height * (1.0 + round.z);
             let z = height - round.z;
             let r = ((1.0 - z) * (1.0 + z)).max(0.0).sqrt();
             let h = DVec3::new(ax * (r * point.cos + round.x), ay * (r * point.sin + round.y), height);
-            point.weight * f(h.normalize())
-        };
-        self.0.iter().map(term).sum()
+            f(point.weight, h.normalize());
+        }
     }
 }
 
 /// `make(0..count)` in order, on every core.
-fn in_parallel<T: Send>(count: usize, make: impl Fn(usize) -> T + Sync) -> Vec<T> {
+pub(super) fn in_parallel<T: Send>(count: usize, make: impl Fn(usize) -> T + Sync) -> Vec<T> {
     let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get).min(count.max(1));
     let make = &make;
     let mut parts: Vec<Vec<T>> = std::thread::scope(|scope| {
@@ -328,9 +336,6 @@ mod tests {
         let r = (1.0 - z * z).max(0.0).sqrt();
         DVec3::new(r * azimuth.cos(), r * azimuth.sin(), z)
     }
-
-    /// Four times the points of a table's node, and no common factor with them.
-    const FINE: (usize, usize) = (46_368, 28_657);
 
     /// VALIDATION section 1.1: without Fresnel loss, at α = 1 and normal incidence, 1 - ln 2; other digits to 6e-4.
     #[test]

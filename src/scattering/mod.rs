@@ -5,8 +5,10 @@
 //! light crosses a boundary, radiance changes by the square of the relative index besides.
 
 mod decision;
+mod facet_cosines;
 pub mod fresnel;
 mod microfacet;
 
 pub use decision::{ReflectionProbability, index_range};
+pub use facet_cosines::{FACET_COSINES, FacetCosines, facet_cosine};
 pub use microfacet::{DielectricAlbedo, ReflectionAlbedo};

@@ -338,7 +338,6 @@ fn roughness(fields: &Fields) -> Option<f64> {
 }
 
 /// The outer `None` is a mistake that has been said.
-#[expect(clippy::option_option, reason = "a mistake differs from a key that is absent")]
 fn temperature(fields: &Fields) -> Option<Option<f64>> {
     fields.get("temperature").map_or(Some(None), |item| kelvin(&item).map(Some))
 }

@@ -16,11 +16,11 @@ const KEYS: Keys =
 const SPECIES: Keys = Keys::new(&["table", "fraction"]);
 
 /// Strength, and columns of a temperature and a spectrum each.
-type Terms = Vec<(f64, Vec<(f64, Handle)>)>;
+type Term = (f64, Vec<(f64, Handle)>);
 
 /// A medium as the file defines it.
 struct Declared {
-    absorbers: Terms,
+    absorbers: Vec<Term>,
     temperature: Option<Field>,
     density: Field,
     taken: Option<MediumId>,
@@ -129,7 +129,7 @@ fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>, grids: &mut Grids) -> 
 
 /// What tables over temperature say about the medium's: one is needed to choose a column, and where it lies beyond them,
 /// the last column is held, which is said.
-fn check_temperatures(fields: &Fields, temperature: Option<&Field>, absorbers: &Terms) -> Option<()> {
+fn check_temperatures(fields: &Fields, temperature: Option<&Field>, absorbers: &[Term]) -> Option<()> {
     for (i, (_, columns)) in absorbers.iter().enumerate().filter(|(_, (_, columns))| columns.len() > 1) {
         let (first, last) = (columns[0].0, columns[columns.len() - 1].0);
         let [low, high] = match temperature {
@@ -165,7 +165,7 @@ fn check_temperatures(fields: &Fields, temperature: Option<&Field>, absorbers: &
     Some(())
 }
 
-fn species<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Terms> {
+fn species<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Vec<Term>> {
     const EXAMPLE: &str = "[{ table = \"co2.csv\", fraction = 0.05 }]";
     let items = item.array()?;
     if items.is_empty() {
@@ -195,7 +195,6 @@ fn species<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Terms> {
 }
 
 /// A number, or `{ grid = "t.zarr" }`; the inner `None` where the key is absent.
-#[expect(clippy::option_option, reason = "a mistake differs from a key that is absent")]
 fn field<'a>(
     fields: &Fields<'a>,
     key: &str,

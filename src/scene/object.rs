@@ -160,7 +160,6 @@ impl<'s, 'a> Objects<'s, 'a> {
     }
 
     /// What `interior` says of an object whose shape, in its own space, is `local`.
-    #[expect(clippy::option_option, reason = "as in `Common`")]
     fn filling(&mut self, fields: &Fields<'a>, local: &Shape) -> Option<Option<Filling>> {
         let item = fields.get("interior")?;
         let medium = self.media.take(&item, self.spectra);

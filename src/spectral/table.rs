@@ -85,7 +85,11 @@ impl SpectralTables {
     }
 
     /// [`SpectralTables::build`]; the curves at the given positions are held as exactly as said.
-    pub fn with_exactness(curves: &[Tabulated], exactness: &[(usize, Exactness)], channels: &Channels) -> SpectralTables {
+    pub fn with_exactness(
+        curves: &[Tabulated],
+        exactness: &[(usize, Exactness)],
+        channels: &Channels,
+    ) -> SpectralTables {
         let channels_padded = channels.len().next_multiple_of(4);
         // All spectra have as many strata as the one that needs most.
         let entries = MAX_ENTRIES.min(MAX_ENTRIES_IN_ALL / curves.len().max(1));

@@ -44,8 +44,10 @@ export async function open(url, { width = 1400, height = 860, dark = false } = {
     }, [x, y]),
     // A number that tells what is on the canvas, its mean brightness, and how many colours it has.
     look: () => page.evaluate(() => {
-      const { canvas } = window.spectile.picture;
-      const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+      const { canvas } = window.spectile.picture, copy = new OffscreenCanvas(canvas.width, canvas.height);
+      const context = copy.getContext("2d", { willReadFrequently: true });
+      context.drawImage(canvas, 0, 0);
+      const { data } = context.getImageData(0, 0, copy.width, copy.height);
       let hash = 0, sum = 0;
       const colours = new Set();
       for (let i = 0; i < data.length; i += 4) {

@@ -79,6 +79,7 @@ if (what === "heat") {
   });
   seen.csv = await download(() => page.locator("#csv").click());
   // The same by keys: the cursor begins where the pointer was.
+  await page.mouse.move(...(await browser.at(Number(x), Number(y))));
   await page.locator("#picture").focus();
   await page.keyboard.press("ArrowRight");
   await page.keyboard.press("ArrowDown");

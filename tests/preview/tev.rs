@@ -39,10 +39,13 @@ impl Body<'_> {
     }
 }
 
-/// The images of a viewer: size, and channels by name.
+/// Size, and channels by name.
+type Image = ([u32; 2], BTreeMap<String, Vec<f32>>);
+
+/// The images of a viewer, by name.
 #[derive(Default)]
 struct Viewer {
-    images: BTreeMap<String, ([u32; 2], BTreeMap<String, Vec<f32>>)>,
+    images: BTreeMap<String, Image>,
     updates: usize,
 }
 

@@ -3,6 +3,7 @@
 #![allow(dead_code)]
 
 pub mod closed_forms;
+pub mod heat;
 pub mod surfaces;
 
 use glam::{DMat3, DVec2, DVec3};

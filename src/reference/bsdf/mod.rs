@@ -24,6 +24,7 @@ mod reflection;
 mod spectra;
 #[cfg(test)]
 mod tests;
+mod thermal;
 
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -32,6 +33,8 @@ use glam::DVec3;
 
 use crate::scene::{Bsdf as Description, MaterialId, Reflectance, SMOOTH, Scene, SpectrumId, TextureId, Weight};
 pub use spectra::SpectralValues;
+use thermal::Hot;
+pub use thermal::hemisphere;
 
 /// Where a path meets a material.
 #[derive(Clone)]
@@ -90,6 +93,7 @@ struct Part {
 /// A material.
 pub struct Bsdf {
     parts: Vec<Part>,
+    hot: Vec<Hot>,
     spectra: Vec<SpectrumId>,
     textures: Vec<TextureId>,
 }
@@ -113,14 +117,23 @@ pub struct Scattering<'v> {
 
 impl Bsdf {
     pub fn new(scene: &Scene, material: MaterialId) -> Self {
-        let mut bsdf = Bsdf { parts: Vec::new(), spectra: Vec::new(), textures: Vec::new() };
-        bsdf.add(scene, material, 1.0, &[]);
+        let mut bsdf = Bsdf { parts: Vec::new(), hot: Vec::new(), spectra: Vec::new(), textures: Vec::new() };
+        bsdf.add(scene, material, 1.0, &[], None);
         bsdf.spectra.sort_unstable();
         bsdf.spectra.dedup();
         bsdf
     }
 
-    /// What [`SpectralValues`] must hold before [`Bsdf::at`].
+    pub fn is_hot(&self) -> bool {
+        !self.hot.is_empty()
+    }
+
+    /// Adds thermal radiance along `at.o`, W m⁻² sr⁻¹ nm⁻¹, of every live channel to `out`.
+    pub fn emit(&self, at: &Vertex, out: &mut [f64]) {
+        self.hot.iter().for_each(|hot| hot.add(at, out));
+    }
+
+    /// What [`SpectralValues`] must hold before [`Bsdf::at`] and [`Bsdf::emit`].
     pub fn spectra(&self) -> &[SpectrumId] {
         &self.spectra
     }
@@ -137,11 +150,23 @@ impl Bsdf {
         }
     }
 
-    fn add(&mut self, scene: &Scene, material: MaterialId, weight: f64, shares: &[(TextureId, bool)]) {
+    /// `kelvin`: of the blend around, for what has no temperature of its own.
+    fn add(
+        &mut self,
+        scene: &Scene,
+        material: MaterialId,
+        weight: f64,
+        shares: &[(TextureId, bool)],
+        kelvin: Option<f64>,
+    ) {
         if weight == 0.0 {
             return;
         }
         let material = &scene.materials[material];
+        let kelvin = material.temperature.or(kelvin);
+        if let Some(kelvin) = kelvin {
+            self.hot.extend(Hot::new(scene, material, weight, shares, kelvin));
+        }
         let smooth = |alpha: f64| alpha < SMOOTH;
         let (opaque, lobes): (bool, Vec<Box<dyn Lobe>>) = match material.bsdf {
             Description::Black => (true, Vec::new()),
@@ -166,14 +191,14 @@ impl Bsdf {
                 (true, plastic::lobes(scene, reflectance, eta, roughness))
             }
             Description::Blend { a, b, weight: Weight::Constant(of_b) } => {
-                self.add(scene, a, weight * (1.0 - of_b), shares);
-                return self.add(scene, b, weight * of_b, shares);
+                self.add(scene, a, weight * (1.0 - of_b), shares, kelvin);
+                return self.add(scene, b, weight * of_b, shares, kelvin);
             }
             Description::Blend { a, b, weight: Weight::Texture(texture) } => {
                 self.textures.push(texture);
                 let with = |missing| [shares, &[(texture, missing)]].concat();
-                self.add(scene, a, weight, &with(true));
-                return self.add(scene, b, weight, &with(false));
+                self.add(scene, a, weight, &with(true), kelvin);
+                return self.add(scene, b, weight, &with(false), kelvin);
             }
         };
         let two_sided = material.two_sided;

@@ -53,6 +53,11 @@ impl<'a> SpectralValues<'a> {
         &self.wavelength
     }
 
+    /// Of channel `k`, in nm.
+    pub fn wavelength(&self, k: usize) -> f64 {
+        self.wavelength[k]
+    }
+
     pub fn fill(&mut self, spectra: &[SpectrumId]) {
         for &spectrum in spectra {
             self.get(spectrum);

@@ -167,6 +167,7 @@ function showCursor() {
 }
 
 async function pin(place) {
+  if (page.ended) return notice("The render has ended; `spectile view` opens its cube.", 4000);
   try {
     await spectra.pin(place);
   } catch (error) {
@@ -203,7 +204,7 @@ async function pin(place) {
       const over = pixel(event);
       keys(false);
       picture.cursor = inside(over) ? over : null;
-      if (picture.cursor) spectra.peek({ x: over[0], y: over[1] });
+      if (picture.cursor && !page.ended) spectra.peek({ x: over[0], y: over[1] });
       else spectra.leave();
       return showCursor();
     }
@@ -266,7 +267,7 @@ function moveCursor(dx, dy) {
   const moved = picture.cursor ? [x + dx, y + dy] : [x, y];
   picture.cursor = [Math.max(0, Math.min(w - 1, moved[0])), Math.max(0, Math.min(h - 1, moved[1]))];
   keys(true);
-  spectra.peek({ x: picture.cursor[0], y: picture.cursor[1] });
+  if (!page.ended) spectra.peek({ x: picture.cursor[0], y: picture.cursor[1] });
   picture.paint();
   showCursor();
 }
@@ -297,7 +298,7 @@ find("help").addEventListener("click", () => find("keys").showModal());
 
 // Controls --------------------------------------------------------------------------------------------------------
 async function control(what) {
-  if (!page.state?.controls) return;
+  if (!page.state?.controls || page.ended) return;
   try {
     const answer = await fetch(`/api/${what}`, { method: "POST" });
     if (!answer.ok) throw new Error((await answer.json()).error);
@@ -363,7 +364,7 @@ async function hear(state) {
   picture.touch(state.changed || []);
   picture.paint();
   changedPins.push(...(state.changed || []));
-  if (spectra.pins.length && changedPins.length && performance.now() > pinsAt) {
+  if (spectra.pins.length && changedPins.length && performance.now() > pinsAt && !page.ended) {
     const ranges = changedPins, { tile, size } = state.cube, columns = Math.ceil(size[0] / tile[0]);
     changedPins = [];
     // Regions go through more than a pixel, so they are fetched less often.
@@ -381,9 +382,7 @@ function listen() {
   events.addEventListener("end", (event) => {
     page.ended = true;
     events.close();
-    hear(JSON.parse(event.data));
-    picture.nextRefresh = 0;
-    picture.pump();
+    hear(JSON.parse(event.data)).then(() => picture.end());
   });
   events.addEventListener("error", () => page.ended || stage("gone"));
 }

@@ -77,7 +77,7 @@ class Picture {
     if (!this.cube) return;
     const [w, h] = this.cube.size, margin = 24;
     this.zoom = Math.min((this.canvas.width - margin) / w, (this.canvas.height - margin) / h);
-    if (this.zoom > 1) this.zoom = Math.floor(2 * this.zoom) / 2;
+    if (this.zoom > 2) this.zoom = Math.floor(2 * this.zoom) / 2;
     this.zoom = Math.max(this.zoom, 1e-4);
     this.centre = [w / 2, h / 2];
     this.fitted = true;
@@ -182,7 +182,7 @@ class Picture {
   pump() {
     const sight = this.cube && !document.hidden && this.sight();
     const now = performance.now();
-    if (!sight || now < this.retryAt) return;
+    if (!sight || now < this.retryAt || this.over) return;
     const { base, fine } = this.scales(), [w, h] = this.cube.size;
     const wanted = [...this.inSight(base, [0, 0, w, h])];
     if (fine !== base) {
@@ -203,6 +203,15 @@ class Picture {
       const took = performance.now() - began;
       this.nextRefresh = performance.now() + Math.max(REFRESH_MS, REFRESH_SHARE * took);
     });
+  }
+
+  // The server is about to go: what is stale in sight is fetched at once, and then nothing more.
+  async end() {
+    const sight = this.cube && this.sight();
+    this.over = true;
+    if (!sight) return;
+    const { base, fine } = this.scales(), squares = new Set([...this.inSight(base, [0, 0, ...this.cube.size]), ...this.inSight(fine, sight)]);
+    await Promise.all([...squares].filter((square) => square.stale && !square.loading).map((square) => this.load(square)));
   }
 
   async load(square) {

@@ -121,7 +121,7 @@ class Progress {
         { stroke: css("--accent"), width: 2, points: { show: true, size: 5, fill: css("--accent") } },
         { stroke: css("--soft"), width: 1, dash: [5, 4], points: { show: false } },
       ],
-      axes: [axis("seconds of rendering", { values: logNumbers, size: 36 }), axis("error estimate (dashed: t^−½)", { values: logNumbers, size: 58 })],
+      axes: [axis("seconds of rendering", { values: logNumbers, size: 36 }), axis("error estimate", { values: logNumbers, size: 58 })],
       legend: { show: false },
       cursor: { show: false },
     }, data, find("curve-plot"));

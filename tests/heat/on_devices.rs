@@ -1,0 +1,156 @@
+//! Heat on devices: closed forms, and against the f64 path tracer (VALIDATION 1.1, 1.2, 1.6).
+
+use glam::{DVec2, DVec3};
+use spectile::gpu::layout::{Emitter, Material};
+use spectile::reference;
+use spectile::render::prepare::Prepared;
+use spectile::scene::{Filter, Projection, Scene, Sides};
+use spectile::spectral::{Channels, Curve, Outside, planck as law};
+
+use crate::device::{Settings, render};
+use crate::scene_builder::closed_forms::{self, Case};
+use crate::scene_builder::heat::*;
+use crate::scene_builder::*;
+use crate::statistics::*;
+
+/// 16 x 16 pixels that look along one ray, `epochs` times 64 samples: replicas of one measurement.
+fn measure(mut scene: Scene, epochs: u32, seed: u64) -> Vec<Estimate> {
+    scene.film.width = 16;
+    scene.film.height = 16;
+    scene.film.crop = [0, 0, 16, 16];
+    let rendered = render(&scene, epochs, 64, Settings { seed, ..Settings::default() });
+    rendered.assert_clean();
+    rendered.replicas()
+}
+
+#[test]
+fn hot_grey_plates() {
+    for Case { scene, expected, seed } in hot_plates(1e3, 24) {
+        // As with the emission written out: two ways of missing 1e-6, r₁¹² r₂¹², and the tables.
+        let bound = Bound { resolution: 0.005, allowance: 2e-5 };
+        assert_estimates("plates", &measure(scene, 2, seed), &expected, bound);
+    }
+}
+
+/// Walls, a ball, a disk and a blend of different emissivities at one temperature: nothing of them can be seen.
+#[test]
+fn isothermal_cavity_is_black() {
+    let slope = Curve::Linear { nm: vec![3e3, 20e3], value: vec![0.9, 0.1], outside: Outside::Hold };
+    let mut scene = Builder::new()
+        .camera(look(0.5 * DVec3::ONE, DVec3::new(0.9, 0.8, 0.0), DVec3::Y, narrow()))
+        .channels(infrared())
+        .bounces(150)
+        .diffuse(room(DVec3::ZERO, DVec3::ONE), slope)
+        .at_kelvin(300.0)
+        .diffuse(disk(DVec3::new(0.3, 0.5, 0.2), DVec3::Z, 0.2), 0.1)
+        .at_kelvin(300.0)
+        .black(sphere(DVec3::new(0.2, 0.2, 0.8), 0.1))
+        .at_kelvin(300.0);
+    let ball = sphere(DVec3::new(0.7, 0.7, 0.7), 0.2);
+    scene = scene.diffuse(ball.clone(), 0.4).black(ball.clone()).blend_of_last_two(ball, 0.3).at_kelvin(300.0);
+    let expected = means(&planck(300.0), &infrared());
+    // Ten events of ρ = 0.9, twice that for corners; 1e-5 for the tables, 1e-5 for the derived curve.
+    let bound = Bound { resolution: 0.005, allowance: 20.0 * ORIGIN_OFFSET + 3e-5 };
+    assert_estimates("isothermal", &measure(scene.build(), 4, 401), &expected, bound);
+}
+
+/// From 3 K to 50,000 K, directly seen from in front and behind: every sample is exact, and what underflows f32 is 0.
+#[test]
+fn planck_of_every_temperature() {
+    let bounds = [[380.0, 380.001], [549.99, 550.01], [9_999.9, 10_000.1], [19_999.9, 20_000.0]];
+    for kelvin in [3.0, 220.0, 300.0, 900.0, 5778.0, 50_000.0] {
+        for normal in [DVec3::Z, DVec3::NEG_Z] {
+            let scene = Builder::new()
+                .channels(Channels::from_bounds(bounds.to_vec(), None))
+                .film(4, 4, Filter::Box)
+                .bounces(0)
+                .black(disk(DVec3::ZERO, normal, 1.0))
+                .at_kelvin(kelvin)
+                .build();
+            let rendered = render(&scene, 1, 64, Settings::default());
+            rendered.assert_clean();
+            for values in rendered.means[0].chunks(4) {
+                for (value, [from, to]) in values.iter().zip(bounds) {
+                    let want = Curve::Blackbody { kelvin, scale: 1.0 }.mean(from, to);
+                    // 1e-4 of the channel's peak pointwise, the mean of 64 stratified wavelengths better; below the
+                    // least normal f32 nothing but zero or less than that.
+                    let bound = 1e-4 * want + f64::from(f32::MIN_POSITIVE);
+                    assert!((f64::from(*value) - want).abs() <= bound, "{kelvin} K, {from} nm: {value}, {want}");
+                }
+            }
+        }
+    }
+    assert!(law::radiance(550.0, 300.0) > 0.0 && (law::radiance(380.0, 3.0) as f32) == 0.0);
+}
+
+/// A dim lamp at 5778 K and a room at 300 K, from 0.5 to 10 um: devices and the reference, both ends converge.
+fn sun_and_heat() -> Scene {
+    let camera =
+        look(DVec3::new(0.1, 0.2, 1.8), DVec3::ZERO, DVec3::Y, Projection::Perspective { tan_half: DVec2::splat(0.5) });
+    Builder::new()
+        .camera(camera)
+        .film(4, 4, Filter::Box)
+        .channels(Channels::from_bounds(
+            vec![[490.0, 510.0], [1_900.0, 2_100.0], [3.9e3, 4.1e3], [9.5e3, 10.5e3]],
+            None,
+        ))
+        .bounces(4)
+        .diffuse(
+            room(DVec3::splat(-2.0), DVec3::splat(2.0)),
+            Curve::Linear { nm: vec![500.0, 10e3], value: vec![0.8, 0.1], outside: Outside::Hold },
+        )
+        .at_kelvin(300.0)
+        .black(sphere(DVec3::new(1.2, 1.5, -0.8), 0.05))
+        .at_kelvin(5778.0)
+        .diffuse(sphere(DVec3::new(-0.4, -0.3, -0.2), 0.5), 0.5)
+        .at_kelvin(350.0)
+        .lamp(disk(DVec3::new(0.0, 1.9, 0.0), DVec3::NEG_Y, 0.4), 1e-3, Sides::Both)
+        .at_kelvin(420.0)
+        .build()
+}
+
+#[test]
+fn sun_and_heat_converge_as_the_reference() {
+    let scene = sun_and_heat();
+    let rendered = render(&scene, 32, 64, Settings { seed: 5, ..Settings::default() });
+    rendered.assert_clean();
+    let (device, truth) = (rendered.values(), reference::render_image(&scene, 30_000, 6));
+    let freedom = f64::from(truth.samples - 1);
+    let truth: Vec<Estimate> = (truth.mean.iter().zip(&truth.standard_error))
+        .map(|(&mean, &error)| Estimate { mean, error, freedom })
+        .collect();
+    // A channel's mean over the image is what resolution and allowance are of.
+    let mean = |k: usize| truth.iter().skip(k).step_by(4).map(|e| e.mean).sum::<f64>() / 16.0;
+    let scale: Vec<f64> = (0..truth.len()).map(|i| mean(i % 4)).collect();
+    let bound = Bound { resolution: 0.05, allowance: 10.0 * ORIGIN_OFFSET + 1e-4 };
+    assert_agreement("sun and heat", &device, &truth, &scale, bound);
+}
+
+/// Heat on diffuse and black surfaces makes the scene one of lamps: the same shaders, the same sizes.
+#[test]
+fn heat_pays_for_nothing_but_lamps() {
+    let cold = closed_forms::isothermal_cavity(5).0;
+    let mut hot = cold.clone();
+    hot.objects.iter_mut().for_each(|object| object.emission = None);
+    hot.materials.iter_mut().for_each(|material| material.temperature = Some(300.0));
+    let [cold, hot] = [cold, hot].map(|scene| Prepared::new(&scene, 0).unwrap_or_else(|e| panic!("{e}")));
+    assert_eq!((hot.features, hot.emitters.len()), (cold.features, cold.emitters.len()));
+    assert_eq!((size_of::<Emitter>(), size_of::<Material>()), (16, 16));
+}
+
+/// What no device renders yet is refused in one sentence that names it.
+#[test]
+fn heat_that_depends_on_direction_is_refused() {
+    let ball = || sphere(DVec3::ZERO, 1.0);
+    let cases = [
+        (Builder::new().conductor(ball(), 0.2, 3.4, [0.0; 2]).at_kelvin(300.0), "of kind `conductor`"),
+        (Builder::new().plastic(ball(), 0.5, 1.5, 0.0).at_kelvin(300.0), "of kind `plastic`"),
+        (Builder::new().one_sided(ball(), 0.5).at_kelvin(300.0), "one-sided"),
+        (Builder::new().lamp(ball(), 1.0, Sides::Front).at_kelvin(300.0), "emission_sides = \"both\""),
+    ];
+    for (builder, words) in cases {
+        let Err(error) = Prepared::new(&builder.build(), 0) else { panic!("{words}: accepted") };
+        assert_eq!(error.exit_code(), 2);
+        assert!(error.to_string().contains(words), "{error}");
+    }
+}
