@@ -238,7 +238,7 @@ impl Writer {
         };
         let chunk = sound(Part::Radiance)?;
         let errors = self.cube.header().has_uncertainty().then(|| sound(Part::StandardError)).transpose()?;
-        Ok(Some(Base::Committed { record, chunk, errors }))
+        Ok(Some(Base::Committed(Box::new(Committed { record, chunk, errors }))))
     }
 
     fn insert(&self, aside: Aside, base: Option<Base>, record: Record, chunk: Chunk, errors: Option<Chunk>) {
@@ -359,28 +359,35 @@ impl Drop for Writer {
 
 /// What a unit is merged into.
 enum Base {
-    Committed { record: Record, chunk: Chunk, errors: Option<Chunk> },
+    Committed(Box<Committed>),
     Pending(Arc<Pending>),
+}
+
+/// A tile as its last commit left it.
+struct Committed {
+    record: Record,
+    chunk: Chunk,
+    errors: Option<Chunk>,
 }
 
 impl Base {
     fn record(&self) -> &Record {
         match self {
-            Base::Committed { record, .. } => record,
+            Base::Committed(committed) => &committed.record,
             Base::Pending(pending) => &pending.record,
         }
     }
 
     fn chunk(&self) -> &Chunk {
         match self {
-            Base::Committed { chunk, .. } => chunk,
+            Base::Committed(committed) => &committed.chunk,
             Base::Pending(pending) => &pending.chunk,
         }
     }
 
     fn errors(&self) -> Option<&Chunk> {
         match self {
-            Base::Committed { errors, .. } => errors.as_ref(),
+            Base::Committed(committed) => committed.errors.as_ref(),
             Base::Pending(pending) => pending.errors.as_ref(),
         }
     }

@@ -64,7 +64,7 @@ impl Response {
         }
         let live = || pieces().filter(|(a, b, p, q)| a < b && (*p > 0.0 || *q > 0.0));
         let from = live().next().map_or(nm[0], |piece| piece.0);
-        let to = live().last().map_or(nm[0], |piece| piece.1);
+        let to = live().next_back().map_or(nm[0], |piece| piece.1);
         let centroid = nm[0] + first_moment / integral;
         let curve = Curve::Linear { nm, value, outside: Outside::Zero };
         Ok(Response { curve, support: [from, to], integral, centroid })
