@@ -400,7 +400,7 @@ impl<'a> Tracer<'a> {
             }
             pieces.extend(self.piece(&interiors, ray.origin, ray.origin + hit.t * ray.direction));
             cross(&mut interiors, object.interior, hit.point.normal.dot(ray.direction) < 0.0);
-            ray.origin = self.world.leave(hit.primitive, &hit.point, ray.direction);
+            ray.origin += self.world.beyond(&ray, &hit) * ray.direction;
         }
     }
 
@@ -421,8 +421,9 @@ impl<'a> Tracer<'a> {
                 return Some(hit);
             }
             cross(interiors, object.interior, hit.point.normal.dot(ray.direction) < 0.0);
-            passed += hit.t;
-            ray.origin = self.world.leave(hit.primitive, &hit.point, ray.direction);
+            let beyond = self.world.beyond(&ray, &hit);
+            passed += beyond;
+            ray.origin += beyond * ray.direction;
         }
     }
 
@@ -447,7 +448,7 @@ impl<'a> Tracer<'a> {
                 if !cross(&mut entered, object.interior, inward) {
                     around.extend(object.interior);
                 }
-                ray.origin = self.world.leave(hit.primitive, &hit.point, direction);
+                ray.origin += self.world.beyond(&ray, &hit) * direction;
             }
         }
         around.reverse();

@@ -119,6 +119,11 @@ pub fn feature_lines(prepared: &Prepared, waves: &WavePlan) -> Vec<FeatureLine> 
             f.general.is_some_and(|g| g.map.is_some()),
             format!("{}, two records a bounce", module(s::MAP)),
         ),
+        line(
+            "heat that depends on the angle",
+            f.general.is_some_and(|g| g.hot),
+            "256 spectra for each hot material that is not diffuse".into(),
+        ),
         line("dispersion", f.general.is_some_and(|g| g.dispersion), "16 bytes a path".into()),
         line(
             "windowed geometry",
