@@ -204,6 +204,39 @@ fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
             let raw = vec4<f32>(0.0);
 #endif
             let weight = bitcast<f32>(record.z);
+#if MEDIA
+            if ((record.x & 0x3fu) == OP_MEDIUM) {
+#repeat VECTORS v
+                let depth_$v = bitcast<f32>(record.w) * spectrum_value(record.y, quad_$v, s);
+                if (weight > 0.0) {
+                    radiance_$v += weight * throughput_$v * absorbed(depth_$v) * spectrum_value(record.x >> 16u, quad_$v, s);
+                }
+                throughput_$v *= exp(-depth_$v);
+#end
+                continue;
+            }
+#if GRIDS
+            if ((record.x & 0x3fu) == OP_MARCH) {
+                let march_from = bitcast<vec4<f32>>(records[r + 1u]).xyz;
+                let march_to = bitcast<vec4<f32>>(records[r + 2u]).xyz;
+                r += 2u;
+                if ((record.x & MODE_ON_F) == 0u) {
+#repeat VECTORS v
+                    march(record, march_from, march_to, quad_$v, s, weight, &throughput_$v, &radiance_$v);
+#end
+                    continue;
+                }
+#repeat VECTORS v
+                march(record, march_from, march_to, quad_$v, s, 0.0, &factor_$v, &radiance_$v);
+                if ((record.x & MODE_GATHER) != 0u) {
+                    radiance_$v += throughput_$v * factor_$v * spectrum_value(record.x >> 16u, quad_$v, s);
+                    factor_$v = vec4<f32>(0.0);
+                }
+#end
+                continue;
+            }
+#endif
+#endif
 #repeat VECTORS v
             var value_$v = operation_value(record, raw, quad_$v, s);
 #end

@@ -130,7 +130,20 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 #endif
 
     // The next vertex.
+#if MEDIA
+    var nested = vec2<u32>(volumes[1], volumes[2]);
+    if (step.bounce > 0u) {
+        nested = states[STATE_WORDS * path + 2u].yz;
+    }
+    var way: Way;
+    let walked = walk(ray, INFINITE, &nested, &way, &overflow);
+    let hit = walked.hit;
+    append_way(&list, &way, ray, hit.primitive == NONE, 0u, scale);
+    let distance = walked.passed + hit.distance;
+#else
     let hit = traverse(ray, INFINITE, false, &overflow);
+    let distance = hit.distance;
+#endif
     if (hit.primitive == NONE) {
 #if ENVIRONMENT
         // A uniform environment is met by sampling the BSDF, which is as good as aiming at it.
@@ -158,7 +171,11 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
         end_path(list, 2u * step.bounce + 1u, overflow);
         return;
     }
+#if MEDIA
+    let surface = surface_at(walked.ray, hit);
+#else
     let surface = surface_at(ray, hit);
+#endif
     let from_front = dot(surface.normal, ray.direction) < 0.0;
 
     // What it emits.
@@ -168,7 +185,7 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
         if (from_front || (spectrum & EMITS_BOTH_SIDES) != 0u) {
             var weight = 1.0;
             if (density >= 0.0) {
-                weight = power_heuristic(density, light_density(surface.emitter, ray.origin, ray.direction, hit.distance, surface.normal));
+                weight = power_heuristic(density, light_density(surface.emitter, ray.origin, ray.direction, distance, surface.normal));
             }
             let begin = list.count;
             append(&list, OP_ONE | MODE_SINGLE, 0u, scale * weight, 0.0);
@@ -459,9 +476,21 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 #if LAMPS
             weight = light_strength * select(scale / light_pdf, weight, is_met);
 #endif
+#if MEDIA
+            way.count = 0u;
+            var nested_light = nested;
+            let inner = boundaries[hit.primitive] & 0xffu;
+            if (direction.z < 0.0 && inner != 0u && !cross_boundary(&nested_light, inner, from_front)) {
+                overflow = true;
+            }
+            if (walk(shadow, shadow_limit, &nested_light, &way, &overflow).hit.primitive != NONE) {
+                continue;
+            }
+#else
             if (traverse(shadow, shadow_limit, true, &overflow).primitive != NONE) {
                 continue;
             }
+#endif
         } else {
             next_density = chance;
             if (!(chance > 0.0)) {
@@ -476,6 +505,17 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
             if (to_light && from_map) {
                 append(&list, OP_SPECTRUM | MODE_SINGLE, part.ab, weight * max(direction.z, 0.0) * INV_PI, 0.0);
                 append_map(&list, MODE_ON_F, map_place, 1.0);
+#if MEDIA
+                append_way(&list, &way, shadow, true, MODE_ON_F, 1.0);
+#endif
+                gather(&list, begin, source);
+                continue;
+            }
+#endif
+#if MEDIA
+            if (to_light && way.count > 0u) {
+                append(&list, OP_SPECTRUM | MODE_SINGLE, part.ab, weight * max(direction.z, 0.0) * INV_PI, 0.0);
+                append_way(&list, &way, shadow, shadow_limit == INFINITE, MODE_ON_F, 1.0);
                 gather(&list, begin, source);
                 continue;
             }
@@ -498,6 +538,11 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 #if MAP
             if (from_map && list.count > begin) {
                 append_map(&list, MODE_ON_F, map_place, 1.0);
+            }
+#endif
+#if MEDIA
+            if (list.count > begin) {
+                append_way(&list, &way, shadow, shadow_limit == INFINITE, MODE_ON_F, 1.0);
             }
 #endif
             gather(&list, begin, source);
@@ -536,8 +581,20 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     heads[path].y = list.used;
     states[STATE_WORDS * path] = bitcast<vec4<u32>>(vec4<f32>(origin, next_density));
     states[STATE_WORDS * path + 1u] = vec4<u32>(bitcast<vec3<u32>>(direction), list.count | (list.used << 16u));
+#if MEDIA
+    let behind_surface = boundaries[hit.primitive] & 0xffu;
+    if (i.z < 0.0 && behind_surface != 0u && !cross_boundary(&nested, behind_surface, from_front)) {
+        atomicAdd(&counters[COUNTER_OVERFLOW], 1u);
+    }
+#if DISPERSION
+    states[STATE_WORDS * path + 2u] = vec4<u32>(live, nested, 0u);
+#else
+    states[STATE_WORDS * path + 2u] = vec4<u32>(NONE, nested, 0u);
+#endif
+#else
 #if DISPERSION
     states[STATE_WORDS * path + 2u] = vec4<u32>(live, 0u, 0u, 0u);
+#endif
 #endif
     let next = atomicAdd(&queue_lengths[step.bounce], 1u);
     queue[((step.bounce + 1u) & 1u) * wave.path_count + next] = path;

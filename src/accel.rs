@@ -20,8 +20,9 @@ const KIND_SPHERE: u32 = 1;
 const KIND_DISK: u32 = 2;
 const KIND_CYLINDER: u32 = 3;
 
-/// The largest number of materials: ids have 24 bits beside the primitive's kind.
-pub const MAX_MATERIALS: usize = 1 << 24;
+/// The largest number of materials: ids have 24 bits beside the primitive's kind, and one stands for none.
+pub const MAX_MATERIALS: usize = (1 << 24) - 1;
+const NO_MATERIAL: u32 = 0x00ff_ffff;
 
 /// World space → device units.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,6 +55,8 @@ pub struct Accel {
     pub primitives: Vec<Primitive>,
     /// Texture coordinates, normals and axes of those that carry some, found by [`Primitive::attributes`].
     pub attributes: Vec<f32>,
+    /// The object of each primitive.
+    pub objects: Vec<u32>,
     /// The emitting primitives: (index into `primitives`, object, area in device units).
     pub emitters: Vec<(u32, usize, f64)>,
     /// Whether anything but triangles occurs.
@@ -70,8 +73,13 @@ impl Accel {
         let (mut degenerate, mut attributes) = (0, Vec::new());
         for (index, object) in scene.objects.iter().enumerate() {
             let first = loose.len();
-            let triangles =
-                collect(&object.shape, object.material.map_or(NONE, |m| m as u32), index as u32, &space, &mut loose);
+            let triangles = collect(
+                &object.shape,
+                object.material.map_or(NO_MATERIAL, |m| m as u32),
+                index as u32,
+                &space,
+                &mut loose,
+            );
             for (primitive, triangle) in loose[first..].iter_mut().zip(&triangles) {
                 primitive.attributes = attach(&object.attributes, *triangle, &mut attributes);
             }
@@ -81,6 +89,7 @@ impl Accel {
         let has_shapes = loose.iter().any(|p| p.tag >> 24 != 0);
         let (nodes, order, depth) = build_nodes(&loose);
         let mut primitives: Vec<Primitive> = order.iter().map(|&i| loose[i as usize]).collect();
+        let objects = primitives.iter().map(|primitive| primitive.emitter).collect();
         let mut emitters = Vec::new();
         for (index, primitive) in primitives.iter_mut().enumerate() {
             // `collect` left the object here; from now on it is the emitter.
@@ -91,7 +100,7 @@ impl Accel {
                 emitters.push((index as u32, object, area(primitive)));
             }
         }
-        Accel { space, nodes, depth, primitives, attributes, emitters, has_shapes, degenerate }
+        Accel { space, nodes, depth, primitives, attributes, objects, emitters, has_shapes, degenerate }
     }
 }
 

@@ -9,7 +9,7 @@ use scene_builder::*;
 use spectile::gpu::adapter::STORAGE_BUFFERS;
 use spectile::gpu::shader::{Module, Source, compose};
 use spectile::render::prepare::{EvaluateShape, Features, Prepared, WindowList, Windows};
-use spectile::scene::{Attributes, Filter, Projection, Sampler, Scene, Shape, Sides, Texels, TextureKind};
+use spectile::scene::{Attributes, Field, Filter, Projection, Sampler, Scene, Shape, Sides, Texels, TextureKind};
 use spectile::spectral::{Channels, Curve};
 
 /// Bytes of a kernel's code, comments and indentation apart: of a plain scene's, and of one that needs everything and spreads its
@@ -175,6 +175,7 @@ fn general_scenes() -> Vec<(String, Scene)> {
     }
     scenes.extend(textured_scenes());
     scenes.extend(light_scenes());
+    scenes.extend(media_scenes());
     scenes
 }
 
@@ -195,6 +196,27 @@ fn light_scenes() -> Vec<(String, Scene)> {
         scenes.push((format!("lights {i}"), builder.build()));
     }
     scenes
+}
+
+/// Media of one number and of voxels, with and without what else shaders have to do on a way.
+fn media_scenes() -> Vec<(String, Scene)> {
+    let voxels = || heat::grid([2, 1, 1], |[x, _, _]| 300.0 + f64::from(x));
+    let one = |add: &dyn Fn(Builder) -> Builder| add(Builder(plain_scene())).build();
+    vec![
+        ("gas".into(), one(&|b| b.gas(0.5).null(disk()))),
+        ("gas around everything".into(), one(&|b| b.gas(0.5).outer().sky(1.0).directional(DVec3::X, 1.0))),
+        (
+            "voxels".into(),
+            one(&|b| b.medium(0.5, Some(voxels()), Field::Constant(1.0)).null_box(-DVec3::ONE, DVec3::ONE).roulette(1)),
+        ),
+        (
+            "voxels in dispersive glass under a map".into(),
+            one(&|b| {
+                let b = b.dielectric(disk(), surfaces::glass_curve(), 0.5).medium(0.5, None, voxels());
+                b.filled_from(DVec3::ZERO, DVec3::ONE).rgb_map([3, 2], vec![0.5; 18])
+            }),
+        ),
+    ]
 }
 
 /// Every kind of texture by itself and with others, what surfaces carry by itself, and all at once.

@@ -2,7 +2,13 @@
 // the depth of this scene's tree: a private array costs a software device by its size.
 
 // A driver in use ends loops silently after 65,535 iterations of an invocation: two traversals must stay below half.
+#if MEDIA
+// All traversals of an invocation share the steps, since paths pass boundaries of media without number.
+const MAX_STEPS: u32 = 24000u;
+var<private> steps_taken: u32;
+#else
 const MAX_STEPS: u32 = 12000u;
+#endif
 
 // For four children: entry and exit distances from quantised planes; a bit pattern for each child that is hit.
 fn hit_children(lo: array<vec4<f32>, 3>, hi: array<vec4<f32>, 3>, scale: vec3<f32>, base_lo: vec3<f32>, base_hi: vec3<f32>,
@@ -48,7 +54,11 @@ fn traverse(ray: Ray, limit: f32, any_hit: bool, overflow: ptr<function, bool>) 
     var nodes_left = vec2<u32>(0u, 0x80000000u);
     // (first primitive, hit bits in the low 24).
     var primitives_left = vec2<u32>(0u, 0u);
+#if MEDIA
+    var steps = steps_taken;
+#else
     var steps = 0u;
+#endif
     loop {
         steps += 1u;
         if (nodes_left.y > 0x00ffffffu) {
@@ -133,6 +143,9 @@ fn traverse(ray: Ray, limit: f32, any_hit: bool, overflow: ptr<function, bool>) 
             nodes_left = stack[stack_size];
         }
     }
+#if MEDIA
+    steps_taken = steps;
+#endif
     return hit;
 }
 

@@ -21,22 +21,28 @@ fn planck(micrometres: vec4<f32>, kelvin: f32) -> vec4<f32> {
 
 // A way through a volume of voxels, cell by cell (Amanatides and Woo 1987). Emission seen through `through` is added to
 // `radiance`, and `through` is attenuated.
-fn march(record: vec4<u32>, from: vec3<f32>, to: vec3<f32>, quad: u32, s: SpectralSample, emission: f32,
+fn march(record: vec4<u32>, start: vec3<f32>, to: vec3<f32>, quad: u32, s: SpectralSample, emission: f32,
          through: ptr<function, vec4<f32>>, radiance: ptr<function, vec4<f32>>) {
     let first = volume_at(record.y);
     let metres = bitcast<f32>(record.w);
     let size = vec3<i32>(vec3<u32>(volumes[first + 7u], volumes[first + 8u], volumes[first + 9u]));
-    let way = to - from;
+    let way = to - start;
     let ahead = vec3<i32>(select(vec3<f32>(-1.0), vec3<f32>(1.0), way > vec3<f32>(0.0)));
-    var cell = clamp(vec3<i32>(floor(from)), vec3<i32>(0), size - 1);
+    var cell = clamp(vec3<i32>(floor(start)), vec3<i32>(0), size - 1);
     // Where the next plane along each axis is crossed, as a fraction of the way.
     let resting = abs(way) < vec3<f32>(1.0e-12);
     let inverse = 1.0 / select(way, vec3<f32>(1.0), resting);
-    var next = select((vec3<f32>(cell + max(ahead, vec3<i32>(0))) - from) * inverse, vec3<f32>(2.0), resting);
+    var next = select((vec3<f32>(cell + max(ahead, vec3<i32>(0))) - start) * inverse, vec3<f32>(2.0), resting);
     let pace = select(abs(inverse), vec3<f32>(0.0), resting);
     let temperature_at = volumes[first + 3u];
     let density_at = volumes[first + 4u];
     let wavelength = spectrum_value(WAVELENGTH, quad, s);
+    // In matter of index n sources are n^2 of those in a vacuum.
+    var squares = vec4<f32>(1.0);
+    if (volumes[first + 23u] != NONE) {
+        let index = spectrum_value(volumes[first + 23u], quad, s);
+        squares = index * index;
+    }
     var done = 0.0;
     let most = u32(size.x + size.y + size.z) + 3u;
     for (var n = 0u; n < most; n += 1u) {
@@ -56,7 +62,7 @@ fn march(record: vec4<u32>, from: vec3<f32>, to: vec3<f32>, quad: u32, s: Spectr
                 let depth = (metres * (end - done) * density) * absorption(volumes[first + 22u], kelvin, quad, s);
                 let lost = absorbed(depth);
                 if (emission > 0.0) {
-                    *radiance += emission * *through * lost * planck(wavelength, kelvin);
+                    *radiance += emission * *through * lost * squares * planck(wavelength, kelvin);
                 }
                 *through *= exp(-depth);
             }

@@ -7,6 +7,8 @@ const NULL_BOUNDARY: u32 = 0x80000000u;
 
 // The volumes that a path is in, the innermost in the low byte, numbers + 1; deeper ones above it, in the second word last.
 const MOST_NESTED: u32 = 8u;
+// Boundaries without material on one straight way.
+const MOST_CROSSINGS: u32 = 256u;
 
 // Enters or leaves volume `number` (+ 1). False where volumes are nested too deep.
 fn cross_boundary(around: ptr<function, vec2<u32>>, number: u32, entering: bool) -> bool {
@@ -38,34 +40,59 @@ fn cross_boundary(around: ptr<function, vec2<u32>>, number: u32, entering: bool)
 struct Way {
     count: u32,
     volume: array<u32, MOST_STRETCHES>,
-    from: array<f32, MOST_STRETCHES>,
+    start: array<f32, MOST_STRETCHES>,
     to: array<f32, MOST_STRETCHES>,
 }
 
 // Notes the stretch up to `to` in the innermost volume. False where there are too many.
-fn add_stretch(way: ptr<function, Way>, around: vec2<u32>, from: f32, to: f32) -> bool {
+fn add_stretch(way: ptr<function, Way>, around: vec2<u32>, start: f32, to: f32) -> bool {
     let number = around.x & 0xffu;
-    if (number == 0u || !(to > from)) {
+    if (number == 0u || !(to > start)) {
         return true;
     }
     if ((*way).count == MOST_STRETCHES) {
         return false;
     }
     (*way).volume[(*way).count] = number - 1u;
-    (*way).from[(*way).count] = from;
+    (*way).start[(*way).count] = start;
     (*way).to[(*way).count] = to;
     (*way).count += 1u;
     return true;
 }
 
-// What lies behind the primitive that a ray met: the rest of the ray, with what is around it.
-fn pass_boundary(ray: Ray, hit: Hit, surface: Surface, around: ptr<function, vec2<u32>>) -> Ray {
-    let entering = dot(surface.normal, ray.direction) < 0.0;
-    let number = boundaries[hit.primitive] & 0xffu;
-    if (number != 0u) {
-        _ = cross_boundary(around, number, entering);
+// Where a way ends: what was met, by which part of the ray, and how far that part's start is from the ray's, in units of its
+// direction.
+struct Walked {
+    hit: Hit,
+    ray: Ray,
+    passed: f32,
+}
+
+// Follows `ray` up to the first surface with a material, nearer than `limit`; `around` and `way` note what it goes through.
+fn walk(ray: Ray, limit: f32, around: ptr<function, vec2<u32>>, way: ptr<function, Way>, overflow: ptr<function, bool>) -> Walked {
+    var walked = Walked(Hit(limit, NONE, 0.0, 0.0), ray, 0.0);
+    for (var n = 0u; n < MOST_CROSSINGS; n += 1u) {
+        let left = select(limit - walked.passed, INFINITE, limit == INFINITE);
+        walked.hit = traverse(walked.ray, left, false, overflow);
+        let met = walked.hit.primitive != NONE;
+        if (!add_stretch(way, *around, walked.passed, select(limit, walked.passed + walked.hit.distance, met))) {
+            *overflow = true;
+        }
+        if (!met || (boundaries[walked.hit.primitive] & NULL_BOUNDARY) == 0u || *overflow) {
+            return walked;
+        }
+        let surface = surface_at(walked.ray, walked.hit);
+        let entering = dot(surface.normal, ray.direction) < 0.0;
+        let number = boundaries[walked.hit.primitive] & 0xffu;
+        if (number != 0u && !cross_boundary(around, number, entering)) {
+            *overflow = true;
+        }
+        walked.ray.origin = offset_origin(surface.position, select(surface.normal, -surface.normal, entering));
+        // To where the rest starts, a little beyond the boundary: what is left must not lead past its end.
+        walked.passed = dot(walked.ray.origin - ray.origin, ray.direction) / dot(ray.direction, ray.direction);
     }
-    return Ray(offset_origin(surface.position, select(surface.normal, -surface.normal, entering)), ray.direction);
+    *overflow = true;
+    return walked;
 }
 
 // Records of the way along `ray`; the outer medium, volume OUTER_VOLUME, is left out where the way leads to infinity: what arrives
@@ -79,14 +106,17 @@ fn append_way(list: ptr<function, RecordList>, way: ptr<function, Way>, ray: Ray
             continue;
         }
         let first = volume_at(volume);
-        let from = (*way).from[n];
-        let metres = ((*way).to[n] - from) * speed;
+        let start = (*way).start[n];
+        // Interiors end within the scene, which is some 4 units across.
+        let to = min((*way).to[n], start + 8.0 / length(ray.direction));
+        let metres = (to - start) * speed;
 #if GRIDS
         if ((volumes[first] & VOLUME_GRID) != 0u) {
-            append(list, OP_MARCH | mode, volume, scale, metres);
-            append_raw(list, vec4<f32>(to_voxels(first, ray.origin + from * ray.direction), 0.0));
-            append_raw(list, vec4<f32>(to_voxels(first, ray.origin + (*way).to[n] * ray.direction), 0.0));
-            if (mode == 0u && (volumes[first] & VOLUME_EMITS) != 0u) {
+            let glows = mode == 0u && (volumes[first] & VOLUME_EMITS) != 0u;
+            append(list, OP_MARCH | mode, volume, select(0.0, scale, glows), metres);
+            append_raw(list, vec4<f32>(to_voxels(first, ray.origin + start * ray.direction), 0.0));
+            append_raw(list, vec4<f32>(to_voxels(first, ray.origin + to * ray.direction), 0.0));
+            if (glows) {
                 (*list).used = (*list).count;
             }
             continue;
@@ -94,7 +124,11 @@ fn append_way(list: ptr<function, RecordList>, way: ptr<function, Way>, ray: Ray
 #endif
         let source = volumes[first + 2u];
         let emits = mode == 0u && source != NONE;
-        append(list, OP_MEDIUM | mode | (select(0u, source, emits) << 16u), volumes[first + 1u], select(0.0, scale, emits), metres);
+        if (mode != 0u) {
+            append(list, OP_EXTINCTION | mode, volumes[first + 1u], 1.0, metres);
+            continue;
+        }
+        append(list, OP_MEDIUM | (select(0u, source, emits) << 16u), volumes[first + 1u], select(0.0, scale, emits), metres);
         if (emits) {
             (*list).used = (*list).count;
         }

@@ -129,6 +129,11 @@ fn operation_value(record: vec4<u32>, raw: vec4<f32>, quad: u32, s: SpectralSamp
     // Channels that only fill up the last quad have index 0.
     let index = max(a, vec4<f32>(1.0e-6));
     switch (operation) {
+#if MEDIA
+        case OP_EXTINCTION: {
+            return exp(-parameter * a);
+        }
+#endif
 #if OP_FRESNEL
         case OP_FRESNEL, OP_TRANSMIT: {
             let eta = select(index, 1.0 / index, (record.x & MODE_BEHIND) != 0u);

@@ -50,6 +50,16 @@ const OP_MAP: u32 = 9u;
 // X = D(h) |o h| |i h| / (o h + n i h)^2 (1 - F), each channel with its own half vector h; parameter: roughness; the next
 // record holds cos o, and i.
 const OP_ROUGH_TRANSMIT: u32 = 48u;
+#if MEDIA
+// A stretch of `parameter` metres through a medium of absorption S_a: R += weight T (1 - exp(-S_a parameter)) S_source, then
+// T *= exp(-S_a parameter). No mode.
+const OP_MEDIUM: u32 = 22u;
+// X = exp(-S_a parameter).
+const OP_EXTINCTION: u32 = 23u;
+// The same for volume y, whose voxels differ, on T and R, or with MODE_ON_F on F; from and to, in voxels, are in the next two
+// records.
+const OP_MARCH: u32 = 24u;
+#endif
 
 // Operations from here on have a record of numbers after them.
 const FIRST_RAW_OP: u32 = 48u;

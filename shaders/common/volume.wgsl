@@ -3,6 +3,7 @@
 //      0 bits            1 absorption        2 source, or NONE   (spectra, without grids)
 //      3, 4 first voxel of temperature, density, or NONE         5, 6 their values where constant
 //      7 … 9 voxels along x, y, z       10 … 21 device units to voxels, rows and offset       22 first word of its absorbers
+//      23 index of refraction there (spectrum), or NONE
 // Absorbers: how many; then of each strength, number of columns, and of each column temperature and spectrum.
 
 @group(0) @binding(61) var<storage, read> volumes: array<u32>;

@@ -46,6 +46,9 @@ modules! {
     KNOTS = "common/knots.wgsl";
     CHANNEL = "common/channel.wgsl";
     PROGRAM = "common/program.wgsl";
+    VOLUME = "common/volume.wgsl";
+    MEDIUM = "common/medium.wgsl";
+    EXTINCTION = "common/extinction.wgsl";
     GENERATE_CAMERA = "generate_camera.wgsl";
     GENERATE_BOUNCE = "generate_bounce.wgsl";
     GENERATE_VERTEX = "generate_vertex.wgsl";

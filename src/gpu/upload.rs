@@ -43,6 +43,7 @@ fn check_size(name: &str, bytes: u64, limits: &wgpu::Limits) -> Result<()> {
     }
     let (what, help) = match name {
         "spectra" | "knot_starts" | "knots" => ("the spectra of the scene", "fewer channels or fewer spectra"),
+        "volumes" | "voxels" => ("the media of the scene", "smaller grids"),
         "map_table" | "map_texels" => ("the environment map", "a smaller one"),
         "emitters" | "emitter_cdf" => ("the emitting triangles of the scene", "a coarser mesh where it emits"),
         "textures" | "texels" => ("the textures of the scene", "smaller ones"),
@@ -81,6 +82,11 @@ fn parts<'a>(prepared: &'a Prepared, windows: &Windows) -> Vec<(String, &'a [u8]
     }
     if prepared.features.general.is_some_and(|general| general.lamps) {
         parts.push(("lamps".into(), bytemuck::cast_slice(&prepared.lamps)));
+    }
+    if let Some(media) = &prepared.media {
+        parts.push(("volumes".into(), bytemuck::cast_slice(&media.volumes)));
+        parts.push(("voxels".into(), bytemuck::cast_slice(&media.voxels)));
+        parts.push(("boundaries".into(), bytemuck::cast_slice(&media.boundaries)));
     }
     if let Some(sky) = &prepared.sky {
         parts.push(("map_table".into(), bytemuck::cast_slice(&sky.table)));

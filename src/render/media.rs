@@ -4,8 +4,8 @@ use glam::{DAffine3, DVec3};
 
 use crate::accel::Accel;
 use crate::gpu::layout::{NONE, Primitive};
-use crate::scene::{Field, Interior, Medium, Projection, Scene, SpectrumId};
-use crate::spectral::Curve;
+use crate::scene::{Bsdf, Field, Interior, MaterialId, Medium, Projection, Scene, SpectrumId};
+use crate::spectral::{Channels, Curve, Outside, planck};
 use crate::{Error, Result};
 
 use super::surfaces::Needed;
@@ -46,6 +46,9 @@ pub struct Media {
 struct Volume<'a> {
     medium: &'a Medium,
     interior: Option<Interior>,
+    /// The index of refraction there, where its surface is a dielectric: radiance in matter is n² of that in a vacuum, and so
+    /// are sources.
+    index: Option<Curve>,
 }
 
 impl Media {
@@ -61,7 +64,8 @@ impl Media {
             let Some(interior) = object.interior else { continue };
             let known = volumes.iter().position(|v| v.interior.is_some_and(|i| i.body == interior.body));
             let index = known.unwrap_or_else(|| {
-                volumes.push(Volume { medium: &scene.media[interior.medium], interior: Some(interior) });
+                let index = object.material.and_then(|material| index(scene, material));
+                volumes.push(Volume { medium: &scene.media[interior.medium], interior: Some(interior), index });
                 volumes.len() - 1
             });
             *number = index as u32 + 1;
@@ -69,7 +73,7 @@ impl Media {
         let mut outer = NONE;
         if let Some(medium) = scene.camera_medium {
             outer = volumes.len() as u32;
-            volumes.push(Volume { medium: &scene.media[medium], interior: None });
+            volumes.push(Volume { medium: &scene.media[medium], interior: None, index: None });
         }
         if volumes.len() > MOST_VOLUMES {
             let message = format!("{} interiors with media, at most {MOST_VOLUMES} are supported", volumes.len());
@@ -137,7 +141,7 @@ impl Media {
             let absorption = Curve::derived(&tables, &scene.channels, sum);
             words[1] = self.spectrum(first + 1, format!("medium \"{}\"", medium.name), absorption, true);
             if let Some(kelvin) = kelvin.filter(|kelvin| *kelvin > 0.0) {
-                let source = Curve::Blackbody { kelvin, scale: 1.0 };
+                let source = source(scene, kelvin, volume.index.as_ref());
                 words[2] = self.spectrum(first + 2, format!("black body at {kelvin} K"), source, false);
             }
             self.volumes[first..first + WORDS].copy_from_slice(&words);
@@ -157,13 +161,17 @@ impl Media {
         (words[4], words[6]) = (density.0, (density.1 as f32).to_bits());
         words[7..10].copy_from_slice(&size);
         let interior = volume.interior.expect("grids fill interiors");
-        let from_device =
-            DAffine3::from_translation(accel.space.center) * DAffine3::from_scale(DVec3::splat(1.0 / accel.space.scale));
+        let from_device = DAffine3::from_translation(accel.space.center)
+            * DAffine3::from_scale(DVec3::splat(1.0 / accel.space.scale));
         let scaled = DAffine3::from_scale(DVec3::from(size.map(f64::from))) * interior.to_grid * from_device;
         let rows = scaled.matrix3.transpose();
         for (i, value) in [rows.x_axis, rows.y_axis, rows.z_axis, scaled.translation].iter().enumerate() {
             let bits = value.as_vec3().to_array().map(f32::to_bits);
             words[10 + 3 * i..13 + 3 * i].copy_from_slice(&bits);
+        }
+        words[23] = NONE;
+        if let Some(index) = &volume.index {
+            words[23] = self.spectrum(first + 23, format!("index in \"{}\"", medium.name), index.clone(), false);
         }
         words[22] = self.volumes.len() as u32;
         self.volumes[first..first + WORDS].copy_from_slice(&words);
@@ -184,13 +192,9 @@ impl Media {
         if self.wavelength.is_none() {
             // µm, linear in every channel.
             let bounds = scene.channels.bounds.iter().flatten();
-            let [low, high] =
-                bounds.fold([f64::INFINITY, 0.0f64], |[low, high], &nm| [low.min(nm), high.max(nm)]);
-            let curve = Curve::Linear {
-                nm: vec![low, high],
-                value: vec![low * 1e-3, high * 1e-3],
-                outside: crate::spectral::Outside::Hold,
-            };
+            let [low, high] = bounds.fold([f64::INFINITY, 0.0f64], |[low, high], &nm| [low.min(nm), high.max(nm)]);
+            let curve =
+                Curve::Linear { nm: vec![low, high], value: vec![low * 1e-3, high * 1e-3], outside: Outside::Hold };
             self.wavelength = Some(self.spectra.len());
             self.spectra.push(Needed::Derived("wavelength".into(), curve));
         }
@@ -263,6 +267,37 @@ impl Media {
         around.extend((self.outer != NONE).then_some(self.outer + 1));
         (around.len() <= 8).then(|| around.iter().rev().fold(0, |word, &n| word << 8 | u64::from(n)))
     }
+}
+
+/// What sources are multiplied with twice in a body of `material`: its index; the mean over channels where it does not disperse.
+fn index(scene: &Scene, material: MaterialId) -> Option<Curve> {
+    let Bsdf::Dielectric { eta, dispersion, .. } = scene.materials[material].bsdf else { return None };
+    let (curve, bounds) = (&scene.spectra[eta].curve, &scene.channels.bounds);
+    let mean = || bounds.iter().map(|b| curve.mean(b[0], b[1])).sum::<f64>() / bounds.len() as f64;
+    Some(if dispersion { curve.clone() } else { Curve::Constant(mean()) })
+}
+
+/// n² B(λ, T).
+fn source(scene: &Scene, kelvin: f64, index: Option<&Curve>) -> Curve {
+    let Some(index) = index else { return Curve::Blackbody { kelvin, scale: 1.0 } };
+    if index.is_constant() {
+        return Curve::Blackbody { kelvin, scale: index.eval(scene.channels.centre(0)).powi(2) };
+    }
+    // From bound to bound, each stretch by its own peak: the tail of Planck's law is as exact as its top.
+    let mut edges: Vec<f64> = scene.channels.bounds.iter().flatten().copied().collect();
+    edges.sort_by(f64::total_cmp);
+    edges.dedup();
+    let (mut nm, mut value) = (Vec::new(), Vec::new());
+    for edge in edges.windows(2) {
+        let wavelength = Curve::Linear { nm: edge.to_vec(), value: edge.to_vec(), outside: Outside::Hold };
+        let stretch = Channels::from_bounds(vec![[edge[0], edge[1]]], None);
+        let at = |v: &[f64]| planck::radiance(v[0], kelvin) * v[1] * v[1];
+        if let Curve::Linear { nm: x, value: y, .. } = Curve::derived(&[&wavelength, index], &stretch, at) {
+            nm.extend(x);
+            value.extend(y);
+        }
+    }
+    Curve::Linear { nm, value, outside: Outside::Hold }
 }
 
 /// Spectra and factors whose sum is the absorption of a homogeneous medium, m⁻¹.

@@ -5,6 +5,7 @@ mod fault_tests;
 mod heat;
 pub mod job;
 pub mod lights;
+pub mod media;
 pub mod patience;
 pub mod plan;
 pub mod pool;

@@ -124,6 +124,16 @@ pub fn feature_lines(prepared: &Prepared, waves: &WavePlan) -> Vec<FeatureLine> 
             f.general.is_some_and(|g| g.hot),
             "256 spectra for each hot material that is not diffuse".into(),
         ),
+        line(
+            "media",
+            f.general.is_some_and(|g| g.media.is_some()),
+            format!("{}, 16 bytes a path, a record for each stretch of a way", module(s::MEDIUM)),
+        ),
+        line(
+            "media of voxels",
+            f.general.is_some_and(|g| g.media.is_some_and(|m| m.grids.is_some())),
+            "a march through its cells for each stretch and channel".into(),
+        ),
         line("dispersion", f.general.is_some_and(|g| g.dispersion), "16 bytes a path".into()),
         line(
             "windowed geometry",
@@ -179,10 +189,6 @@ pub fn check(scene: &Scene) -> Result<()> {
     let [width, height] = scene.film.cube_size();
     if width == 0 || height == 0 || scene.channels.is_empty() {
         return Err(Error::input(&scene.file, "there is nothing to render: no pixels or no channels"));
-    }
-    if let Some(medium) = scene.media.first() {
-        let message = format!("medium \"{}\" fills something, which cannot be rendered yet: remove it", medium.name);
-        return Err(Error::input(&scene.file, message));
     }
     Ok(())
 }

@@ -9,6 +9,7 @@ use crate::gpu::self_test::LOOP_LIMIT;
 use crate::gpu::shader::{self, Defines, Module};
 use crate::render::heat;
 use crate::render::lights::{LightPicks, STEPS, light_picks};
+use crate::render::media::Media;
 use crate::render::sky::SkyMap;
 use crate::render::surfaces::{Kind, Needed, Surfaces};
 use crate::scene::{
@@ -78,6 +79,16 @@ pub struct General {
     /// Surfaces that emit by angle.
     pub hot: bool,
     pub map: Option<Map>,
+    pub media: Option<MediaShape>,
+}
+
+/// Media, as shaders are composed for them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MediaShape {
+    pub outer: u32,
+    pub stretches: u32,
+    /// Id of the wavelength's spectrum, and how large lists of absorbers are, where there are grids.
+    pub grids: Option<[u32; 3]>,
 }
 
 /// An environment map, as shaders are composed for it.
@@ -125,6 +136,7 @@ pub struct Prepared {
     pub materials: Vec<Material>,
     /// In general scenes, instead of `materials`.
     pub surfaces: Option<Surfaces>,
+    pub media: Option<Media>,
     /// Emitting primitives, then lamps.
     pub emitters: Vec<Emitter>,
     pub lamps: Vec<Lamp>,
@@ -158,7 +170,9 @@ impl Prepared {
             || !scene.textures.is_empty()
             || !scene.lights.is_empty()
             || sky.is_some()
+            || !scene.media.is_empty()
             || !heat.by_angle.is_empty();
+        let mut media = Media::new(scene, &accel)?;
         let mut surfaces = general.then(|| Surfaces::new(scene));
         let axis = surfaces.as_mut().zip(sky.as_ref()).map(|(surfaces, sky)| {
             surfaces.spectra.push(Needed::Exact("places in the environment map".into(), sky.axis.clone()));
@@ -168,10 +182,22 @@ impl Prepared {
         let uniform = scene.environment.as_ref().and_then(|e| e.uniform()).filter(|_| !general);
         let uniform = uniform.map(|radiance| scene.spectra[radiance].curve.scaled(4.0 * PI));
         let picks = light_picks(scene, &accel, uniform.as_ref().or(sky.as_ref().map(|sky| &sky.flux)));
+        let media_spectra = surfaces.as_ref().map_or(0, |s| s.spectra.len());
+        if let (Some(surfaces), Some(media)) = (&mut surfaces, &mut media) {
+            surfaces.spectra.append(&mut media.spectra);
+        }
         let (tables, ids) = spectral_tables(scene, &heat, surfaces.as_ref().map_or(&[], |s| &s.spectra))?;
         if let Some(surfaces) = &mut surfaces {
             surfaces.name_spectra(|position| tables.ids[ids.needed[position]]);
         }
+        if let Some(media) = &mut media {
+            media.name_spectra(|position| tables.ids[ids.needed[media_spectra + position]]);
+        }
+        let media_shape = media.as_ref().map(|m| MediaShape {
+            outer: m.outer,
+            stretches: m.stretches,
+            grids: m.wavelength.map(|w| [tables.ids[ids.needed[media_spectra + w]], m.most_absorbers, m.most_columns]),
+        });
 
         let factor = |s: usize| tables.ids[ids.factors[&s]];
         let source = |s: usize| tables.ids[ids.sources[&s]];
@@ -214,12 +240,13 @@ impl Prepared {
             lamps: !lamps.is_empty(),
             suns,
             map,
+            media: media_shape,
             ..General::of(surfaces, scene)
         };
         features.general = surfaces.as_ref().map(of);
         features.registers &= !general;
         let frame = frame(scene, seed, &accel, &picks, environment_spectrum, tables.stratum_bits);
-        let max_records = max_records(&frame, features, surfaces.as_ref());
+        let max_records = max_records(&frame, features, surfaces.as_ref(), media.as_ref());
         if max_records >= MAX_RECORDS {
             let message = format!(
                 "a path of {} bounces may take {max_records} records in this scene, at most {MAX_RECORDS} are supported: \
@@ -228,11 +255,12 @@ impl Prepared {
             );
             return Err(Error::input(&scene.file, message));
         }
-        Ok(Prepared {
+        let prepared = Prepared {
             features,
             frame: Frame { max_records, ..frame },
             materials,
             surfaces,
+            media,
             emitters,
             lamps,
             sky,
@@ -243,7 +271,25 @@ impl Prepared {
             channels: scene.channels.len(),
             accel,
             tables,
-        })
+        };
+        if prepared.path_iterations() > LOOP_LIMIT {
+            let message = format!(
+                "a path of {} bounces may go through {} voxels on each of its ways, more than one evaluation can: lower \
+                 integrator.max_bounces or use coarser grids",
+                prepared.frame.max_bounces,
+                prepared.media.as_ref().map_or(0, |media| media.cells)
+            );
+            return Err(Error::input(&scene.file, message));
+        }
+        Ok(prepared)
+    }
+
+    /// Iterations that evaluation may take for one path: its records, and the voxels on its ways, a vector of channels at a
+    /// time.
+    pub fn path_iterations(&self) -> u32 {
+        let cells = self.media.as_ref().map_or(0, |media| media.cells);
+        let ways = self.frame.max_bounces.saturating_mul(2) + 1;
+        (self.frame.max_records + 1).saturating_add(ways.saturating_mul(2 * cells))
     }
 
     /// Most records that one path can have: at each vertex what it emits and what next-event estimation found.
@@ -310,6 +356,9 @@ impl Prepared {
             modules.push(shader::MAP);
         }
         modules.extend([shader::RECORD, shader::TABLES, shader::MATERIAL, shader::GGX, shader::BSDF]);
+        if general.media.is_some() {
+            modules.extend([shader::VOLUME, shader::MEDIUM]);
+        }
         if general.anisotropic {
             modules.push(shader::TANGENT);
         }
@@ -335,6 +384,12 @@ impl Prepared {
             }
             if general.map.is_some() {
                 modules.push(shader::MAP_VALUE);
+            }
+            if let Some(media) = &general.media {
+                modules.push(shader::EXTINCTION);
+                if media.grids.is_some() {
+                    modules.push(shader::VOLUME);
+                }
             }
             modules.push(shader::PROGRAM);
         }
@@ -369,6 +424,13 @@ impl Prepared {
             d.set(name, has(kinds));
         }
         d.set("ROUGH_BASE", general.rough_base).set("OP_ETA_TABLE", rough_glass || general.rough_base);
+        if let Some(media) = &general.media {
+            d.set("MEDIA", true).constant("OUTER_VOLUME", media.outer).constant("MOST_STRETCHES", media.stretches);
+            if let Some([wavelength, absorbers, columns]) = media.grids {
+                d.set("GRIDS", true).set("MOST_ABSORBERS", absorbers).set("MOST_COLUMNS", columns);
+                d.constant("WAVELENGTH", wavelength);
+            }
+        }
         d.set("OP_ONLY", general.dispersion);
         d.set("TEXTURES", general.textures).set("TEXTURED", general.textured).set("KEPT", general.textured_base);
         d.set("COLOURS", general.colours).set("MIXTURES", general.mixtures).set("SHARES", general.shares);
@@ -421,7 +483,7 @@ impl Prepared {
 
     /// Bytes of a path's state between two bounces.
     pub fn state_bytes(&self) -> u32 {
-        if self.features.general.is_some_and(|g| g.dispersion) { 48 } else { 32 }
+        if self.features.general.is_some_and(|g| g.dispersion || g.media.is_some()) { 48 } else { 32 }
     }
 
     /// Switches and constants of `evaluate_pixel`, for workgroups as `shape` says.
@@ -631,14 +693,18 @@ fn features(scene: &Scene, accel: &Accel, tables: &SpectralTables, spectra: usiz
 }
 
 /// Most records of a path: at every scattering event what materials take, and emission where a surface or the sky emits.
-fn max_records(frame: &Frame, features: Features, surfaces: Option<&Surfaces>) -> u32 {
+fn max_records(frame: &Frame, features: Features, surfaces: Option<&Surfaces>, media: Option<&Media>) -> u32 {
     let bounces = frame.max_bounces;
     let general = features.general.unwrap_or_default();
     // Where a path leaves the scene: the environment, and suns that may cover one another.
     let emission = if features.emitters { bounces + 1 } else { 1 } + general.suns;
     // A direction in a map is an instruction of its own, and parts a diffuse vertex in two.
     let aimed = if general.map.is_some() { 2 } else { 0 };
-    emission.saturating_add(bounces.saturating_mul(surfaces.map_or(1, |s| s.vertex_records) + aimed))
+    // The way to each vertex, and from each to a light; a vertex that aims through a medium has no record for both.
+    let way = media.map_or(0, Media::way_records);
+    let through = if media.is_some() { way + 2 } else { 0 };
+    let vertex = surfaces.map_or(1, |s| s.vertex_records) + aimed + way + through;
+    (emission + way).saturating_add(bounces.saturating_mul(vertex))
 }
 
 fn frame(

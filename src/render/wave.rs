@@ -55,6 +55,8 @@ pub struct WavePlan {
     pub max_records: u32,
     /// Bytes of a path's state and of a record.
     pub state_size: u32,
+    /// Loop iterations that evaluating a path may take.
+    pub path_iterations: u32,
     pub record_size: u32,
     pub roulette: bool,
     pub limits: DeviceLimits,
@@ -97,6 +99,7 @@ impl WavePlan {
             max_bounces: prepared.frame.max_bounces,
             max_records: records as u32,
             state_size: prepared.state_bytes(),
+            path_iterations: prepared.path_iterations(),
             record_size: prepared.record_bytes(),
             roulette: prepared.features.roulette,
             limits,
@@ -136,7 +139,7 @@ impl WavePlan {
 
     /// Samples per pixel of a wave: one invocation of `evaluate` walks all of them.
     fn most_samples(&self) -> u32 {
-        let samples = (LOOP_LIMIT / (self.max_records + 1)).clamp(1, 64).min(self.paths);
+        let samples = (LOOP_LIMIT / self.path_iterations).clamp(1, 64).min(self.paths);
         1 << samples.ilog2()
     }
 
@@ -309,6 +312,7 @@ mod tests {
             max_bounces: 5,
             max_records: 11,
             state_size: 32,
+            path_iterations: 12,
             record_size: 8,
             roulette: false,
             limits: LIMITS,
