@@ -383,7 +383,9 @@ impl<'a> Tracer<'a> {
             let object = &self.scene.objects[self.world.primitives[hit.primitive].object];
             cross(&mut interiors, object.interior, goes_inside);
         }
-        let (mut ray, mut pieces) = (Ray { origin, direction: aim.direction }, Vec::new());
+        // From just off the surface to the very target: a parallel line would meet a light seen obliquely too early.
+        let direction = aim.target.map_or(aim.direction, |target| (target - origin).normalize());
+        let (mut ray, mut pieces) = (Ray { origin, direction }, Vec::new());
         loop {
             let left = aim.target.map_or(f64::INFINITY, |target| (target - ray.origin).dot(ray.direction));
             let hit = self.world.closest_hit(&ray).filter(|hit| hit.t < left);
