@@ -45,11 +45,6 @@ const PART_DISPERSES: u32 = 0x400u;
 // They bend further apart than the lobe is wide: refraction leaves one.
 const PART_NARROW: u32 = 0x800u;
 
-#if TEXTURED
-// The reflectance of a diffuse surface or base is texture `loss`.
-const PART_TEXTURED: u32 = 0x1000u;
-#endif
-
 const KIND_LAMBERT: u32 = 0u;
 const KIND_CONDUCTOR: u32 = 1u;
 const KIND_ROUGH_CONDUCTOR: u32 = 2u;

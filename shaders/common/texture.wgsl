@@ -40,6 +40,9 @@ fn texture_number(texture: u32, around: Around, channel: u32) -> f32 {
 #endif
 
 #if TEXTURED
+// Flag of a part: the reflectance of its diffuse surface or base is texture `loss`.
+const PART_TEXTURED: u32 = 0x1000u;
+
 // Appends what adds `weight` times a textured reflectance, with `mode`.
 fn append_reflectance(list: ptr<function, RecordList>, texture: u32, uv: vec2<f32>, weight: f32, mode: u32) {
     let around = texels_around(texture, uv);

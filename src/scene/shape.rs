@@ -109,8 +109,9 @@ fn axes_about(axis: DVec3) -> DMat3 {
     if axis.y < 0.0 && across.length() < 1e-12 {
         return DMat3::from_cols(DVec3::X, DVec3::NEG_Y, DVec3::NEG_Z);
     }
-    // Rodrigues: v + a x v + a x (a x v) / (1 + cosine).
-    let turned = |v: DVec3| v + across.cross(v) + across.cross(across.cross(v)) / (1.0 + axis.y);
+    // Rodrigues: v + a x v + a x (a x v) / (1 + cosine), where 1 + cosine does not cancel.
+    let share = if axis.y < 0.0 { (1.0 - axis.y) / across.length_squared() } else { 1.0 / (1.0 + axis.y) };
+    let turned = |v: DVec3| v + across.cross(v) + across.cross(across.cross(v)) * share;
     let (x, z) = (turned(DVec3::X), turned(DVec3::Z));
     DMat3::from_cols(x.normalize(), axis, z.normalize())
 }
@@ -272,7 +273,8 @@ mod tests {
             Attributes { normals: Some(vec![[tilted, DVec3::ZERO, -tilted]]), ..Attributes::default() };
         assert_eq!(settle_normals(&mesh, &mut attributes), Replaced { without_length: 1, behind: 1 });
         let unit = DVec3::new(0.0, 0.6, 0.8);
-        assert_eq!(attributes.normals, Some(vec![[unit, DVec3::Z, unit]]));
+        let [settled] = attributes.normals.as_deref().unwrap() else { panic!("one triangle") };
+        assert!(settled.iter().zip([unit, DVec3::Z, unit]).all(|(a, b)| a.distance(b) < 1e-15), "{settled:?}");
         // Those of the triangle itself, as written with a few digits, are none.
         attributes.normals = Some(vec![[DVec3::new(1e-5, 0.0, 1.0), DVec3::Z, 7.0 * DVec3::Z]]);
         assert_eq!(settle_normals(&mesh, &mut attributes), Replaced::default());
