@@ -74,6 +74,22 @@ need_device() {
   has_device || stop 3 "still no adapter that Spectile can use; \`$spectile devices\` says why"
 }
 
+# A real Slurm for the tests of array jobs, which bring up clusters of their own and end them; nothing is left running. Where
+# there are no Debian packages the tests say that they are skipped.
+need_slurm() {
+  local program
+  for program in munged slurmctld slurmd sbatch srun; do
+    PATH=$PATH:/usr/sbin:/sbin command -v "$program" >/dev/null && continue
+    if ! command -v apt-get >/dev/null; then
+      say "no Slurm here, and no apt-get to install it: tests of array jobs will say that they are skipped"
+      return
+    fi
+    install "Slurm" slurmctld slurmd slurm-client slurm-wlm-basic-plugins munge
+    break
+  done
+  export SPECTILE_SLURM=required
+}
+
 # The readers that cubes are tested with, in .venv; sets SPECTILE_PYTHON for the tests.
 need_python() {
   local wanted=$root/tests/python/requirements.txt venv=$root/.venv

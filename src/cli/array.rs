@@ -99,8 +99,8 @@ pub fn task(args: &Args, output: &Output) -> Result<()> {
     };
     let runs = Cube::open(&args.cube).and_then(|cube| cube.runs()).unwrap_or_default();
     let here =
-        |run: &&Run| run.process == std::process::id() && run.slurm.as_ref() == Some(&slurm) && run.started_s >= began;
-    let recorded = runs.iter().find(here).is_some();
+        |run: &Run| run.process == std::process::id() && run.slurm.as_ref() == Some(&slurm) && run.started_s >= began;
+    let recorded = runs.iter().any(here);
     let error = match error {
         Error::Interrupted { signal: signal_hook::consts::SIGTERM } => {
             match requeue(&job, &slurm, runs.iter(), recorded) {
@@ -137,7 +137,7 @@ fn requeue<'r>(
             job.samples.min(64)
         )));
     }
-    if client::requeue(slurm.job)? {
+    if client::requeue(&slurm.name())? {
         say("requeued: what is merged stays, and the next run goes on from there");
     }
     Ok(())

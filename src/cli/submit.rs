@@ -320,7 +320,11 @@ pub fn submit_array(job: &mut Job, cube: &Path, tasks: &str, except: &[String]) 
 /// What a node said, as an error of its own kind here.
 fn as_on_node(code: i32, cube: &Path, what: String) -> Error {
     match code {
-        5 => Error::storage(cube, format!("a node of the cluster says: {what}")),
+        5 => {
+            // The cube's path stands before it anyway.
+            let what = what.strip_prefix(&format!("{}: ", cube.display())).unwrap_or(&what);
+            Error::storage(cube, format!("a node of the cluster says: {what}"))
+        }
         _ => Error::Usage(format!("a node of the cluster says: {what}")),
     }
 }

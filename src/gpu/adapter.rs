@@ -163,6 +163,11 @@ impl Selection {
     /// Positions in `listed`, of GPUs only those `given`. Errors: no usable adapter, or a position that is not there, not
     /// usable or not given.
     fn choose(&self, listed: &[AdapterFacts], given: &Given) -> Result<Vec<usize>> {
+        // Where Slurm does not say which GPUs it gave, whoever names them knows.
+        let given = match (self, given) {
+            (Selection::List(_), Given::Count(_)) => &Given::Everything,
+            (_, given) => given,
+        };
         let all = usable_once(listed, given)?;
         match self {
             Selection::List(positions) => {

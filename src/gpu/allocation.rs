@@ -22,6 +22,8 @@ pub(super) enum Given {
     Addresses(Vec<String>),
     /// GPUs by their places in the order of PCI addresses, where no driver says more. Perhaps none.
     Places(Vec<usize>),
+    /// So many, without a word on which: the cluster counts its GPUs and does not know their device files.
+    Count(usize),
 }
 
 /// A GPU in /proc.
@@ -98,6 +100,10 @@ fn of(variable: &dyn Fn(&str) -> Option<String>, nvidia: &[Described]) -> Result
     let own = list(&["SLURM_STEP_GPUS", "SLURM_JOB_GPUS"]);
     let (numbers, are_files) = if own.is_empty() { (visible, false) } else { (own, true) };
     let numbers = expand(&numbers).map_err(|word| refused(&word))?;
+    if numbers.is_empty() {
+        let count = variable("SLURM_GPUS_ON_NODE").and_then(|text| text.trim().parse::<usize>().ok());
+        return Ok(count.filter(|&n| n > 0).map_or(Given::Places(Vec::new()), Given::Count));
+    }
     if nvidia.is_empty() {
         return Ok(Given::Places(numbers));
     }
@@ -107,10 +113,7 @@ fn of(variable: &dyn Fn(&str) -> Option<String>, nvidia: &[Described]) -> Result
         let gpu = if are_files { nvidia.iter().find(|gpu| gpu.minor == number) } else { in_order.get(number).copied() };
         gpu.map(|gpu| gpu.address.clone()).ok_or_else(|| refused(&number.to_string()))
     };
-    match numbers.is_empty() {
-        true => Ok(Given::Places(Vec::new())),
-        false => numbers.iter().map(address).collect::<Result<_>>().map(Given::Addresses),
-    }
+    numbers.iter().map(address).collect::<Result<_>>().map(Given::Addresses)
 }
 
 /// Numbers and ranges such as `2-4`.
@@ -138,6 +141,13 @@ impl Given {
         match self {
             Given::Everything => Ok(gpus.to_vec()),
             Given::Places(places) if places.is_empty() => Ok(Vec::new()),
+            Given::Count(count) if gpus.is_empty() => Err(missing(&format!("{count} GPUs"))),
+            Given::Count(count) if gpus.len() > *count => Err(Error::NoDevice(format!(
+                "Slurm gave this job {count} of {} GPUs here, but does not say which (gres.conf names no device files); ask for \
+                 all of a node, or choose with --devices",
+                gpus.len()
+            ))),
+            Given::Count(_) => Ok(gpus.to_vec()),
             // Where other GPUs are hidden from the job, those that it sees are its own.
             Given::Places(places) if gpus.len() == places.len() => Ok(gpus.to_vec()),
             Given::Addresses(addresses)
@@ -169,6 +179,7 @@ impl Given {
             Given::Everything => 0,
             Given::Addresses(addresses) => addresses.len(),
             Given::Places(places) => places.len(),
+            Given::Count(count) => *count,
         }
     }
 }
@@ -210,6 +221,8 @@ mod tests {
             (&[("CUDA_VISIBLE_DEVICES", "1")][..], Given::Everything),
             (&[job], Given::Places(vec![])),
             (&[job, ("CUDA_VISIBLE_DEVICES", "NoDevFiles")], Given::Places(vec![])),
+            (&[job, ("SLURM_GPUS_ON_NODE", "0")], Given::Places(vec![])),
+            (&[job, ("SLURM_GPUS_ON_NODE", "2")], Given::Count(2)),
             // Slurm counts device files, CUDA goes by addresses; in a constrained job it begins at 0 again.
             (&[job, ("SLURM_JOB_GPUS", "0,3"), ("CUDA_VISIBLE_DEVICES", "0,1")], addresses(&["c1", "41"])),
             (&[job, ("SLURM_JOB_GPUS", "0-2"), ("SLURM_STEP_GPUS", "2")], addresses(&["81"])),
@@ -238,6 +251,9 @@ mod tests {
         assert_eq!(among(&Given::Places(vec![])).expect("none"), [0usize; 0]);
         assert_eq!(among(&addresses(&["81", "07"])).expect("two"), [2, 1]);
         assert_eq!(among(&Given::Places(vec![0, 2])).expect("two"), [1, 0]);
+        assert_eq!(among(&Given::Count(3)).expect("all"), [0, 1, 2]);
+        assert!(among(&Given::Count(2)).expect_err("which?").to_string().contains("2 of 3 GPUs here"));
+        assert!(Given::Count(2).among(&listed, &[]).expect_err("none").to_string().contains("no such GPU here"));
         // What one sees is what one was given, whatever it is called outside.
         let nameless = vec![AdapterFacts::default(); 2];
         assert_eq!(addresses(&["01", "02"]).among(&nameless, &[0, 1]).expect("both"), [0, 1]);

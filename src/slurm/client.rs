@@ -99,9 +99,9 @@ pub fn states(jobs: &[u64]) -> Option<Vec<(String, usize)>> {
     Some(found)
 }
 
-/// Puts this running task back into the queue. False where it is not running by Slurm's account: it was cancelled, or Slurm
+/// Puts this running task, `ARRAY_TASK`, back into the queue: the number alone of one of the tasks is that of the whole array. False where it is not running by Slurm's account: it was cancelled, or Slurm
 /// requeues it by itself. Slurm's controller may be away for a moment.
-pub fn requeue(job: u64) -> Result<bool> {
+pub fn requeue(task: &str) -> Result<bool> {
     const ATTEMPTS: u32 = 10;
     const PAUSE: Duration = Duration::from_secs(3);
     let mut last = String::new();
@@ -109,8 +109,7 @@ pub fn requeue(job: u64) -> Result<bool> {
         if attempt > 0 {
             thread::sleep(PAUSE);
         }
-        let id = job.to_string();
-        let state = run(Command::new("squeue").args(["--noheader", "--format=%T", "--jobs", &id]))?;
+        let state = run(Command::new("squeue").args(["--noheader", "--format=%T", "--jobs", task]))?;
         if !state.success {
             last = complaint(&state.stderr);
             continue;
@@ -118,13 +117,13 @@ pub fn requeue(job: u64) -> Result<bool> {
         if state.stdout.trim() != "RUNNING" {
             return Ok(false);
         }
-        let said = run(Command::new("scontrol").args(["requeue", &id]))?;
+        let said = run(Command::new("scontrol").args(["requeue", task]))?;
         if said.success {
             return Ok(true);
         }
         last = complaint(&said.stderr);
     }
-    Err(Error::Usage(format!("job {job} cannot be requeued: {last}")))
+    Err(Error::Usage(format!("job {task} cannot be requeued: {last}")))
 }
 
 /// What running a command on one node, at once, told.
