@@ -79,6 +79,14 @@ impl Stream {
             let snapshot = self.feed.wait(revision, if ending { Duration::ZERO } else { AGAIN_AFTER });
             let sent = match &mut connection {
                 Some(connection) => self.update(connection, &snapshot),
+                // Before there is a cube there is nothing to show.
+                None if grid(&snapshot).is_none() => {
+                    if ending {
+                        return;
+                    }
+                    revision = snapshot.revision;
+                    continue;
+                }
                 None => {
                     let stream = connected.take().map_or_else(|| connect(&self.address), Ok);
                     stream.and_then(|stream| {

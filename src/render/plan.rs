@@ -128,6 +128,11 @@ pub fn feature_lines(prepared: &Prepared, waves: &WavePlan) -> Vec<FeatureLine> 
             format!("{}, two records a bounce", module(s::MAP)),
         ),
         line(
+            "heat that depends on the angle",
+            f.general.is_some_and(|g| g.hot),
+            "256 spectra for each hot material that is not diffuse".into(),
+        ),
+        line(
             "media",
             f.general.is_some_and(|g| g.media.is_some()),
             format!("{}, 16 bytes a path, a record for each stretch of a way", module(s::MEDIUM)),

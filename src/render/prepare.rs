@@ -2,7 +2,8 @@
 
 use crate::accel::{Accel, MAX_MATERIALS};
 use crate::gpu::layout::{
-    EMITS_BOTH_SIDES, EMITTER_IS_LAMP, Emitter, Frame, LAMP_DIRECTIONAL, LAMP_POINT, LAMP_SUN, Lamp, Material, NONE,
+    EMITS_BOTH_SIDES, EMITS_BY_ANGLE, EMITTER_IS_LAMP, Emitter, Frame, LAMP_DIRECTIONAL, LAMP_POINT, LAMP_SUN, Lamp,
+    Material, NONE,
 };
 use crate::gpu::self_test::LOOP_LIMIT;
 use crate::gpu::shader::{self, Defines, Module};
@@ -76,6 +77,8 @@ pub struct General {
     /// Lights without a surface, and how many of them are suns.
     pub lamps: bool,
     pub suns: u32,
+    /// Surfaces that emit by angle.
+    pub hot: bool,
     pub map: Option<Map>,
     pub media: Option<MediaShape>,
 }
@@ -169,7 +172,8 @@ impl Prepared {
 
     /// `scene` in the channels that the device renders.
     fn flatten(scene: &Scene, seed: u64, integration: Option<Integration>) -> Result<Prepared> {
-        let scene = &*heat::as_emission(scene)?;
+        let heat = heat::as_emission(scene)?;
+        let scene = &*heat.scene;
         let accel = Accel::build(scene);
         if scene.materials.len() > MAX_MATERIALS {
             return Err(Error::input(&scene.file, format!("more than {MAX_MATERIALS} materials")));
@@ -181,7 +185,8 @@ impl Prepared {
             || !scene.textures.is_empty()
             || !scene.lights.is_empty()
             || sky.is_some()
-            || !scene.media.is_empty();
+            || !scene.media.is_empty()
+            || !heat.by_angle.is_empty();
         let mut media = Media::new(scene, &accel)?;
         let mut surfaces = general.then(|| Surfaces::new(scene));
         let axis = surfaces.as_mut().zip(sky.as_ref()).map(|(surfaces, sky)| {
@@ -197,7 +202,7 @@ impl Prepared {
             surfaces.spectra.append(&mut media.spectra);
         }
         let weights = integration.as_ref().map(|integration| integration.weights.as_slice());
-        let (tables, ids) = spectral_tables(scene, surfaces.as_ref().map_or(&[], |s| &s.spectra), weights)?;
+        let (tables, ids) = spectral_tables(scene, &heat, surfaces.as_ref().map_or(&[], |s| &s.spectra), weights)?;
         if let Some(surfaces) = &mut surfaces {
             surfaces.name_spectra(|position| tables.ids[ids.needed[position]]);
         }
@@ -223,6 +228,10 @@ impl Prepared {
             source: scene.environment.as_ref().and_then(daylight).map_or(0, source),
         });
         let (lamps, lamp_emitters) = lamps(scene, &accel, &picks, source);
+        // Behind all that can be chosen: the spectra of what emits by angle.
+        let first_row = accel.emitters.len() + lamp_emitters.len();
+        let rows = heat.by_angle.iter().flatten().flatten();
+        let rows = rows.map(|&spectrum| Emitter { primitive: source(spectrum), ..Emitter::default() });
         let emitters = accel
             .emitters
             .iter()
@@ -230,14 +239,20 @@ impl Prepared {
             .map(|(&(primitive, object, area), &pick)| {
                 let emission = scene.objects[object].emission.as_ref().expect("emitters come from emitting objects");
                 let sides = if emission.sides == Sides::Both { EMITS_BOTH_SIDES } else { 0 };
-                Emitter { primitive, spectrum: source(emission.radiance) | sides, pick: pick as f32, area: area as f32 }
+                let spectrum = match heat.groups[object] {
+                    None => source(emission.radiance),
+                    Some(group) => (first_row + 2 * group * heat::COSINES) as u32 | EMITS_BY_ANGLE,
+                };
+                Emitter { primitive, spectrum: spectrum | sides, pick: pick as f32, area: area as f32 }
             })
             .chain(lamp_emitters)
+            .chain(rows)
             .collect();
         let environment_spectrum = scene.environment.as_ref().and_then(|e| e.uniform()).map_or(0, source);
         let mut features = features(scene, &accel, &tables, ids.factors.len() + ids.sources.len());
         let suns = scene.lights.iter().filter(|light| matches!(light, Light::Sun { .. })).count() as u32;
         let of = |surfaces: &Surfaces| General {
+            hot: !heat.by_angle.is_empty(),
             lamps: !lamps.is_empty(),
             suns,
             map,
@@ -405,6 +420,9 @@ impl Prepared {
         let rough_glass = has(&[Kind::RoughBoundary]);
         d.set("GENERAL", true).set("ANISOTROPIC", general.anisotropic).set("DISPERSION", general.dispersion);
         d.constant("STATE_WORDS", self.state_bytes() / 16);
+        if general.hot {
+            d.set("HOT", true).constant("HOT_COSINES", heat::COSINES as u32);
+        }
         for (name, kinds) in [
             ("MIRRORS", &[Kind::Conductor, Kind::Mirror, Kind::Refraction][..]),
             ("MICROFACETS", &[Kind::RoughConductor, Kind::RoughCoat, Kind::RoughBoundary]),
@@ -613,6 +631,7 @@ fn daylight(environment: &Environment) -> Option<usize> {
 /// Tables of the constant 1, of what multiplies throughput, then of what emits; the weights of responses, per channel, last.
 fn spectral_tables(
     scene: &Scene,
+    heat: &heat::Heat,
     needed: &[Needed],
     weights: Option<&[Curve]>,
 ) -> Result<(SpectralTables, SpectrumIds)> {
@@ -625,6 +644,7 @@ fn spectral_tables(
     let sources = scene.objects.iter().filter_map(|o| o.emission.as_ref().map(|e| e.radiance));
     let sources = sources.chain(scene.environment.as_ref().and_then(|e| e.uniform().or(daylight(e))));
     let sources = sources.chain(scene.lights.iter().map(|light| light.spectrum()));
+    let sources = sources.chain(heat.by_angle.iter().flatten().flatten().copied());
     let mut curves = vec![&Curve::Constant(1.0)];
     let mut names = vec!["1".to_owned()];
     let mut number = |list: std::collections::BTreeSet<usize>| -> std::collections::BTreeMap<usize, usize> {

@@ -33,7 +33,8 @@ fn drive(what: &str, url: &str, [x, y]: [u32; 2]) -> Option<Value> {
     let seen: Value = serde_json::from_slice(&output.stdout).expect("JSON");
     assert_eq!(seen["complaints"], serde_json::json!([]), "the browser complains");
     assert_eq!(seen["elsewhere"], serde_json::json!([]), "something is asked of others");
-    assert!(seen["start"]["colours"].as_u64() > Some(50), "there is a picture: {}", seen["start"]);
+    // An empty canvas has a handful.
+    assert!(seen["start"]["colours"].as_u64() > Some(20), "there is a picture: {}", seen["start"]);
     Some(seen)
 }
 
