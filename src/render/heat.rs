@@ -24,6 +24,9 @@ pub struct Heat<'a> {
     pub groups: Vec<Option<usize>>,
 }
 
+/// What decides an object's emission: its material, and the spectrum of its lamp and whether that is on both sides.
+type Source = (MaterialId, Option<(SpectrumId, bool)>);
+
 /// A hot part of a surface.
 struct Leaf<'a> {
     weight: f64,
@@ -100,7 +103,7 @@ pub fn as_emission(scene: &Scene) -> Result<Heat<'_>> {
         return Ok(heat);
     }
     let mut lit = scene.clone();
-    let mut made: Vec<((MaterialId, Option<(SpectrumId, bool)>), (SpectrumId, Option<usize>))> = Vec::new();
+    let mut made: Vec<(Source, (SpectrumId, Option<usize>))> = Vec::new();
     for (index, object) in scene.objects.iter().enumerate() {
         let Some(material) = object.material else { continue };
         let emitted = object.emission.as_ref().map(|e| (e.radiance, e.sides == Sides::Both));
