@@ -112,6 +112,7 @@ fn render(scene: &Scene, samples: u32, seed: u64, output: &Path) -> Result<(Cube
         tiles: None,
         seed,
         tile: None,
+        uncertainty: false,
         stop: StopRule { samples: Some(samples), time: None },
         preview: None,
         profile: false,

@@ -101,7 +101,7 @@ need_python() {
   if ! cmp -s "$wanted" "$venv/requirements.txt"; then
     # Debian's python3 comes without what venv needs.
     python3 -c 'import ensurepip' 2>/dev/null || install "Python's venv" python3-venv
-    say "installing xarray and zarr into .venv"
+    say "installing readers of cubes and exports (xarray, rasterio, OpenEXR, …) into .venv"
     python3 -m venv --clear "$venv"
     "$venv/bin/pip" install --quiet --disable-pip-version-check -r "$wanted"
     cp "$wanted" "$venv/requirements.txt"

@@ -180,7 +180,12 @@ fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
 #endif
 
 #repeat VECTORS v
+#if RESPONSES
+        // What the channel's response makes of this wavelength, before anything else.
+        var throughput_$v = spectrum_value(RESPONSE, quad_$v, s);
+#else
         var throughput_$v = vec4<f32>(1.0);
+#endif
         var radiance_$v = vec4<f32>(0.0);
 #if GENERAL
         var product_$v = vec4<f32>(0.0);

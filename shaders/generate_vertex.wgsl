@@ -16,6 +16,33 @@
 @group(1) @binding(12) var<storage, read_write> queue: array<u32>;
 @group(1) @binding(13) var<storage, read_write> queue_lengths: array<atomic<u32>>;
 
+#if HOT
+const EMITS_BY_ANGLE: u32 = 0x20000000u;
+
+// A random number beside those of the bounce.
+fn hot_numbers(path: u32) -> vec2<f32> {
+    let slot = wave.pixel_begin + path / wave.samples;
+    let index = wave.sample_begin + path % wave.samples;
+    let in_tile = slot % wave.tile_pixels;
+    let pixel = units[slot / wave.tile_pixels].xy + vec2<u32>(in_tile % wave.tile_width, in_tile / wave.tile_width);
+    let key = pixel_key(frame.seed_low, frame.seed_high, pixel.x, pixel.y, wave.epoch) ^ 0x85ebca6bu;
+    return random_pair(key, DIMENSION_BOUNCE + step.bounce * DIMENSIONS_PER_VERTEX, index, wave.epoch_mask);
+}
+
+// What an emitter sends out at a cosine: where that depends on the angle, one of the two spectra nearest to it, by chance,
+// so that the mean is linear between them.
+fn emitted_spectrum(emitter: Emitter, front: bool, cosine: f32, u: f32) -> u32 {
+    if ((emitter.spectrum & EMITS_BY_ANGLE) == 0u) {
+        return emitter.spectrum & SPECTRUM_MASK;
+    }
+    let x = pow(clamp(cosine, 1.0e-9, 1.0), 1.0 / 3.0) * f32(HOT_COSINES - 1u);
+    let node = min(u32(x), HOT_COSINES - 2u);
+    let nearer = select(0u, 1u, u < x - f32(node));
+    let row = (emitter.spectrum & 0x1fffffffu) + select(HOT_COSINES, 0u, front);
+    return emitters[row + node + nearer].primitive;
+}
+#endif
+
 const DIMENSION_LOBE: u32 = 3u;
 const DIMENSIONS_PER_VERTEX: u32 = 4u;
 
@@ -162,7 +189,12 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
             }
             let begin = list.count;
             append(&list, OP_ONE | MODE_SINGLE, 0u, scale * weight, 0.0);
+#if HOT
+            let cosine = abs(dot(surface.normal, ray.direction));
+            gather(&list, begin, emitted_spectrum(emitters[surface.emitter], from_front, cosine, hot_numbers(path).x));
+#else
             gather(&list, begin, spectrum & SPECTRUM_MASK);
+#endif
         }
     }
 #endif
@@ -405,6 +437,10 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
                 light_pdf = point.density;
                 let facing = select(point.normal, -point.normal, dot(point.normal, towards) > 0.0);
                 end = offset_origin(point.position, facing);
+#if HOT
+                let along = dot(point.normal, towards) / max(length(towards), 1.0e-30);
+                source = emitted_spectrum(emitter, along < 0.0, abs(along), hot_numbers(path).y);
+#endif
             }
 #endif
         }

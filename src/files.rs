@@ -42,6 +42,96 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
     })
 }
 
+/// A file that is written piece by piece under a hidden name beside its own, and takes its place in one step when it is
+/// whole. One that never is, is removed.
+pub struct Replacement {
+    target: PathBuf,
+    aside: PathBuf,
+    file: fs::File,
+    finished: bool,
+}
+
+impl Replacement {
+    pub fn create(target: &Path) -> Result<Replacement> {
+        check_target(target)?;
+        let aside = sibling(target, "part");
+        let failed = |error| Error::storage(target, format!("cannot be written: {error}"));
+        let file = fs::File::create_new(&aside).map_err(failed)?;
+        Ok(Replacement { target: target.to_owned(), aside, file, finished: false })
+    }
+
+    pub fn file(&mut self) -> &mut fs::File {
+        &mut self.file
+    }
+
+    /// The error of a write that failed.
+    pub fn failed(&self, error: impl std::fmt::Display) -> Error {
+        Error::storage(&self.target, format!("cannot be written: {error}"))
+    }
+
+    /// Replaces what was there.
+    pub fn finish(mut self) -> Result<()> {
+        fs::rename(&self.aside, &self.target).map_err(|error| self.failed(error))?;
+        self.finished = true;
+        Ok(())
+    }
+}
+
+impl Drop for Replacement {
+    fn drop(&mut self) {
+        if !self.finished {
+            // Writing has failed already; that error is the one to report.
+            let _ = fs::remove_file(&self.aside);
+        }
+    }
+}
+
+/// A folder that is filled under a hidden name beside its own, and takes its place in one step. One that never does is
+/// removed.
+pub struct NewFolder {
+    target: PathBuf,
+    aside: PathBuf,
+    finished: bool,
+}
+
+impl NewFolder {
+    /// Refuses where there is something already.
+    pub fn create(target: &Path) -> Result<NewFolder> {
+        if target.symlink_metadata().is_ok() {
+            return Err(Error::Usage(format!(
+                "{} exists already; remove it, or choose another name",
+                target.display()
+            )));
+        }
+        let aside = sibling(target, "part");
+        let failed = |error| Error::storage(target, format!("cannot be written: {error}"));
+        fs::create_dir(&aside).map_err(failed)?;
+        Ok(NewFolder { target: target.to_owned(), aside, finished: false })
+    }
+
+    /// Where it is filled.
+    pub fn path(&self) -> &Path {
+        &self.aside
+    }
+
+    /// Gives it its name.
+    pub fn finish(mut self) -> Result<()> {
+        let renamed = fs::rename(&self.aside, &self.target);
+        renamed.map_err(|error| Error::storage(&self.target, format!("cannot be written: {error}")))?;
+        self.finished = true;
+        Ok(())
+    }
+}
+
+impl Drop for NewFolder {
+    fn drop(&mut self) {
+        if !self.finished {
+            // Writing has failed already; that error is the one to report.
+            let _ = fs::remove_dir_all(&self.aside);
+        }
+    }
+}
+
 /// Waits until the names in a folder are on disk.
 pub fn sync_folder(folder: &Path) -> std::io::Result<()> {
     // Other systems open no folders, and keep names by themselves.
@@ -96,6 +186,17 @@ pub fn free_bytes(folder: &Path) -> Option<u64> {
     {
         let _ = folder;
         None
+    }
+}
+
+/// Bytes of a file, or of all files under a folder; what cannot be read counts nothing.
+pub fn bytes_of(path: &Path) -> u64 {
+    match fs::symlink_metadata(path) {
+        Ok(found) if found.is_dir() => {
+            fs::read_dir(path).into_iter().flatten().flatten().map(|entry| bytes_of(&entry.path())).sum()
+        }
+        Ok(found) => found.len(),
+        Err(_) => 0,
     }
 }
 

@@ -7,6 +7,7 @@ pub mod accel;
 pub mod cli;
 pub mod cube;
 pub mod error;
+pub mod export;
 pub mod files;
 pub mod format;
 pub mod gpu;

@@ -16,7 +16,7 @@ use spectile::reference;
 use spectile::render::prepare::{Features, Prepared};
 use spectile::render::rng::hash;
 use spectile::scene::{Filter, Mesh, Projection, Sampler, Scene, Shape, Sides};
-use spectile::spectral::{Channels, Curve, Outside};
+use spectile::spectral::{Channels, Curve, Outside, Response};
 use statistics::*;
 
 /// The origin offset of a few scattering events in rooms a few times larger than what stands in them, and the tables'
@@ -343,4 +343,34 @@ fn small_biases() {
         .build();
     scene.integrator.sampler = Sampler::Sobol;
     compare("small biases", &scene, &Effort { epochs: 256, reference: 65_536, pixel: 0.01, image: 0.0004 });
+}
+
+/// Responses that overlap, one that is narrow and one far away, over spectra with a step and a line; the reference draws
+/// wavelengths over each whole support.
+#[test]
+fn responses() {
+    let response = |nm: &[f64], value: &[f64]| Response::new(nm.to_vec(), value.to_vec()).expect("a response");
+    let named = [
+        ("wide", response(&[420.0, 500.0, 600.0, 680.0], &[0.0, 1.0, 0.2, 0.9])),
+        ("narrow", response(&[590.0, 600.0, 610.0], &[0.0, 1.0, 0.0])),
+        ("other", response(&[560.0, 640.0, 720.0], &[0.0, 2.0, 0.0])),
+        ("thermal", response(&[8000.0, 9000.0, 12_000.0], &[0.5, 1.0, 0.0])),
+    ];
+    let named = named.into_iter().map(|(name, response)| (name.to_owned(), response)).collect();
+    let table =
+        |nm: &[f64], value: &[f64]| Curve::Linear { nm: nm.to_vec(), value: value.to_vec(), outside: Outside::Hold };
+    let lamp = table(&[500.0, 550.0, 550.0, 595.0, 600.0, 605.0, 9000.0], &[1.0, 2.0, 4.0, 1.0, 9.0, 1.0, 3.0]);
+    let scene = Builder::new()
+        .camera(look(DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO, DVec3::Y, narrow()))
+        .film(8, 8, Filter::Box)
+        .channels(Channels::from_responses(named, None))
+        .bounces(3)
+        .diffuse(
+            quad(DVec3::new(-2.0, -2.0, 0.0), DVec3::X * 4.0, DVec3::Y * 4.0),
+            table(&[400.0, 600.0, 700.0, 10_000.0], &[0.2, 0.8, 0.5, 0.9]),
+        )
+        .lamp(quad(DVec3::new(-0.5, 1.0, 0.5), DVec3::X, DVec3::Z), lamp, Sides::Both)
+        .sky(0.1)
+        .build();
+    compare("responses", &scene, &USUAL);
 }

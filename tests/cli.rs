@@ -65,7 +65,7 @@ fn help_teaches_and_version_is_printed() {
     for word in ["render", "Exit codes", "W m-2 sr-1 nm-1", "spectile export cube.zarr"] {
         assert!(top.contains(word), "{word}");
     }
-    for name in ["render", "plan", "devices", "info", "spectrum", "compare", "export"] {
+    for name in ["render", "plan", "devices", "info", "spectrum", "compare", "export", "sensor"] {
         let (long, short) = (success(folder.path(), &[name, "--help"]), success(folder.path(), &[name, "-h"]));
         assert!(long.len() > short.len(), "{name}: --help says more than -h");
         assert!(long.contains("Usage: spectile"), "{name}");
@@ -89,8 +89,7 @@ fn mistaken_arguments_are_exit_code_2() {
         (vec!["compare", "a", "b", "--tolerance", "-1"], "tolerance"),
         (vec!["export", "a.zarr", "-o", "a.png", "--exposure", "bright"], "EV"),
         (vec!["export", "a.zarr", "-o", "a.jpg"], "names no format"),
-        (vec!["export", "a.zarr", "-o", "a.exr"], "export to exr is not supported yet"),
-        (vec!["export", "a.zarr", "-o", "a.png", "--format", "envi"], "export to envi is not supported yet"),
+        (vec!["export", "a.zarr", "-o", "a.exr", "--bands", "many"], "550nm"),
     ] {
         let (code, stderr) = failure(folder.path(), &arguments);
         assert_eq!(code, 2, "{arguments:?}");

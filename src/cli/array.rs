@@ -155,6 +155,7 @@ fn render(cube: &Path, job: &Job, number: u32, interrupt: &std::sync::Arc<Interr
         tiles: Some(tiles),
         seed: job.seed,
         tile: job.tile,
+        uncertainty: false,
         stop: StopRule { samples: Some(job.samples), time: None },
         preview: None,
         profile: false,
@@ -344,7 +345,7 @@ mod tests {
         assert_eq!(except(&[good.clone(), hole.clone(), hole.clone()]), Some(vec!["b".into()]));
         assert_eq!(except(&[good.clone(), run("b", RunState::Failed, 3)]), Some(vec![]));
         assert_eq!(except(&[run("a", RunState::Running, 0)]), Some(vec![]), "killed");
-        assert_eq!(except(&[hole.clone()]), None);
+        assert_eq!(except(std::slice::from_ref(&hole)), None);
         let before = Run { slurm: None, ..good };
         assert_eq!(except(&[before, hole]), None, "what another array did says nothing of this one");
     }

@@ -6,20 +6,38 @@ use clap::ValueEnum;
 use serde_json::json;
 
 use super::Output;
-use crate::cube::Cube;
+use super::bands::Bands;
+use crate::cube::{Cube, Quantity, Rect, View};
+use crate::export;
+use crate::format::envi::Interleave;
 use crate::format::png;
-use crate::{Error, Result};
+use crate::render::worker::check_interrupt;
+use crate::spectral::colour::{Observer, Projection, map_srgb8, percentiles};
+use crate::{Error, Result, files};
 
 /// Write a cube, or a picture of it, in another format
 ///
+/// envi: raw numbers and a header with wavelengths, widths, units and names (ENVI, QGIS, GDAL, Spectral Python).
+/// exr: spectral OpenEXR, a channel a band, and R, G, B for viewers that know nothing of spectra.
+/// zarr: a compressed Zarr v3 store with coordinates (xarray); smaller than the cube, and good to read band by band.
+/// csv: a line a pixel, a column a band.
 /// png: the preview of the cube as an 8-bit sRGB picture. It shows the colours an eye would see where the channels cover
-/// the visible (CIE 1931), else three channels as red, green and blue (channels.false_colour in the scene). Brighter than
-/// white and colours outside the gamut of sRGB are cut; what is not rendered yet is black.
+/// the visible (CIE 1931), else three channels as red, green and blue (channels.false_colour in the scene). Other colours:
+/// --bands, --observer, --temperature, --colour-map. Brighter than white and colours outside the gamut of sRGB are cut; what
+/// is not rendered yet is black.
+///
+/// The numbers are those of the cube, to the last bit; memory stays small whatever the cube's size. What is not rendered
+/// yet is NaN (-9999 in ENVI, which the header says; empty in CSV).
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = "\
 Examples:
-  spectile export cube.zarr -o picture.png
-  spectile export cube.zarr -o picture.png --exposure 1.5")]
+  spectile export cube.zarr -o picture.png --exposure 1.5
+  spectile export cube.zarr -o near.png --bands 860nm,650nm,550nm       false colours
+  spectile export cube.zarr -o heat.png --bands 8um..14um --temperature brightness temperature
+  spectile export cube.zarr -o cube.img                                 ENVI, and cube.hdr
+  spectile export cube.zarr -o thermal.exr --bands 8um..14um
+  spectile export cube.zarr -o part.zarr --crop 100,100,356,356 --bands 0..50,120
+  spectile export cube.zarr -o blocks --format envi --blocks 1024       a folder of files, and index.json")]
 pub struct Args {
     /// The cube, a folder
     pub cube: PathBuf,
@@ -32,12 +50,89 @@ pub struct Args {
     #[arg(long, value_enum)]
     pub format: Option<Format>,
 
+    /// Only these bands: numbers from 0, half-open ranges, or wavelengths, with commas between
+    ///
+    /// 3 and 0..10 are channels by number, 550nm is the one that holds that wavelength, 8um..14um are all with their
+    /// centres in that range. They are written in this order. For a PNG: three are shown as red, green and blue, one as
+    /// grey.
+    #[arg(long, value_name = "BANDS", value_parser = Bands::parse)]
+    pub bands: Option<Bands>,
+
+    /// Only the pixels of columns X0 to X1 - 1 and rows Y0 to Y1 - 1 of the cube
+    #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = parse_crop)]
+    pub crop: Option<Rect>,
+
+    /// Brightness temperatures in K: of the black body with the radiance of each channel
+    ///
+    /// For a PNG: of the chosen bands together, in a perceptually uniform colour map.
+    #[arg(long, conflicts_with_all = ["integrated", "xyz", "standard_error"])]
+    pub temperature: bool,
+
+    /// X, Y and Z instead of the bands, for the standard observer of this year
+    ///
+    /// Divided by the integral of ybar: a constant 1 W m-2 sr-1 nm-1 has Y = 1.
+    #[arg(long, value_enum, value_name = "OBSERVER", num_args = 0..=1, default_missing_value = "1931")]
+    #[arg(conflicts_with_all = ["bands", "integrated"])]
+    pub xyz: Option<Observer>,
+
+    /// The standard errors of the values instead of these, from a cube that was rendered with --uncertainty
+    ///
+    /// A Zarr store gets both without asking.
+    #[arg(long, conflicts_with = "xyz")]
+    pub standard_error: bool,
+
+    /// Radiance of the channels in W m-2 sr-1: their means times their widths (or the integrals of their responses)
+    #[arg(long)]
+    pub integrated: bool,
+
+    /// Order of the numbers in an ENVI file
+    #[arg(long, value_enum)]
+    pub interleave: Option<Interleave>,
+
+    /// Split an OpenEXR file by wavelength into several of at most N bands
+    ///
+    /// Many readers refuse files of more than 1024 channels.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub exr_split: Option<u32>,
+
+    /// Write the unit W.m^-2.sr^-1 into an OpenEXR file, as its layout says, although values are per nanometre
+    ///
+    /// By default the unit is W.m^-2.sr^-1.nm^-1, which is true; some readers warn about it.
+    #[arg(long)]
+    pub exr_strict_units: bool,
+
+    /// Write every chunk of a Zarr store to a file of its own
+    ///
+    /// By default several share one (shards), which GDAL before 3.13 cannot read.
+    #[arg(long)]
+    pub zarr_no_shards: bool,
+
+    /// Write blocks of N x N pixels to files of their own in the folder FILE, with an index.json
+    ///
+    /// For cubes too large for one file. --format says which.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), requires = "format")]
+    pub blocks: Option<u32>,
+
     /// Exposure of a picture in EV: every step up is twice as bright
     ///
     /// At 0 a radiance of 1 W m-2 sr-1 nm-1 in all channels is white. Without it the 99th percentile of the lit pixels
     /// is, and the exposure chosen is printed; use that for pictures that are to be compared.
     #[arg(long, value_name = "EV", value_parser = super::parse_exposure, allow_hyphen_values = true)]
     pub exposure: Option<f64>,
+
+    /// Colours as the standard observer of this year sees them, in a picture
+    #[arg(long, value_enum, conflicts_with = "bands")]
+    pub observer: Option<Observer>,
+
+    /// Show the bands of a picture together, in a perceptually uniform colour map
+    #[arg(long)]
+    pub colour_map: bool,
+
+    /// Ends of the colour map: W m-2 sr-1 nm-1, or K with --temperature
+    ///
+    /// Without it they are the 1st and the 99th percentile, and are printed.
+    #[arg(long, value_name = "FROM..TO", value_parser = parse_range, allow_hyphen_values = true)]
+    pub range: Option<[f64; 2]>,
 
     /// One JSON object on stdout, instead of text
     #[arg(long)]
@@ -48,13 +143,13 @@ pub struct Args {
 pub enum Format {
     /// 8-bit sRGB picture (.png)
     Png,
-    /// ENVI image and header (.img, .hdr); not supported yet
+    /// ENVI image and header (.img or .bil, .bip, .bsq, and .hdr)
     Envi,
-    /// Spectral OpenEXR (.exr); not supported yet
+    /// Spectral OpenEXR (.exr)
     Exr,
-    /// Compressed Zarr v3 (.zarr); not supported yet
+    /// Compressed Zarr v3 (.zarr)
     Zarr,
-    /// Table of spectra (.csv); not supported yet
+    /// Table of spectra (.csv)
     Csv,
 }
 
@@ -63,36 +158,253 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         Some(format) => format,
         None => guess(&args.output)?,
     };
-    if format != Format::Png {
-        let name = format.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default();
-        return Err(Error::Usage(format!("export to {name} is not supported yet; this version writes png")));
-    }
+    check_options(args, format)?;
     let cube = Cube::open(&args.cube)?;
-    let picture = cube.preview()?;
+    if format == Format::Png {
+        return write_png(args, &cube, output);
+    }
+    let view = view(args, &cube)?;
+    let format = match format {
+        Format::Envi => export::Format::Envi { interleave: interleave(args)? },
+        Format::Exr => {
+            let split = args.exr_split.map(|n| n as usize);
+            let channels = split.unwrap_or(usize::MAX).min(view.channels().len()) + 3;
+            if channels > export::WIDELY_READ {
+                output.warn(&format!(
+                    "{channels} channels in one OpenEXR file: OpenImageIO and what uses it read {} at most; --exr-split 1000 \
+                     makes several files",
+                    export::WIDELY_READ
+                ))?;
+            }
+            export::Format::Exr { strict_units: args.exr_strict_units, split }
+        }
+        Format::Zarr => export::Format::Zarr { shards: !args.zarr_no_shards },
+        Format::Csv | Format::Png => export::Format::Csv,
+    };
+    let files = write(args, &view, format)?;
+    report(args, &view, format, &files, output)
+}
+
+/// Options that mean nothing for the format are mistakes.
+fn check_options(args: &Args, format: Format) -> Result<()> {
+    let given = [
+        ("--interleave", args.interleave.is_some(), vec![Format::Envi]),
+        ("--exr-split", args.exr_split.is_some(), vec![Format::Exr]),
+        ("--exr-strict-units", args.exr_strict_units, vec![Format::Exr]),
+        ("--zarr-no-shards", args.zarr_no_shards, vec![Format::Zarr]),
+        ("--exposure", args.exposure.is_some(), vec![Format::Png]),
+        ("--observer", args.observer.is_some(), vec![Format::Png]),
+        ("--colour-map", args.colour_map, vec![Format::Png]),
+        ("--range", args.range.is_some(), vec![Format::Png]),
+        ("--xyz", args.xyz.is_some(), vec![Format::Envi, Format::Zarr, Format::Csv]),
+        ("--temperature", args.temperature, vec![Format::Png, Format::Envi, Format::Zarr, Format::Csv]),
+        ("--standard-error", args.standard_error, vec![Format::Envi, Format::Exr, Format::Zarr, Format::Csv]),
+        ("--integrated", args.integrated, vec![Format::Envi, Format::Exr, Format::Zarr, Format::Csv]),
+        ("--blocks", args.blocks.is_some(), vec![Format::Envi, Format::Exr, Format::Zarr, Format::Csv]),
+    ];
+    let name = |format: Format| format.to_possible_value().map(|v| v.get_name().to_owned()).unwrap_or_default();
+    match given.iter().find(|(_, is_given, formats)| *is_given && !formats.contains(&format)) {
+        None => Ok(()),
+        Some((option, _, formats)) => {
+            let formats: Vec<String> = formats.iter().map(|&format| name(format)).collect();
+            Err(Error::Usage(format!("{option} goes with {}, not with {}", formats.join(", "), name(format))))
+        }
+    }
+}
+
+/// The part of the cube that is asked for.
+fn view<'c>(args: &Args, cube: &'c Cube) -> Result<View<'c>> {
+    let mut view = View::whole(cube);
+    if let Some(bands) = &args.bands {
+        let chosen = bands.resolve(cube.channels()).map_err(Error::Usage)?;
+        let mut seen = std::collections::BTreeSet::new();
+        if let Some(twice) = chosen.iter().find(|&&band| !seen.insert(band)) {
+            return Err(Error::Usage(format!("--bands names the band {twice} twice")));
+        }
+        view = view.with_bands(chosen)?;
+    }
+    if let Some(crop) = args.crop {
+        view = view.with_rect(crop)?;
+    }
+    if args.standard_error {
+        view = view.of_errors()?;
+    }
+    view.with_quantity(match (args.xyz, args.temperature, args.integrated) {
+        (Some(observer), ..) => Quantity::Xyz(observer),
+        (_, true, _) => Quantity::Temperature,
+        (.., true) => Quantity::Integrated,
+        _ => Quantity::Radiance,
+    })
+}
+
+/// Of an ENVI file: as asked, or as its extension says.
+fn interleave(args: &Args) -> Result<Interleave> {
+    let extension = args.output.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    let named = [Interleave::Bil, Interleave::Bip, Interleave::Bsq].into_iter().find(|i| i.name() == extension);
+    match (args.interleave, named) {
+        (Some(asked), Some(named)) if asked != named => Err(Error::Usage(format!(
+            "{}: the extension contradicts --interleave {}",
+            args.output.display(),
+            asked.name()
+        ))),
+        (asked, named) => Ok(asked.or(named).unwrap_or(Interleave::Bil)),
+    }
+}
+
+/// Writes the files, with a bar on a terminal; an interrupt leaves nothing behind.
+fn write(args: &Args, view: &View, format: export::Format) -> Result<Vec<PathBuf>> {
+    let interrupt = super::interrupt::watch()?;
+    let bar = super::progress::bar(args.json);
+    let mut progress = |done: u64, all: u64| {
+        if let Some(bar) = &bar {
+            bar.set_length(all);
+            bar.set_position(done);
+        }
+        check_interrupt(&interrupt)
+    };
+    let result = match args.blocks {
+        None => export::write(view, &args.output, format, &mut progress),
+        Some(side) => export::write_blocks(view, &args.output, format, side, &mut progress),
+    };
+    if let Some(bar) = &bar {
+        bar.finish_and_clear();
+    }
+    result
+}
+
+fn report(args: &Args, view: &View, format: export::Format, written: &[PathBuf], output: &Output) -> Result<()> {
+    let progress = view.cube().progress()?;
+    let missing = progress.tiles - progress.tiles_started;
+    let ([width, height], channels) = (view.size(), view.channels().len());
+    let bytes: u64 = written.iter().map(|path| files::bytes_of(path)).sum();
+    output.event(
+        "done",
+        json!({
+            "file": args.output,
+            "format": format.name(),
+            "files": written,
+            "size": [width, height],
+            "bands": channels,
+            "integrated": args.integrated,
+            "bytes": bytes,
+            "tiles_missing": missing,
+        }),
+    )?;
+    let names: Vec<String> = written.iter().map(|path| path.display().to_string()).collect();
+    let bytes = files::format_bytes(bytes);
+    output.text(&format!("{}: {width} x {height} pixels x {channels} bands, {bytes}\n", names.join(", ")))?;
+    if missing > 0 {
+        output.text(&format!("{missing} of {} tiles have no samples yet\n", progress.tiles))?;
+    }
+    Ok(())
+}
+
+fn write_png(args: &Args, cube: &Cube, output: &Output) -> Result<()> {
+    let usage = |what: String| Error::Usage(format!("{}: {what}", args.cube.display()));
+    let mut view = View::whole(cube);
+    if let Some(crop) = args.crop {
+        view = view.with_rect(crop)?;
+    }
+    let bands = args.bands.as_ref().map(|bands| bands.resolve(cube.channels()).map_err(Error::Usage)).transpose()?;
+    let missing = {
+        let progress = cube.progress()?;
+        [progress.tiles - progress.tiles_started, progress.tiles]
+    };
+    if args.temperature || args.colour_map {
+        if let Some(option) = args.observer.map(|_| "--observer").or(args.exposure.map(|_| "--exposure")) {
+            return Err(usage(format!("{option} means nothing in a colour map; --range gives its ends")));
+        }
+        if let Some(bands) = bands {
+            view = view.with_bands(bands)?;
+        }
+        return write_map(args, &view, missing, output);
+    }
+    if args.range.is_some() {
+        return Err(usage("--range goes with --temperature or --colour-map".into()));
+    }
+    let (picture, shows) = match (bands.as_deref(), args.observer) {
+        (None, None) if args.crop.is_none() => (cube.preview()?, super::info::shows(cube)),
+        (None, None) => (export::colours(&view, cube.projection())?, super::info::shows(cube)),
+        (None, Some(observer)) => {
+            let seen = Projection::as_seen(cube.channels(), observer);
+            let seen = seen.ok_or_else(|| usage("its channels do not cover the visible; choose --bands".into()))?;
+            (export::colours(&view, &seen)?, format!("colours as seen ({}, sRGB)", observer.name()))
+        }
+        (Some(bands), _) => {
+            let (rgb, how) = match *bands {
+                [grey] => ([grey; 3], format!("{} in grey", cube.channels().names[grey])),
+                [r, g, b] => {
+                    let name = |k: usize| cube.channels().names[k].as_str();
+                    let how = format!("{} as red, {} as green, {} as blue", name(r), name(g), name(b));
+                    ([r, g, b], format!("false colours: {how}"))
+                }
+                _ => {
+                    let what = format!(
+                        "a picture shows one band or three, but --bands names {}; --colour-map or --temperature shows several \
+                         together",
+                        bands.len()
+                    );
+                    return Err(usage(what));
+                }
+            };
+            (export::colours(&view, &Projection::false_colour(rgb))?, how)
+        }
+    };
     let ev = args.exposure.unwrap_or_else(|| picture.auto_exposure());
     png::write(&args.output, &picture, ev)?;
-
-    let ([width, height], progress) = (cube.header().size, cube.progress()?);
-    let missing = progress.tiles - progress.tiles_started;
-    let shows = super::info::shows(&cube);
     output.event(
         "done",
         json!({
             "file": args.output,
             "format": "png",
-            "size": [width, height],
+            "size": picture.size,
             "exposure_ev": ev,
             "shows": shows,
-            "tiles_missing": missing,
+            "tiles_missing": missing[0],
         }),
     )?;
     let how = if args.exposure.is_some() { "as asked" } else { "99th percentile white" };
-    let file = args.output.display();
+    let (file, [width, height]) = (args.output.display(), picture.size);
     output.text(&format!("{file}: {width} x {height} pixels, {shows}, exposure {ev:+.3} EV ({how})\n"))?;
-    if missing > 0 {
-        output.text(&format!("{missing} of {} tiles have no samples yet and are black\n", progress.tiles))?;
+    say_missing(missing, output)
+}
+
+/// A colour map of the bands of `view` together.
+fn write_map(args: &Args, view: &View, missing: [u32; 2], output: &Output) -> Result<()> {
+    let (map, of, unit) = match args.temperature {
+        true => (export::Map::Temperature, "brightness temperature", "K"),
+        false => (export::Map::Radiance, "mean radiance", "W m-2 sr-1 nm-1"),
+    };
+    let values = export::map(view, map)?;
+    let range = args.range.unwrap_or_else(|| percentiles(&values));
+    png::write_srgb8(&args.output, view.size(), &map_srgb8(&values, range))?;
+    let channels = view.channels();
+    let from = channels.bounds.iter().map(|b| b[0]).fold(f64::INFINITY, f64::min);
+    let to = channels.bounds.iter().map(|b| b[1]).fold(f64::NEG_INFINITY, f64::max);
+    let shows = format!("{of} of {} bands, {from} to {to} nm", channels.len());
+    output.event(
+        "done",
+        json!({
+            "file": args.output,
+            "format": "png",
+            "size": view.size(),
+            "range": range,
+            "range_units": unit,
+            "shows": shows,
+            "tiles_missing": missing[0],
+        }),
+    )?;
+    let how = if args.range.is_some() { "as asked" } else { "1st to 99th percentile" };
+    let (file, [width, height], [low, high]) = (args.output.display(), view.size(), range);
+    output.text(&format!("{file}: {width} x {height} pixels, {shows}, {low:.6} to {high:.6} {unit} ({how})\n"))?;
+    say_missing(missing, output)
+}
+
+fn say_missing([missing, tiles]: [u32; 2], output: &Output) -> Result<()> {
+    if missing == 0 {
+        return Ok(());
     }
-    Ok(())
+    output.text(&format!("{missing} of {tiles} tiles have no samples yet and are black\n"))
 }
 
 /// The format that a file's extension stands for.
@@ -105,8 +417,22 @@ fn guess(path: &Path) -> Result<Format> {
         "zarr" => Ok(Format::Zarr),
         "csv" => Ok(Format::Csv),
         _ => Err(Error::Usage(format!(
-            "{}: the extension names no format; use .png, or say --format png",
+            "{}: the extension names no format; use .png, .img, .exr, .zarr or .csv, or say --format",
             path.display()
         ))),
+    }
+}
+
+fn parse_range(text: &str) -> std::result::Result<[f64; 2], String> {
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|v| v.is_finite());
+    let range = text.split_once("..").and_then(|(from, to)| Some([number(from)?, number(to)?]));
+    range.filter(|[from, to]| from < to).ok_or_else(|| "a range is FROM..TO with FROM < TO, such as 280..320".into())
+}
+
+fn parse_crop(text: &str) -> std::result::Result<Rect, String> {
+    let numbers: Option<Vec<u32>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
+    match numbers.as_deref() {
+        Some(&[x0, y0, x1, y1]) if x0 < x1 && y0 < y1 => Ok(Rect { x0, y0, x1, y1 }),
+        _ => Err("a crop is X0,Y0,X1,Y1 in whole pixels with X0 < X1 and Y0 < Y1, such as 0,0,64,64".into()),
     }
 }

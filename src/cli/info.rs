@@ -169,6 +169,7 @@ impl Found {
             "epochs": epochs(cube, progress),
             "error_estimate_is_rough": epochs(cube, progress) < ROUGH_BELOW,
             "store_bytes": header.store_bytes(),
+            "uncertainty": header.has_uncertainty(),
             "preview": shows(cube),
             "attributes": header.attributes,
             "channels": each.collect::<Vec<_>>(),
@@ -200,6 +201,14 @@ impl Found {
         }
         self.work.rows().into_iter().for_each(|(name, value)| row(name, value));
         row("error estimate", describe_estimate(cube, progress, estimate));
+        if header.has_uncertainty() {
+            let epochs = epochs(cube, progress);
+            let what = match epochs {
+                0 | 1 => "of every pixel and channel once there are 2 epochs".to_owned(),
+                n => format!("of every pixel and channel, from {n} epochs (Student's t, {} degrees of freedom)", n - 1),
+            };
+            row("standard error", what);
+        }
         row("preview", shows(cube));
         row("on disk", format!("{} when all tiles are begun", crate::files::format_bytes(header.store_bytes())));
         for (name, value) in &header.attributes {
@@ -233,6 +242,9 @@ fn describe_samples(progress: &Progress) -> String {
 }
 
 fn describe_estimate(cube: &Cube, progress: &Progress, estimate: &[f64]) -> String {
+    if cube.header().attributes.contains_key("derived") {
+        return "unknown: made of the channels of another cube, whose errors belong together".into();
+    }
     let epochs = epochs(cube, progress);
     if epochs < 2 {
         return format!("unknown before 2 epochs ({} samples per pixel)", 2 * cube.header().epoch);

@@ -1,6 +1,7 @@
 //! Arguments → job → exit code; one file per subcommand.
 
 mod array;
+mod bands;
 mod compare;
 mod devices;
 mod export;
@@ -11,6 +12,7 @@ mod plan;
 mod progress;
 mod render;
 mod scene;
+mod sensor;
 mod sinks;
 mod spectrum;
 mod standing;
@@ -41,6 +43,7 @@ Examples:
   spectile info cube.zarr                               how far it got, how large the error is
   spectile spectrum cube.zarr 120 80                    the spectrum of one pixel, as CSV
   spectile export cube.zarr -o picture.png              a picture of it
+  spectile sensor cube.zarr --responses s.csv -o s.zarr what a sensor would see of it
   spectile view cube.zarr                               a page to look at it
   spectile compare cube.zarr reference.zarr             how it differs from another cube
 
@@ -66,6 +69,7 @@ enum Command {
     Spectrum(spectrum::Args),
     Compare(compare::Args),
     Export(export::Args),
+    Sensor(sensor::Args),
     View(view::Args),
     /// A task of an array job (written into the batch script by `submit`)
     #[command(hide = true)]
@@ -88,6 +92,7 @@ impl Cli {
             Command::Info(args) => args.json,
             Command::Compare(args) => args.json,
             Command::Export(args) => args.json,
+            Command::Sensor(args) => args.json,
             Command::View(args) => args.json,
             Command::Submit(args) => args.json,
             Command::Spectrum(_) | Command::ArrayTask(_) | Command::ArrayEnd(_) | Command::ArrayProbe(_) => false,
@@ -104,6 +109,7 @@ impl Cli {
             Command::Spectrum(args) => spectrum::run(args, output),
             Command::Compare(args) => compare::run(args, output),
             Command::Export(args) => export::run(args, output),
+            Command::Sensor(args) => sensor::run(args, output),
             Command::View(args) => view::run(args, output),
             Command::Submit(args) => submit::run(args, output),
             Command::ArrayTask(args) => array::task(args, output),

@@ -45,6 +45,12 @@ impl Output {
         write(&format!("{}\n", Value::Object(object)))
     }
 
+    /// Says a warning on stderr, and in JSON as an event on stdout too.
+    pub fn warn(&self, text: &str) -> Result<()> {
+        say(&format!("warning: {text}"));
+        self.event("warning", json!({ "message": text }))
+    }
+
     /// Says why a command ended: on stderr, and in JSON as an event on stdout too.
     pub fn error(&self, error: &Error) {
         match error {

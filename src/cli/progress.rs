@@ -21,6 +21,15 @@ const ROUGH_BELOW: u32 = 8;
 const LINE_EVERY: Duration = Duration::from_secs(1);
 const LINE_AT_LEAST_EVERY: Duration = Duration::from_secs(10);
 
+/// A bar for work that is not a render, on a terminal.
+pub fn bar(json: bool) -> Option<ProgressBar> {
+    (!json && std::io::stderr().is_terminal()).then(|| {
+        let bar = ProgressBar::with_draw_target(Some(1), ProgressDrawTarget::stderr_with_hz(5));
+        let style = ProgressStyle::with_template("{bar:30} {percent} %  {eta} left").expect("a valid template");
+        bar.with_style(style)
+    })
+}
+
 pub struct Reporter<'a> {
     output: &'a Output,
     quiet: bool,
@@ -83,9 +92,9 @@ impl<'a> Reporter<'a> {
         self.epoch = job.scene.integrator.epoch;
         let [width, height] = job.scene.film.cube_size();
         let tile = plan::tile_size(&job.scene, job.tile);
-        let disk = plan::header(&job.scene, tile, job.seed).store_bytes();
+        let disk = job.header(tile).store_bytes();
         let channels = job.scene.channels.len();
-        let samples_limit = job.stop.samples_limit(self.epoch)?;
+        let samples_limit = job.stop.samples_limit(self.epoch, job.uncertainty)?;
         self.line(&format!(
             "{}: {width} x {height} pixels x {channels} channels, {} on disk",
             job.scene.file.display(),

@@ -11,7 +11,9 @@ use crate::{Error, Result};
 /// Print the spectrum of one pixel as CSV
 ///
 /// A header, then one line a channel, in the order of the cube: the centre of the channel in nm and its mean spectral
-/// radiance in W m-2 sr-1 nm-1 (and its standard error, where the cube has it), with as many digits as bring back the stored number exactly.
+/// radiance in W m-2 sr-1 nm-1, with as many digits as bring back the stored number exactly. Cubes rendered with
+/// --uncertainty have a third column, the standard error (NaN below two epochs); a plot shows the values plus and minus
+/// two of them.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = "\
 Examples:
@@ -40,11 +42,12 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         let what = format!("pixel {} {} has no samples yet; try again when its tile is rendered", args.x, args.y);
         return Err(Error::Usage(format!("{}: {what}", args.cube.display())));
     };
+    let errors = cube.standard_error(args.x, args.y)?;
     if let Some(path) = &args.plot {
         let samples = cube.samples(cube.grid().tile_at(args.x, args.y))?;
         let title = format!("{}, column {}, row {}, {samples} samples", args.cube.display(), args.x, args.y);
-        write_atomically(path, plot::spectrum(cube.channels(), &spectrum, &title)?.as_bytes())?;
+        let plot = plot::spectrum(cube.channels(), &spectrum, errors.as_deref(), &title)?;
+        write_atomically(path, plot.as_bytes())?;
     }
-    let standard_error = cube.look().standard_error(args.x, args.y)?;
-    output.text(&text::spectrum_csv(cube.channels(), &spectrum, standard_error.as_deref()))
+    output.text(&text::spectrum_csv(cube.channels(), &spectrum, errors.as_deref()))
 }

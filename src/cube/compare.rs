@@ -29,6 +29,47 @@ pub struct ChannelMetrics {
     /// mean of (x - ref)² / (ref² + ε), ε = (0.01 · mean of ref)². Equal values differ by 0, also where ref and ε are 0;
     /// others are infinitely far apart there.
     pub rel_mse: f64,
+    /// Where a cube has standard errors (one without counts as exact): whether they explain the difference.
+    pub z: Option<ZTest>,
+}
+
+/// The differences of a channel in units of their standard errors.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ZTest {
+    /// Of the mean over pixels: Σ (x - ref) / sqrt(Σ s²). Within ±2 in 95 % of all cases if nothing but noise differs.
+    pub mean: f64,
+    /// Root mean square over pixels of (x - ref)/s; 1 if nothing but noise differs and there are many epochs.
+    pub rms: f64,
+    /// Pixels with a standard error above 0, or different without one.
+    pub pixels: u64,
+}
+
+/// Sums over pixels for the z-test of a channel.
+#[derive(Debug, Clone, Copy, Default)]
+struct ZSums {
+    difference: f64,
+    variance: f64,
+    square: f64,
+    pixels: u64,
+}
+
+impl ZSums {
+    fn add(&mut self, difference: f64, variance: f64) {
+        // Equal and exact, or an error that is not known.
+        if variance.is_nan() || (variance == 0.0 && difference == 0.0) {
+            return;
+        }
+        self.difference += difference;
+        self.variance += variance;
+        self.square += difference * difference / variance;
+        self.pixels += 1;
+    }
+
+    fn test(&self) -> Option<ZTest> {
+        let Self { difference, variance, square, pixels } = *self;
+        let rms = (square / pixels as f64).sqrt();
+        (pixels > 0).then(|| ZTest { mean: difference / variance.sqrt(), rms, pixels })
+    }
 }
 
 impl Comparison {
@@ -78,6 +119,7 @@ pub fn compare(cube: &Cube, reference: &Cube) -> Result<Comparison> {
             }
         }
     })?;
+    let z = z_sums(cube, reference)?;
     let n = compared as f64;
     let metrics = |k: usize| ChannelMetrics {
         mean: mean(sums[k]),
@@ -85,9 +127,36 @@ pub fn compare(cube: &Cube, reference: &Cube) -> Result<Comparison> {
         bias: bias[k] / n,
         rmse: (square[k] / n).sqrt(),
         rel_mse: relative[k] / n,
+        z: z.as_ref().and_then(|z| z[k].test()),
     };
     let [width, height] = cube.header().size.map(u64::from);
     Ok(Comparison { channels: (0..channels).map(metrics).collect(), pixels: compared, pixels_in_all: width * height })
+}
+
+/// Per channel; `None` where neither cube has standard errors.
+fn z_sums(a: &Cube, b: &Cube) -> Result<Option<Vec<ZSums>>> {
+    if !a.header().has_uncertainty() && !b.header().has_uncertainty() {
+        return Ok(None);
+    }
+    let mut sums = vec![ZSums::default(); a.channels().len()];
+    for tile in 0..a.grid().count() {
+        let (Some(chunk), errors) = (a.chunk(tile)?, a.error_chunk(tile)?) else { continue };
+        for other in b.grid().tiles_in(chunk.rect()) {
+            let (Some(other), other_errors) = (b.chunk(other)?, b.error_chunk(other)?) else { continue };
+            let Some(common) = chunk.rect().intersection(&other.rect()) else { continue };
+            for (y, x) in (common.y0..common.y1).flat_map(|y| (common.x0..common.x1).map(move |x| (y, x))) {
+                let (of_a, of_b) = (chunk.spectrum(x, y), other.spectrum(x, y));
+                let square = |errors: &Option<Chunk>, k: usize| {
+                    errors.as_ref().map_or(0.0, |errors| f64::from(errors.spectrum(x, y)[k]).powi(2))
+                };
+                for (k, sums) in sums.iter_mut().enumerate() {
+                    let difference = f64::from(of_a[k]) - f64::from(of_b[k]);
+                    sums.add(difference, square(&errors, k) + square(&other_errors, k));
+                }
+            }
+        }
+    }
+    Ok(Some(sums))
 }
 
 fn check_comparable(a: &Cube, b: &Cube) -> Result<()> {

@@ -14,9 +14,6 @@ use super::store::{Cube, PRIVATE, Part, read_group};
 use super::writer::BATCH_BYTES;
 use crate::{Error, Result, files};
 
-/// Arrays that later versions add and this one must not mistake for somebody else's files.
-const OTHER_ARRAYS: [&str; 1] = ["standard_error"];
-
 /// What may be at the path of a cube that is going to be written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Existing {
@@ -127,7 +124,7 @@ fn find_way(path: &Path, header: &Header, existing: Existing, tiles: &Range<u32>
             // A link to a cube on another disk stays a link.
             let target = fs::canonicalize(path).unwrap_or(path.to_owned());
             check_removable(&target)?;
-            check_space(path, files::parent(&target), header, count, folder_bytes(&target))?;
+            check_space(path, files::parent(&target), header, count, files::bytes_of(&target))?;
             Ok(Way::Replace(target))
         }
         Existing::Join | Existing::Resume if there => {
@@ -135,7 +132,7 @@ fn find_way(path: &Path, header: &Header, existing: Existing, tiles: &Range<u32>
             let missing = tiles.clone().filter(|&tile| !cube.part_path(Part::Radiance, tile).exists()).count();
             if missing > 0 {
                 // What a killed process left aside goes first.
-                check_space(path, cube.path(), header, missing as u64, folder_bytes(&cube.aside_folder()))?;
+                check_space(path, cube.path(), header, missing as u64, files::bytes_of(&cube.aside_folder()))?;
             }
             Ok(Way::GoOn(Box::new(cube)))
         }
@@ -206,7 +203,7 @@ fn write_empty(folder: &Path, header: &Header) -> Result<()> {
     let each = |value: &dyn Fn(usize) -> f64| doubles((0..channels.len()).map(value));
     write("wavelength/c/0", &each(&|k| channels.centre(k)))?;
     write("wavelength_bounds/c/0/0", &doubles(channels.bounds.iter().flatten().copied()))?;
-    write("response_integral/c/0", &each(&|k| channels.width(k)))?;
+    write("response_integral/c/0", &each(&|k| channels.integral(k)))?;
     for (axis, name) in ["x", "y"].into_iter().enumerate() {
         let centres = (0..header.size[axis]).map(|i| f64::from(header.origin[axis]) + f64::from(i) + 0.5);
         write(&format!("{name}/c/0"), &doubles(centres))?;
@@ -243,11 +240,8 @@ fn check_removable(path: &Path) -> Result<()> {
         error => error,
     })?;
     let arrays = group["consolidated_metadata"]["metadata"].as_object();
-    let known = |name: &str| {
-        [PRIVATE, "zarr.json"].contains(&name)
-            || OTHER_ARRAYS.contains(&name)
-            || arrays.is_some_and(|arrays| arrays.contains_key(name))
-    };
+    let known =
+        |name: &str| [PRIVATE, "zarr.json"].contains(&name) || arrays.is_some_and(|arrays| arrays.contains_key(name));
     for entry in fs::read_dir(path).map_err(|error| Error::storage(path, error))? {
         let name = entry.map_err(|error| Error::storage(path, error))?.file_name();
         if !name.to_str().is_some_and(known) {
@@ -270,16 +264,4 @@ fn check_space(path: &Path, folder: &Path, header: &Header, tiles: u64, freed: u
         ))),
         _ => Ok(()),
     }
-}
-
-/// Bytes of all files under a folder; what cannot be read counts nothing.
-fn folder_bytes(folder: &Path) -> u64 {
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    entries
-        .map(|entry| match entry.file_type() {
-            Ok(kind) if kind.is_dir() => folder_bytes(&entry.path()),
-            Ok(_) => entry.metadata().map_or(0, |metadata| metadata.len()),
-            Err(_) => 0,
-        })
-        .sum()
 }

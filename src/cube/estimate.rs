@@ -73,7 +73,7 @@ mod tests {
             samples,
             epoch: 0,
             suffix: 0,
-            checksums: [0; 4],
+            checksums: [0; 5],
             spread: vec![2.0, 0.0, 0.0],
             square: vec![9.0, 5.0, 0.0],
         }

@@ -1,7 +1,7 @@
 //! The journal of a tile: what its files must be, one fixed-size record for every commit (DESIGN section 4).
 //!
 //! A record, little-endian: magic, tile, K, samples per pixel, index of the last epoch merged, suffix of the files aside,
-//! five 128-bit checksums (one per [`Part`], one spare), per channel Σ M2 and Σ mean² for the error estimate, and the
+//! five 128-bit checksums (one per [`Part`], zero for one that the cube has not), per channel Σ M2 and Σ mean² for the error estimate, and the
 //! checksum of all that. Checksums are XXH3 (Y. Collet, xxHash), which finds damage and is no protection against intent.
 
 use std::fs::{self, File, OpenOptions};
@@ -14,9 +14,7 @@ use super::store::{Cube, Part};
 use crate::{Error, Result, files};
 
 const MAGIC: [u8; 8] = *b"SPTJRNL1";
-/// Checksums in a record: of the four parts, and room for one more.
-const CHECKSUMS: usize = 5;
-const HEAD_BYTES: usize = 32 + 16 * CHECKSUMS;
+const HEAD_BYTES: usize = 32 + 16 * Part::ALL.len();
 /// A journal that is this long is written anew with its last record only, so that it stays small beside its tile.
 const MAX_RECORDS: u64 = 16;
 /// The most that a journal takes.
@@ -245,7 +243,7 @@ mod tests {
             samples,
             epoch: 8,
             suffix: u64::from(samples) << 32 | 5,
-            checksums: [1, 2 << 100, 3, u128::MAX],
+            checksums: [1, 2 << 100, 3, u128::MAX, 0],
             spread: vec![0.5, -0.0, 1e300],
             square: vec![9.0, 5.0, 0.0],
         }

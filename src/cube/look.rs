@@ -237,10 +237,7 @@ impl<'a> Look<'a> {
     /// The standard errors of a tile, laid out like its radiance, where the cube has them. They are read as the last commit
     /// left them.
     fn standard_errors(&self, tile: u32) -> Result<Option<Chunk>> {
-        let (cube, grid) = (self.cube, self.cube.grid());
-        let [column, row] = grid.position(tile);
-        let path = cube.path().join(format!("standard_error/c/0/{row}/{column}"));
-        Chunk::open(&path, grid.rect(tile), grid.tile, cube.channels().len())
+        self.cube.error_chunk(tile)
     }
 
     /// The standard error of every channel of a pixel, where the cube has them.

@@ -65,4 +65,10 @@ impl Chunk {
         let pixel = (y - self.rect.y0) as usize * self.tile_width + (x - self.rect.x0) as usize;
         &self.values()[pixel * self.channels..][..self.channels]
     }
+
+    /// All values from the spectrum of a pixel of this tile on: those of the pixels to its right follow, K each.
+    pub(super) fn spectra_from(&self, x: u32, y: u32) -> &[f32] {
+        let pixel = (y - self.rect.y0) as usize * self.tile_width + (x - self.rect.x0) as usize;
+        &self.values()[pixel * self.channels..]
+    }
 }

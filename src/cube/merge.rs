@@ -171,6 +171,49 @@ impl<'a> Fold<'a> {
     }
 }
 
+/// Writes the standard errors of a tile's new means to `file`: of `unit`, the mean of the last of `epochs` equal epochs, and
+/// the mean and the standard error of those before it. With B epochs the variance of the mean is M2 / (B (B - 1)), M2 the
+/// sum that Welford's rule adds δ² (B - 1) / B to, δ the distance of the last epoch from the mean before it; so the standard
+/// error carries the sum from one epoch to the next. NaN below two epochs, and beyond the edge of the picture.
+pub(super) fn write_standard_errors(
+    grid: Grid,
+    rect: Rect,
+    channels: usize,
+    epochs: u32,
+    old: Option<(&Chunk, &Chunk)>,
+    unit: &[f32],
+    file: &mut impl Write,
+) -> std::io::Result<()> {
+    let [tile_width, tile_height] = grid.tile.map(|n| n as usize);
+    let buffered = (BUFFER_BYTES / (4 * channels)).clamp(1, tile_width * tile_height);
+    let mut buffer: Vec<f32> = Vec::with_capacity(buffered * channels);
+    let n = f64::from(epochs);
+    for pixel in 0..tile_width * tile_height {
+        let (x, y) = (pixel % tile_width, pixel / tile_width);
+        let is_inside = x < rect.width() as usize && y < rect.height() as usize;
+        let values = pixel * channels..(pixel + 1) * channels;
+        match old {
+            Some((mean, error)) if is_inside && epochs >= 2 => {
+                let before = mean.values()[values.clone()].iter().zip(&error.values()[values.clone()]);
+                buffer.extend(before.zip(&unit[values]).map(|((&mean, &error), &new)| {
+                    let error = f64::from(error);
+                    // The first of the epochs has no spread yet.
+                    let spread = if epochs == 2 { 0.0 } else { error * error * (n - 1.0) * (n - 2.0) };
+                    let distance = f64::from(new) - f64::from(mean);
+                    let spread = spread + distance * distance * ((n - 1.0) / n);
+                    (spread / (n * (n - 1.0))).sqrt() as f32
+                }));
+            }
+            _ => buffer.resize(buffer.len() + channels, f32::NAN),
+        }
+        if buffer.len() == buffered * channels {
+            file.write_all(bytemuck::cast_slice(&buffer))?;
+            buffer.clear();
+        }
+    }
+    file.write_all(bytemuck::cast_slice(&buffer))
+}
+
 /// The new running mean of one pixel, and δ² of every channel added to `distance`.
 fn merge_pixel(old: &[f32], new: &[f32], weight: f64, mean: &mut [f32], distance: &mut [f64]) {
     for (((&old, &new), mean), distance) in old.iter().zip(new).zip(mean).zip(distance) {

@@ -5,8 +5,8 @@ use std::path::Path;
 use serde_json::{Map, Value, json};
 
 use super::grid::Grid;
-use crate::spectral::Channels;
 use crate::spectral::colour::{Projection, ProjectionKind};
+use crate::spectral::{Channels, Curve, Response};
 use crate::{Error, Result};
 
 /// The version of the layout, `spectile_format` among the attributes of the group.
@@ -28,11 +28,34 @@ pub struct Header {
     pub attributes: Map<String, Value>,
 }
 
+/// The attribute of cubes with standard errors.
+pub(super) const UNCERTAINTY: &str = "uncertainty";
+
 /// Attributes of the group that the header's own fields make.
-const RESERVED: [&str; 8] =
-    ["Conventions", "title", "spectile_format", "spectile_version", "epoch", "origin", "channel_names", "false_colour"];
+const RESERVED: [&str; 9] = [
+    "Conventions",
+    "title",
+    "spectile_format",
+    "spectile_version",
+    "epoch",
+    "origin",
+    "channel_names",
+    "false_colour",
+    "responses",
+];
 
 impl Header {
+    /// Whether the cube has the array `standard_error`: an attribute says so where it has.
+    pub fn has_uncertainty(&self) -> bool {
+        self.attributes.get(UNCERTAINTY) == Some(&Value::Bool(true))
+    }
+
+    /// The same with the array `standard_error`.
+    pub fn with_uncertainty(mut self) -> Header {
+        self.attributes.insert(UNCERTAINTY.into(), Value::Bool(true));
+        self
+    }
+
     pub fn grid(&self) -> Grid {
         Grid { size: self.size, tile: self.tile }
     }
@@ -50,21 +73,28 @@ impl Header {
     /// Bytes on disk of a cube that has so many of its tiles. Files take whole blocks of 4 KiB, and folders one.
     pub(super) fn bytes_with_tiles(&self, tiles: u64) -> u64 {
         const BLOCK_BYTES: u64 = 4096;
-        // Metadata and coordinates of nine arrays, the facts of a few runs, and their folders.
-        const FIXED_BLOCKS: u64 = 60;
+        // Metadata and coordinates of ten arrays, the facts of a few runs, and their folders.
+        const FIXED_BLOCKS: u64 = 66;
         let in_blocks = |bytes: u64| bytes.div_ceil(BLOCK_BYTES) * BLOCK_BYTES;
         let channels = self.channels.len() as u64;
         let pixels = u64::from(self.tile[0]) * u64::from(self.tile[1]);
         let blocks = self.grid().tile_blocks().map(u64::from);
         let journal = super::journal::MAX_BYTES_PER_CHANNEL * channels + super::journal::MAX_BYTES;
-        let files = [pixels * channels * 4, pixels * 12, blocks[0] * blocks[1] * channels * 4, 4, journal];
+        let errors = if self.has_uncertainty() { pixels * channels * 4 } else { 0 };
+        let files = [pixels * channels * 4, errors, pixels * 12, blocks[0] * blocks[1] * channels * 4, 4, journal];
         // Each tile has a folder of `preview`, each row of tiles one of every array.
         let tile = files.into_iter().map(in_blocks).sum::<u64>() + BLOCK_BYTES;
         let [_, rows] = self.grid().tiles().map(u64::from);
         // Names stand on a line each; centres, bounds and integrals are four doubles.
         let names: u64 = self.channels.names.iter().map(|name| name.len() as u64 + 16).sum();
+        // A node of a response is two numbers, a line each.
+        let nodes = |response: &Response| match response.curve() {
+            Curve::Linear { nm, .. } => 64 * nm.len() as u64,
+            _ => 0,
+        };
+        let names = names + self.channels.responses.iter().map(nodes).sum::<u64>();
         let coordinates = 32 * channels + 8 * (u64::from(self.size[0]) + u64::from(self.size[1]));
-        let metadata = FIXED_BLOCKS * BLOCK_BYTES + in_blocks(names) + in_blocks(coordinates) + 4 * rows * BLOCK_BYTES;
+        let metadata = FIXED_BLOCKS * BLOCK_BYTES + in_blocks(names) + in_blocks(coordinates) + 5 * rows * BLOCK_BYTES;
         tile.saturating_mul(tiles).saturating_add(metadata)
     }
 
@@ -93,7 +123,7 @@ impl Header {
                     let bounds = |[from, to]: [f64; 2]| format!("{from} to {to} nm");
                     there_and_wanted(&format!("channel {k}"), bounds(there.bounds[k]), bounds(wanted.bounds[k]))
                 }
-                None => Some("the names of the channels, or channels.false_colour".into()),
+                None => Some("the responses or names of the channels, or channels.false_colour".into()),
             };
         }
         if self.tile != wanted.tile {
@@ -151,6 +181,9 @@ impl Header {
         if channels.is_empty() || channels.names.len() != channels.len() {
             return Err(format!("{} channels with {} names", channels.len(), channels.names.len()));
         }
+        if !channels.responses.is_empty() && channels.responses.len() != channels.len() {
+            return Err(format!("{} channels with {} responses", channels.len(), channels.responses.len()));
+        }
         for (k, [from, to]) in channels.bounds.iter().enumerate() {
             if !(*from > 0.0 && from < to && to.is_finite()) {
                 return Err(format!("channel {k} from {from} to {to} nm is no interval of wavelength"));
@@ -180,6 +213,9 @@ impl Header {
             ("channel_names".into(), json!(self.channels.names)),
             ("false_colour".into(), json!(self.channels.false_colour)),
         ]);
+        if !self.channels.responses.is_empty() {
+            attributes.insert("responses".into(), json!(self.channels.responses));
+        }
         let arrays = arrays(self);
         let consolidated: Map<String, Value> = arrays.iter().map(|(name, v)| ((*name).into(), v.clone())).collect();
         let group = json!({
@@ -217,6 +253,9 @@ impl Header {
             serde_json::from_value(take("false_colour")).map_err(|_| damaged("has no `false_colour`"))?;
         let epoch = serde_json::from_value(take("epoch")).map_err(|_| damaged("has no `epoch`"))?;
         let origin = serde_json::from_value(take("origin")).map_err(|_| damaged("has no `origin`"))?;
+        let responses = attributes.remove("responses").unwrap_or_else(|| json!([]));
+        let responses = serde_json::from_value(responses)
+            .map_err(|what| damaged(&format!("holds no valid `responses`: {what}")))?;
         for name in RESERVED {
             attributes.remove(name);
         }
@@ -224,7 +263,7 @@ impl Header {
             size: [*width, *height],
             origin,
             tile: [*tile_width, *tile_height],
-            channels: Channels { bounds: read_bounds(*count as usize)?, names, false_colour },
+            channels: Channels { bounds: read_bounds(*count as usize)?, names, false_colour, responses },
             epoch,
             attributes,
         };
@@ -272,7 +311,7 @@ fn arrays(header: &Header) -> Vec<(&'static str, Value)> {
         }
     };
     let pixel = |side: &str| json!({ "long_name": format!("pixel centre on the full film, from the {side}"), "units": "pixel" });
-    vec![
+    let mut arrays = vec![
         (
             "radiance",
             Array {
@@ -345,7 +384,19 @@ fn arrays(header: &Header) -> Vec<(&'static str, Value)> {
             }
             .chunked(&[channels, tile_blocks_y, tile_blocks_x]),
         ),
-    ]
+    ];
+    if header.has_uncertainty() {
+        let errors = Array {
+            codecs: channel_fastest(),
+            attributes: json!({
+                "long_name": "standard error of radiance, from the spread of equal epochs; NaN below two of them",
+                "units": radiance_units,
+            }),
+            ..Array::new("float32", &[channels, height, width], &["wavelength", "y", "x"])
+        };
+        arrays.push(("standard_error", errors.chunked(&[channels, tile_height, tile_width])));
+    }
+    arrays
 }
 
 /// `radiance` is encoded as [y, x, wavelength]: the chunk is the raw tile, a pixel's spectrum contiguous.

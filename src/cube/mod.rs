@@ -29,11 +29,13 @@ mod preview;
 mod protocol_tests;
 mod recover;
 mod runs;
+mod sensor;
 mod store;
 mod verify;
+mod view;
 mod writer;
 
-pub use compare::{ChannelMetrics, Comparison, compare};
+pub use compare::{ChannelMetrics, Comparison, ZTest, compare};
 pub use create::{Existing, check_target, make};
 pub use epochs::{epoch_samples, epochs_in, samples_before, whole_epochs};
 pub use grid::{Grid, Rect};
@@ -43,8 +45,10 @@ pub use merge::{merge_bytes, merge_means};
 pub use metadata::{FORMAT, Header};
 pub use preview::reduction;
 pub use runs::{Run, RunFile, RunState, SlurmTask, Stand, Work, node_name, now_s};
+pub use sensor::{Findings, integrate};
 pub use store::{Cube, Progress};
 pub use verify::Verification;
+pub use view::{Quantity, Reader, Strides, View};
 pub use writer::Writer;
 
 /// Side, in pixels, of the blocks whose means make up `overview`.

@@ -57,7 +57,8 @@ fn leftovers(cube: &Cube, tiles: &Range<u32>) -> Result<BTreeMap<u32, Vec<PathBu
     Ok(found)
 }
 
-/// The record that rules a tile: the one with the most samples whose radiance is there, in place or aside.
+/// The record that rules a tile: the one with the most samples whose radiance (and standard error) is there, in place or
+/// aside.
 fn recover_tile(cube: &Cube, tile: u32, warn: &mut dyn FnMut(String)) -> Result<Option<Record>> {
     let journal = Journal::of(cube, tile);
     let (records, sound) = journal.records()?;
@@ -86,7 +87,7 @@ fn recover_tile(cube: &Cube, tile: u32, warn: &mut dyn FnMut(String)) -> Result<
     }
     let mut anything = !valid.is_empty();
     let mut folders = BTreeSet::new();
-    for part in Part::ALL {
+    for &part in cube.parts() {
         let path = cube.part_path(part, tile);
         match fs::remove_file(&path) {
             Ok(()) => {
@@ -110,11 +111,11 @@ fn recover_tile(cube: &Cube, tile: u32, warn: &mut dyn FnMut(String)) -> Result<
 }
 
 /// Brings every file of `record` to its place; derived ones are made anew where they are not as they should be. False
-/// where the radiance is not there.
+/// where the radiance or the standard error is not there.
 fn put_in_place(cube: &Cube, record: &Record) -> Result<bool> {
     let mut folders = BTreeSet::new();
     let mut missing = Vec::new();
-    for part in Part::ALL {
+    for &part in cube.parts() {
         let checksum = record.checksums[part as usize];
         let target = cube.part_path(part, record.tile);
         let aside = cube.aside_path(part, record.tile, record.suffix);
@@ -127,7 +128,7 @@ fn put_in_place(cube: &Cube, record: &Record) -> Result<bool> {
                 Journal::of(cube, record.tile).sync()?;
             }
             take_place(&aside, &target, &mut folders)?;
-        } else if part == Part::Radiance {
+        } else if !part.is_derived() {
             return Ok(false);
         } else {
             missing.push(part);
@@ -158,7 +159,7 @@ fn rebuild(cube: &Cube, record: &Record, parts: &[Part], folders: &mut BTreeSet<
     for &part in parts {
         let samples = record.samples.to_le_bytes();
         let bytes: &[u8] = match part {
-            Part::Radiance => continue,
+            Part::Radiance | Part::StandardError => continue,
             Part::Samples => &samples,
             Part::Preview => bytemuck::cast_slice(&fold.preview),
             Part::Overview => bytemuck::cast_slice(&fold.overview),

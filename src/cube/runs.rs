@@ -284,7 +284,7 @@ mod tests {
             run(RunState::Done, 0..3, 0),
         ];
         let samples = [64, 64, 16, 64, 64, 0, 0, 0, 32, 0];
-        let work = Work::judge(&samples, &[6..8], runs.clone(), None);
+        let work = Work::judge(&samples, std::slice::from_ref(&(6..8)), runs.clone(), None);
         let expected = [
             Stand::Done(Some(0)),
             Stand::Done(Some(0)),

@@ -27,11 +27,18 @@ pub(super) enum Part {
     Samples,
     Preview,
     Overview,
+    /// Only in cubes that have it.
+    StandardError,
 }
 
 impl Part {
     /// In the order in which they are written and take their places.
-    pub const ALL: [Part; 4] = [Part::Radiance, Part::Samples, Part::Preview, Part::Overview];
+    pub const ALL: [Part; 5] = [Part::Radiance, Part::Samples, Part::Preview, Part::Overview, Part::StandardError];
+
+    /// Whether it can be made from the radiance anew.
+    pub fn is_derived(self) -> bool {
+        !matches!(self, Part::Radiance | Part::StandardError)
+    }
 
     pub fn name(self) -> &'static str {
         match self {
@@ -39,6 +46,7 @@ impl Part {
             Part::Samples => "samples",
             Part::Preview => "preview",
             Part::Overview => "overview",
+            Part::StandardError => "standard_error",
         }
     }
 }
@@ -142,29 +150,57 @@ impl Cube {
 
     /// The radiance of a tile, mapped into memory; `None` before its first unit.
     pub fn chunk(&self, tile: u32) -> Result<Option<Chunk>> {
-        Chunk::open(
-            &self.part_path(Part::Radiance, tile),
-            self.grid().rect(tile),
-            self.header.tile,
-            self.channels().len(),
-        )
+        self.mapped(&self.part_path(Part::Radiance, tile), tile)
+    }
+
+    /// The standard errors of a tile, mapped into memory like [`Cube::chunk`]: NaN below two epochs. `None` before its
+    /// first unit, and in cubes without them.
+    pub fn error_chunk(&self, tile: u32) -> Result<Option<Chunk>> {
+        match self.header.has_uncertainty() {
+            true => self.mapped(&self.part_path(Part::StandardError, tile), tile),
+            false => Ok(None),
+        }
+    }
+
+    pub(super) fn mapped(&self, path: &Path, tile: u32) -> Result<Option<Chunk>> {
+        Chunk::open(path, self.grid().rect(tile), self.header.tile, self.channels().len())
+    }
+
+    /// The parts that each tile of this cube has.
+    pub(super) fn parts(&self) -> &'static [Part] {
+        if self.header.has_uncertainty() { &Part::ALL } else { &Part::ALL[..4] }
     }
 
     /// The K channels of the pixel in column `x` and row `y` from the top left, in one contiguous read; `None` before
     /// the first unit of its tile.
     pub fn spectrum(&self, x: u32, y: u32) -> Result<Option<Vec<f32>>> {
-        let [width, height] = self.header.size;
-        if x >= width || y >= height {
-            let what = format!("pixel {x} {y} is outside the picture; columns are 0..{width}, rows 0..{height}");
-            return Err(Error::Usage(format!("{}: {what}", self.path.display())));
-        }
+        self.check_pixel(x, y)?;
         self.look().spectrum(x, y)
+    }
+
+    /// The standard errors of the pixel's channels, as [`Cube::spectrum`] gives their values; `None` also in cubes without
+    /// them. NaN below two epochs.
+    pub fn standard_error(&self, x: u32, y: u32) -> Result<Option<Vec<f32>>> {
+        self.check_pixel(x, y)?;
+        self.look().standard_error(x, y)
+    }
+
+    fn check_pixel(&self, x: u32, y: u32) -> Result<()> {
+        let [width, height] = self.header.size;
+        if x < width && y < height {
+            return Ok(());
+        }
+        let what = format!("pixel {x} {y} is outside the picture; columns are 0..{width}, rows 0..{height}");
+        Err(Error::Usage(format!("{}: {what}", self.path.display())))
     }
 
     /// The error estimate of every channel (DESIGN section 8), from the spread of the epochs: sqrt(Σ variance of the
     /// mean / Σ mean²), sums over the pixels of all tiles begun. NaN while any of those has fewer than two epochs, 0
-    /// where a channel is all zero.
+    /// where a channel is all zero. NaN in a cube made of another one's channels: these spread together.
     pub fn error_estimate(&self) -> Result<Vec<f64>> {
+        if self.header.attributes.contains_key("derived") {
+            return Ok(vec![f64::NAN; self.channels().len()]);
+        }
         let mut totals = estimate::Totals::new(self.channels().len(), self.header.epoch);
         for tile in 0..self.grid().count() {
             if let Some(record) = Journal::of(self, tile).last()? {
@@ -214,7 +250,7 @@ impl Cube {
         let [column, row] = self.grid().position(tile);
         let name = part.name();
         self.path.join(match part {
-            Part::Radiance | Part::Overview => format!("{name}/c/0/{row}/{column}"),
+            Part::Radiance | Part::Overview | Part::StandardError => format!("{name}/c/0/{row}/{column}"),
             Part::Samples => format!("{name}/c/{row}/{column}"),
             Part::Preview => format!("{name}/c/{row}/{column}/0"),
         })

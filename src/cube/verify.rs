@@ -80,12 +80,13 @@ impl Cube {
             let (records, sound) = journal.records()?;
             let damaged_records = !sound || records.contains(&None);
             let last = records.into_iter().flatten().next_back();
-            let mut wrong: Vec<String> = Part::ALL.iter().filter_map(|&part| self.wrong(part, tile, &last)).collect();
+            let mut wrong: Vec<String> =
+                self.parts().iter().filter_map(|&part| self.wrong(part, tile, &last)).collect();
             if damaged_records {
                 wrong.push(format!("the journal of tile {tile} has a damaged record"));
             }
             if wrong.is_empty() || !(was_in_use || is_in_use()) || attempt == ATTEMPTS {
-                found.files += u64::from(last.is_some()) * (Part::ALL.len() as u64 + 1);
+                found.files += u64::from(last.is_some()) * (self.parts().len() as u64 + 1);
                 found.damage.extend(wrong);
                 return Ok(());
             }

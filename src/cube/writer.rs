@@ -17,7 +17,7 @@ use super::journal::{Journal, Record};
 use super::lock::TileLock;
 use super::look::Window;
 use super::map::Chunk;
-use super::merge::{Fold, check_portion};
+use super::merge::{Fold, check_portion, write_standard_errors};
 use super::metadata::Header;
 use super::recover;
 use super::store::{Cube, Part};
@@ -72,6 +72,8 @@ struct Pending {
     /// Suffix of the record before it in the journal.
     previous: Option<u64>,
     chunk: Chunk,
+    /// In cubes that have them.
+    errors: Option<Chunk>,
 }
 
 impl Writer {
@@ -166,6 +168,22 @@ impl Writer {
     ///
     /// Waits while the open batch is full. On an error the tile is what it was.
     pub fn merge_unit(&self, tile: u32, n_before: u32, n_unit: u32, unit: &[f32]) -> Result<()> {
+        self.merge(tile, n_before, n_unit, unit, check_portion)
+    }
+
+    /// Stores what was made of another cube's tile, with as many samples per pixel as that has, into one that has none.
+    pub fn store(&self, tile: u32, samples: u32, values: &[f32]) -> Result<()> {
+        self.merge(tile, 0, samples, values, |_, samples, _| Ok(samples))
+    }
+
+    fn merge(
+        &self,
+        tile: u32,
+        n_before: u32,
+        n_unit: u32,
+        unit: &[f32],
+        samples_after: fn(u32, u32, u32) -> Result<u32>,
+    ) -> Result<()> {
         let (cube, grid) = (&self.cube, self.cube.grid());
         let expected = grid.tile_pixels() * cube.channels().len();
         if !self.tiles.contains(&tile) || unit.len() != expected {
@@ -181,12 +199,16 @@ impl Writer {
             );
             return Err(Error::storage(cube.path(), what));
         }
-        let samples = check_portion(n_before, n_unit, cube.header().epoch)?;
+        let samples = samples_after(n_before, n_unit, cube.header().epoch)?;
         let aside = Aside::new(cube, tile);
         let record = aside.write(base.as_ref(), samples, n_unit, unit)?;
-        let chunk = Chunk::open(&aside.path(Part::Radiance), grid.rect(tile), grid.tile, cube.channels().len())?;
-        let chunk = chunk.ok_or_else(|| Error::storage(&aside.path(Part::Radiance), "has vanished"))?;
-        self.insert(aside, base, record, chunk);
+        let mapped = |part: Part| {
+            let path = aside.path(part);
+            cube.mapped(&path, tile)?.ok_or_else(|| Error::storage(&path, "has vanished"))
+        };
+        let chunk = mapped(Part::Radiance)?;
+        let errors = cube.header().has_uncertainty().then(|| mapped(Part::StandardError)).transpose()?;
+        self.insert(aside, base, record, chunk, errors);
         Ok(())
     }
 
@@ -204,16 +226,22 @@ impl Writer {
         }
         drop(state);
         let Some(record) = Journal::of(&self.cube, tile).last()? else { return Ok(None) };
-        let path = self.cube.part_path(Part::Radiance, tile);
-        let damaged = |what: &str| Error::storage(&path, format!("{what}; --resume puts it in order"));
-        let chunk = self.cube.chunk(tile)?.ok_or_else(|| damaged("is missing, although the journal has it"))?;
-        if checksums::of(chunk.bytes()) != record.checksums[Part::Radiance as usize] {
-            return Err(damaged("is damaged: it is not what the journal says"));
-        }
-        Ok(Some(Base::Committed { record, chunk }))
+        let sound = |part: Part| {
+            let path = self.cube.part_path(part, tile);
+            let damaged = |what: &str| Error::storage(&path, format!("{what}; --resume puts it in order"));
+            let chunk = self.cube.mapped(&path, tile)?;
+            let chunk = chunk.ok_or_else(|| damaged("is missing, although the journal has it"))?;
+            if checksums::of(chunk.bytes()) != record.checksums[part as usize] {
+                return Err(damaged("is damaged: it is not what the journal says"));
+            }
+            Ok(chunk)
+        };
+        let chunk = sound(Part::Radiance)?;
+        let errors = self.cube.header().has_uncertainty().then(|| sound(Part::StandardError)).transpose()?;
+        Ok(Some(Base::Committed(Box::new(Committed { record, chunk, errors }))))
     }
 
-    fn insert(&self, aside: Aside, base: Option<Base>, record: Record, chunk: Chunk) {
+    fn insert(&self, aside: Aside, base: Option<Base>, record: Record, chunk: Chunk, errors: Option<Chunk>) {
         let tile = record.tile;
         let mut state = self.state();
         let replaced = state.open.remove(&tile);
@@ -224,7 +252,7 @@ impl Writer {
             (Some(base), _) => Some(base.record().suffix),
         };
         state.totals.replace(base.as_ref().map(Base::record), &record);
-        state.open.insert(tile, Arc::new(Pending { record, previous, chunk }));
+        state.open.insert(tile, Arc::new(Pending { record, previous, chunk, errors }));
         drop(state);
         aside.keep();
         if let Some(replaced) = replaced {
@@ -304,7 +332,7 @@ impl Writer {
     /// Makes the files aside of a batch durable, and then the records that speak of them.
     fn journal(&self, batch: &BTreeMap<u32, Arc<Pending>>) -> Result<()> {
         for (&tile, pending) in batch {
-            for part in Part::ALL {
+            for &part in self.cube.parts() {
                 let path = self.cube.aside_path(part, tile, pending.record.suffix);
                 let synced =
                     File::open(&path).and_then(|file| file.sync_all()).and_then(|()| step("file aside synced"));
@@ -331,22 +359,36 @@ impl Drop for Writer {
 
 /// What a unit is merged into.
 enum Base {
-    Committed { record: Record, chunk: Chunk },
+    Committed(Box<Committed>),
     Pending(Arc<Pending>),
+}
+
+/// A tile as its last commit left it.
+struct Committed {
+    record: Record,
+    chunk: Chunk,
+    errors: Option<Chunk>,
 }
 
 impl Base {
     fn record(&self) -> &Record {
         match self {
-            Base::Committed { record, .. } => record,
+            Base::Committed(committed) => &committed.record,
             Base::Pending(pending) => &pending.record,
         }
     }
 
     fn chunk(&self) -> &Chunk {
         match self {
-            Base::Committed { chunk, .. } => chunk,
+            Base::Committed(committed) => &committed.chunk,
             Base::Pending(pending) => &pending.chunk,
+        }
+    }
+
+    fn errors(&self) -> Option<&Chunk> {
+        match self {
+            Base::Committed(committed) => committed.errors.as_ref(),
+            Base::Pending(pending) => pending.errors.as_ref(),
         }
     }
 }
@@ -386,12 +428,20 @@ impl<'a> Aside<'a> {
         let samples_sum = self.file(Part::Samples, |file| file.write_all(&samples.to_le_bytes()))?;
         let preview = self.file(Part::Preview, |file| file.write_all(bytemuck::cast_slice(&fold.preview)))?;
         let overview = self.file(Part::Overview, |file| file.write_all(bytemuck::cast_slice(&fold.overview)))?;
+        let errors = match cube.header().has_uncertainty() {
+            false => 0,
+            true => self.file(Part::StandardError, |file| {
+                let (grid, epochs) = (cube.grid(), samples / cube.header().epoch);
+                let old = base.and_then(|base| Some((base.chunk(), base.errors()?)));
+                write_standard_errors(grid, grid.rect(tile), cube.channels().len(), epochs, old, unit, file)
+            })?,
+        };
         Ok(Record {
             tile,
             samples,
             epoch: epochs_in(samples, cube.header().epoch).saturating_sub(1),
             suffix: self.suffix,
-            checksums: [radiance, samples_sum, preview, overview],
+            checksums: [radiance, samples_sum, preview, overview, errors],
             spread,
             square,
         })
@@ -421,7 +471,7 @@ impl Drop for Aside<'_> {
 }
 
 fn remove_aside(cube: &Cube, tile: u32, suffix: u64) {
-    for part in Part::ALL {
+    for &part in cube.parts() {
         // Nobody reads such a file; one that cannot be removed now is removed when the tile is resumed.
         let _ = fs::remove_file(cube.aside_path(part, tile, suffix));
     }
@@ -429,7 +479,7 @@ fn remove_aside(cube: &Cube, tile: u32, suffix: u64) {
 
 /// Renames the files aside of a tile to their places, and adds the folders that must be synced then.
 fn take_places(cube: &Cube, tile: u32, suffix: u64, folders: &mut BTreeSet<PathBuf>) -> Result<()> {
-    for part in Part::ALL {
+    for &part in cube.parts() {
         let (aside, target) = (cube.aside_path(part, tile, suffix), cube.part_path(part, tile));
         take_place(&aside, &target, folders)?;
     }

@@ -6,10 +6,11 @@ use crate::spectral::Channels;
 use crate::{Error, Result};
 
 /// An SVG plot of one spectrum over its channels: every channel a level over its own interval, joined where intervals
-/// meet. `radiance` in W m⁻² sr⁻¹ nm⁻¹; what is not finite is left out.
-pub fn spectrum(channels: &Channels, radiance: &[f32], title: &str) -> Result<String> {
+/// meet, with a band of two standard errors to both sides where `errors` has them. `radiance` in W m⁻² sr⁻¹ nm⁻¹; what is
+/// not finite is left out.
+pub fn spectrum(channels: &Channels, radiance: &[f32], errors: Option<&[f32]>, title: &str) -> Result<String> {
     let mut svg = String::new();
-    draw(&mut svg, channels, radiance, title).map_err(|error| Error::Internal(format!("plot: {error}")))?;
+    draw(&mut svg, channels, radiance, errors, title).map_err(|error| Error::Internal(format!("plot: {error}")))?;
     Ok(svg)
 }
 
@@ -17,9 +18,18 @@ fn draw(
     svg: &mut String,
     channels: &Channels,
     radiance: &[f32],
+    errors: Option<&[f32]>,
     title: &str,
 ) -> std::result::Result<(), Box<dyn std::error::Error>> {
-    let finite = || radiance.iter().copied().filter(|v| v.is_finite()).map(f64::from);
+    // Two standard errors below and above, where they are known.
+    let band: Vec<(f64, f64)> = (0..radiance.len())
+        .map(|k| {
+            let value = f64::from(radiance[k]);
+            let error = errors.map_or(f64::NAN, |errors| 2.0 * f64::from(errors[k]));
+            if error.is_finite() { (value - error, value + error) } else { (value, value) }
+        })
+        .collect();
+    let finite = || band.iter().flat_map(|(low, high)| [*low, *high]).filter(|v| v.is_finite());
     let largest = finite().fold(0.0, |a, b| f64::max(a, b.abs()));
     // In powers of 1000, so that the axis has numbers for people whatever the level.
     let exponent = if largest > 0.0 { (largest.log10() / 3.0).floor() as i32 * 3 } else { 0 };
@@ -53,6 +63,13 @@ fn draw(
         .axis_desc_style(("sans-serif", 16))
         .light_line_style(BLACK.mix(0.06))
         .draw()?;
+    if errors.is_some() {
+        for (k, &(low, high)) in band.iter().enumerate().filter(|(_, (low, high))| low < high) {
+            let [from, to] = channels.bounds[k];
+            let corners = [(from, scaled(low)), (to, scaled(high))];
+            chart.draw_series([Rectangle::new(corners, RGBColor(0x1f, 0x4e, 0x9e).mix(0.25).filled())])?;
+        }
+    }
     for line in levels(channels, radiance) {
         let points = line.into_iter().map(|(nm, v)| (nm, scaled(v)));
         chart.draw_series(LineSeries::new(points, RGBColor(0x1f, 0x4e, 0x9e).stroke_width(2)))?;
@@ -92,10 +109,20 @@ mod tests {
     #[test]
     fn axes_have_labels_units_and_scale() {
         let channels = Channels::equal(400.0, 700.0, 3);
-        let svg = spectrum(&channels, &[1e-5, 4e-5, 2e-5], "pixel <1> & \"2\"").expect("plot");
+        let svg = spectrum(&channels, &[1e-5, 4e-5, 2e-5], None, "pixel <1> & \"2\"").expect("plot");
         assert!(svg.contains("wavelength (nm)") && svg.contains("10⁻⁶ W m⁻² sr⁻¹ nm⁻¹"), "{svg}");
         assert!(svg.contains("<text") && svg.contains("pixel &lt;1&gt; &amp;"), "{svg}");
         assert!(svg.trim_end().ends_with("</svg>"));
+    }
+
+    #[test]
+    fn errors_are_a_band_around_the_levels() {
+        let channels = Channels::equal(400.0, 700.0, 3);
+        let bands = |errors: Option<&[f32]>| {
+            let svg = spectrum(&channels, &[1.0, 4.0, 2.0], errors, "p").expect("plot");
+            svg.matches("opacity=\"0.25\"").count()
+        };
+        assert_eq!((bands(None), bands(Some(&[f32::NAN, 0.5, 0.25])), bands(Some(&[0.0; 3]))), (0, 2, 0));
     }
 
     #[test]
@@ -111,7 +138,7 @@ mod tests {
     fn extreme_spectra_are_drawn() {
         let narrow = Channels::from_bounds(vec![[19_999.999, 20_000.0]], None);
         for values in [[0.0], [f32::MAX], [f32::from_bits(1)], [-3.0], [f32::NAN]] {
-            let svg = spectrum(&narrow, &values, "one channel").expect("plot");
+            let svg = spectrum(&narrow, &values, None, "one channel").expect("plot");
             assert!(!svg.contains("NaN") && !svg.contains("inf"), "{values:?}");
         }
         assert_eq!([superscript(-45), superscript(36)], ["⁻⁴⁵", "³⁶"]);

@@ -8,19 +8,28 @@ use crate::{Error, Result};
 
 /// Writes a picture at an exposure of `ev` as 8-bit sRGB, marked as such, replacing `path` in one step.
 pub fn write(path: &Path, picture: &Picture, ev: f64) -> Result<()> {
-    let bytes = encode(picture, ev).map_err(|error| Error::storage(path, format!("cannot be made: {error}")))?;
+    write_srgb8(path, picture.size, &picture.to_srgb8(ev))
+}
+
+/// Writes 8-bit sRGB, three bytes a pixel, as it stands.
+pub fn write_srgb8(path: &Path, size: [u32; 2], rgb: &[u8]) -> Result<()> {
+    let bytes = encode_srgb8(size, rgb).map_err(|error| Error::storage(path, format!("cannot be made: {error}")))?;
     write_atomically(path, &bytes)
 }
 
 /// A picture as the bytes of a PNG file.
 pub fn encode(picture: &Picture, ev: f64) -> std::result::Result<Vec<u8>, png::EncodingError> {
+    encode_srgb8(picture.size, &picture.to_srgb8(ev))
+}
+
+fn encode_srgb8(size: [u32; 2], rgb: &[u8]) -> std::result::Result<Vec<u8>, png::EncodingError> {
     let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, picture.size[0], picture.size[1]);
+    let mut encoder = png::Encoder::new(&mut bytes, size[0], size[1]);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
     let mut writer = encoder.write_header()?;
-    writer.write_image_data(&picture.to_srgb8(ev))?;
+    writer.write_image_data(rgb)?;
     writer.finish()?;
     Ok(bytes)
 }

@@ -1,8 +1,10 @@
-//! Spectra in text files: CSV (`nm,value`, with more columns by name; `nm,n,k`) and `.spd` (`nm value`).
+//! Spectra in files. Here CSV (`nm,value`, with more columns by name; `nm,n,k`) and `.spd` (`nm value`); which of the other
+//! formats a file has is told from its name and its first line.
 
 use std::fmt::{Debug, Write};
 use std::path::Path;
 
+use super::{library, modtran};
 use crate::error::Problem;
 use crate::spectral::Channels;
 
@@ -11,7 +13,7 @@ use crate::spectral::Channels;
 pub struct SpectrumTable {
     pub nm: Vec<f64>,
     pub value: Vec<f64>,
-    /// The 1-based line each value stands on.
+    /// The 1-based line each value stands on; empty where the file has no lines.
     pub line: Vec<usize>,
 }
 
@@ -32,11 +34,31 @@ pub fn spectrum_csv<T: Debug>(channels: &Channels, radiance: &[T], standard_erro
     csv
 }
 
-/// Reads the spectrum of `column` (by name; absent: the only value column) of the file at `path`.
+/// Reads the spectrum of `column` (by name; absent: the only one) of the file at `path`: CSV, `.spd`, an ENVI spectral
+/// library, ECOSTRESS or USGS text, or MODTRAN's tape7. `unit` is that of CSV's first column where its header does not say.
 ///
 /// Errors name the line; without one, the file as a whole could not be read.
-pub fn read_spectrum(path: &Path, column: Option<&str>) -> Result<SpectrumTable, Box<Problem>> {
-    parse_spectrum(&read(path)?, path, column)
+pub fn read_spectrum(path: &Path, column: Option<&str>, unit: Option<Unit>) -> Result<SpectrumTable, Box<Problem>> {
+    let bytes = read(path)?;
+    let other = if library::is_envi(path, &bytes) {
+        library::read_envi(path, column)
+    } else if library::is_ecostress(&bytes) {
+        library::no_columns(path, column).and_then(|()| library::parse_ecostress(&bytes, path))
+    } else if library::is_usgs(&bytes) {
+        library::no_columns(path, column).and_then(|()| library::read_usgs(&bytes, path))
+    } else if modtran::is_tape7(path, &bytes) {
+        modtran::parse(&bytes, path, column)
+    } else {
+        return parse(&bytes, path, column.map_or(Column::Only, Column::Named), unit);
+    };
+    match unit {
+        None => other,
+        Some(_) => {
+            let help = Some("remove `unit`".to_owned());
+            let message = "says by itself in which unit its wavelengths are".to_owned();
+            Err(Box::new(Problem { file: path.to_owned(), message, help, ..Problem::default() }))
+        }
+    }
 }
 
 /// The content of the file at `path`.
@@ -47,14 +69,14 @@ pub(super) fn read(path: &Path) -> Result<Vec<u8>, Box<Problem>> {
     })
 }
 
-/// [`read_spectrum`] on the content of the file; `path` tells `.spd` from CSV and stands in messages.
+/// [`read_spectrum`] on the content of a CSV or `.spd` file, which `path` tells apart; it stands in messages too.
 pub fn parse_spectrum(bytes: &[u8], path: &Path, column: Option<&str>) -> Result<SpectrumTable, Box<Problem>> {
-    parse(bytes, path, column.map_or(Column::Only, Column::Named))
+    parse(bytes, path, column.map_or(Column::Only, Column::Named), None)
 }
 
 /// The columns `n` and `k` of an `nm,n,k` file; without a header, the second and the third of three.
 pub fn parse_index(bytes: &[u8], path: &Path) -> Result<[SpectrumTable; 2], Box<Problem>> {
-    Ok([parse(bytes, path, Column::OfIndex("n"))?, parse(bytes, path, Column::OfIndex("k"))?])
+    Ok([parse(bytes, path, Column::OfIndex("n"), None)?, parse(bytes, path, Column::OfIndex("k"), None)?])
 }
 
 /// Every column beside the wavelength, with the name that the header gives it.
@@ -70,9 +92,9 @@ pub fn parse_columns(bytes: &[u8], path: &Path) -> Result<Vec<(String, SpectrumT
     let names = header.map_or_else(Vec::new, |header| Separator::of(header).split(header));
     if let [_] | [] = names[..] {
         // Says what is wrong.
-        return parse(bytes, path, Column::Only).map(|table| vec![(String::new(), table)]);
+        return parse(bytes, path, Column::Only, None).map(|table| vec![(String::new(), table)]);
     }
-    names[1..].iter().map(|name| Ok(((*name).to_owned(), parse(bytes, path, Column::Named(name))?))).collect()
+    names[1..].iter().map(|name| Ok(((*name).to_owned(), parse(bytes, path, Column::Named(name), None)?))).collect()
 }
 
 /// Which column of a file is wanted.
@@ -85,7 +107,7 @@ enum Column<'a> {
     OfIndex(&'a str),
 }
 
-fn parse(bytes: &[u8], path: &Path, column: Column) -> Result<SpectrumTable, Box<Problem>> {
+fn parse(bytes: &[u8], path: &Path, column: Column, unit: Option<Unit>) -> Result<SpectrumTable, Box<Problem>> {
     // Only comments and names can hold anything but ASCII, so old encodings do no harm.
     let text = String::from_utf8_lossy(bytes);
     let text = text.trim_start_matches('\u{feff}');
@@ -103,7 +125,8 @@ fn parse(bytes: &[u8], path: &Path, column: Column) -> Result<SpectrumTable, Box
     let separator = if is_spd { Separator::Space } else { Separator::of(first) };
     let first_cells = separator.split(first);
     let header = first_cells[0].parse::<f64>().is_err();
-    let layout = reader.layout(first_line, &first_cells, header)?;
+    let mut layout = reader.layout(first_line, &first_cells, header)?;
+    layout.unit = unit.unwrap_or(layout.unit);
     if header {
         lines.next();
     }
@@ -121,18 +144,18 @@ fn parse(bytes: &[u8], path: &Path, column: Column) -> Result<SpectrumTable, Box
 
 /// How the cells of a line are told apart; decided by the first line.
 #[derive(Clone, Copy)]
-enum Separator {
+pub(super) enum Separator {
     Char(char),
     Space,
 }
 
 impl Separator {
-    fn of(line: &str) -> Self {
+    pub fn of(line: &str) -> Self {
         [';', '\t', ','].into_iter().find(|c| line.contains(*c)).map_or(Separator::Space, Separator::Char)
     }
 
     /// At least one cell, without surrounding blanks and quotes.
-    fn split(self, line: &str) -> Vec<&str> {
+    pub fn split(self, line: &str) -> Vec<&str> {
         match self {
             Separator::Char(c) => line.split(c).map(|cell| cell.trim().trim_matches('"').trim()).collect(),
             Separator::Space => line.split_whitespace().collect(),
@@ -140,16 +163,16 @@ impl Separator {
     }
 }
 
-/// Unit of the first column, from its header.
-#[derive(Clone, Copy, PartialEq)]
-enum Unit {
+/// Unit of the first column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Unit {
     Nanometre,
     Micrometre,
     Wavenumber,
 }
 
 impl Unit {
-    fn to_nm(self, x: f64) -> f64 {
+    pub(super) fn to_nm(self, x: f64) -> f64 {
         match self {
             Unit::Nanometre => x,
             Unit::Micrometre => x * 1e3,
@@ -158,7 +181,7 @@ impl Unit {
     }
 
     /// `Err` names a unit that is none of ours.
-    fn from_header(name: &str) -> Result<Self, String> {
+    pub(super) fn from_header(name: &str) -> Result<Self, String> {
         let name = name.to_lowercase();
         if name.contains("cm-1") || name.contains("cm^-1") || name.contains("wavenumber") {
             return Ok(Unit::Wavenumber);
@@ -267,40 +290,52 @@ impl Reader<'_> {
     }
 
     /// The table in ascending order, which its lines must have one way or the other.
-    fn ascending(&self, mut table: SpectrumTable) -> Result<SpectrumTable, Box<Problem>> {
-        if table.nm.len() < 2 {
-            let of = match self.column {
-                Column::OfIndex(name) => format!(" of {name}"),
-                _ => String::new(),
-            };
-            let message = format!("has {} values{of}", table.nm.len());
-            return Err(self.at(None, message, "give at least two wavelengths"));
-        }
-        if let Some(i) = table.nm.iter().position(|nm| !nm.is_finite()) {
-            return Err(self.at(Some(table.line[i]), "the wavelength cannot be represented in nm".to_owned(), ""));
-        }
-        if table.nm.first() > table.nm.last() {
-            table.nm.reverse();
-            table.value.reverse();
-            table.line.reverse();
-        }
-        for i in 1..table.nm.len() {
-            let (before, nm) = (table.nm[i - 1], table.nm[i]);
-            if nm < before {
-                let message = format!("{nm} nm follows {before} nm");
-                return Err(self.at(Some(table.line[i]), message, "sort the lines by wavelength"));
-            }
-            if i >= 2 && nm == table.nm[i - 2] {
-                let message = format!("{nm} nm stands here for the third time");
-                return Err(self.at(
-                    Some(table.line[i]),
-                    message,
-                    "two equal wavelengths make a step; remove the others",
-                ));
-            }
-        }
-        Ok(table)
+    fn ascending(&self, table: SpectrumTable) -> Result<SpectrumTable, Box<Problem>> {
+        let of = match self.column {
+            Column::OfIndex(name) => format!(" of {name}"),
+            _ => String::new(),
+        };
+        ascending(table, self.path, &of)
     }
+}
+
+/// A table in ascending order, which it must have one way or the other; `of` says what of the file at `path` it is.
+pub(super) fn ascending(mut table: SpectrumTable, path: &Path, of: &str) -> Result<SpectrumTable, Box<Problem>> {
+    let wrong = |i: Option<usize>, table: &SpectrumTable, message: String, help: &str| {
+        let line = i.and_then(|i| table.line.get(i).copied());
+        let help = (!help.is_empty()).then(|| help.to_owned());
+        Box::new(Problem { file: path.to_owned(), line, message, help, ..Problem::default() })
+    };
+    if table.nm.len() < 2 {
+        let message = format!("has {} values{of}", table.nm.len());
+        return Err(wrong(None, &table, message, "give at least two wavelengths"));
+    }
+    if let Some(i) = table.nm.iter().position(|nm| !nm.is_finite()) {
+        return Err(wrong(Some(i), &table, "the wavelength cannot be represented in nm".to_owned(), ""));
+    }
+    if table.nm.first() > table.nm.last() {
+        table.nm.reverse();
+        table.value.reverse();
+        table.line.reverse();
+    }
+    for i in 1..table.nm.len() {
+        let (before, nm) = (table.nm[i - 1], table.nm[i]);
+        if nm < before {
+            let message = format!("{nm} nm follows {before} nm");
+            return Err(wrong(Some(i), &table, message, "sort the lines by wavelength"));
+        }
+        if i >= 2 && nm == table.nm[i - 2] {
+            let message = format!("{nm} nm stands here for the third time");
+            let help = "two equal wavelengths make a step; remove the others";
+            return Err(wrong(Some(i), &table, message, help));
+        }
+    }
+    Ok(table)
+}
+
+/// A name in a message, in quotes.
+pub(super) fn named(name: &str) -> String {
+    format!("\"{}\"", name.escape_debug())
 }
 
 #[cfg(test)]

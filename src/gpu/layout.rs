@@ -63,6 +63,8 @@ pub struct Emitter {
 
 /// Bit of [`Emitter::spectrum`].
 pub const EMITS_BOTH_SIDES: u32 = 0x8000_0000;
+/// Bit of [`Emitter::spectrum`], which is then the place among the emitters of the first spectrum of a row over cosines.
+pub const EMITS_BY_ANGLE: u32 = 0x2000_0000;
 
 /// `Material` in WGSL.
 #[repr(C)]

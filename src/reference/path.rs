@@ -93,7 +93,9 @@ impl<'a> Path<'a> {
     /// Starts a path with wavelength coordinate `mu` (Eq. 4 of the method: one for all channels).
     fn begin(&mut self, mu: f64) {
         self.spectra.begin(mu);
-        self.throughput.fill(1.0);
+        for (k, throughput) in self.throughput.iter_mut().enumerate() {
+            *throughput = self.spectra.response(k);
+        }
         self.radiance.fill(0.0);
         self.alive = 0..self.throughput.len();
     }
@@ -383,7 +385,9 @@ impl<'a> Tracer<'a> {
             let object = &self.scene.objects[self.world.primitives[hit.primitive].object];
             cross(&mut interiors, object.interior, goes_inside);
         }
-        let (mut ray, mut pieces) = (Ray { origin, direction: aim.direction }, Vec::new());
+        // From just off the surface to the very target: a parallel line would meet a light seen obliquely too early.
+        let direction = aim.target.map_or(aim.direction, |target| (target - origin).normalize());
+        let (mut ray, mut pieces) = (Ray { origin, direction }, Vec::new());
         loop {
             let left = aim.target.map_or(f64::INFINITY, |target| (target - ray.origin).dot(ray.direction));
             let hit = self.world.closest_hit(&ray).filter(|hit| hit.t < left);
@@ -400,7 +404,7 @@ impl<'a> Tracer<'a> {
             }
             pieces.extend(self.piece(&interiors, ray.origin, ray.origin + hit.t * ray.direction));
             cross(&mut interiors, object.interior, hit.point.normal.dot(ray.direction) < 0.0);
-            ray.origin = self.world.leave(hit.primitive, &hit.point, ray.direction);
+            ray.origin += self.world.beyond(&ray, &hit) * ray.direction;
         }
     }
 
@@ -421,8 +425,9 @@ impl<'a> Tracer<'a> {
                 return Some(hit);
             }
             cross(interiors, object.interior, hit.point.normal.dot(ray.direction) < 0.0);
-            passed += hit.t;
-            ray.origin = self.world.leave(hit.primitive, &hit.point, ray.direction);
+            let beyond = self.world.beyond(&ray, &hit);
+            passed += beyond;
+            ray.origin += beyond * ray.direction;
         }
     }
 
@@ -447,7 +452,7 @@ impl<'a> Tracer<'a> {
                 if !cross(&mut entered, object.interior, inward) {
                     around.extend(object.interior);
                 }
-                ray.origin = self.world.leave(hit.primitive, &hit.point, direction);
+                ray.origin += self.world.beyond(&ray, &hit) * direction;
             }
         }
         around.reverse();

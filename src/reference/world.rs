@@ -105,6 +105,13 @@ impl World {
         point.position + self.primitives[i].offset.copysign(point.normal.dot(towards)) * point.normal
     }
 
+    /// How far along `ray` it is just beyond the surface that it met: on the same line, so that what is aimed at is not
+    /// missed, nor met too early where it is seen obliquely.
+    pub fn beyond(&self, ray: &Ray, hit: &Hit) -> f64 {
+        let cosine = hit.point.normal.dot(ray.direction).abs().max(1e-3);
+        hit.t + self.primitives[hit.primitive].offset / cosine
+    }
+
     /// Calls `test(primitive, t_max)` for every primitive whose leaf the ray enters before t_max, which `test` may
     /// lower; stops as soon as it returns true.
     fn visit(&self, ray: &Ray, mut test: impl FnMut(usize, &mut f64) -> bool) {

@@ -86,6 +86,7 @@ fn render_into(
         tiles: None,
         seed: 3,
         tile: Some(TILE),
+        uncertainty: false,
         stop: StopRule { samples: Some(samples), time: None },
         preview: None,
         profile: false,

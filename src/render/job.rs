@@ -8,11 +8,14 @@ use std::time::Duration;
 use crate::cube::{Existing, Header, epochs_in, whole_epochs};
 use crate::gpu::adapter::Selection;
 use crate::preview::Feed;
+use crate::render::plan;
 use crate::scene::Scene;
 use crate::{Error, Result, files};
 
 /// Samples per pixel where no stop rule says otherwise.
 pub const DEFAULT_SAMPLES: u32 = 64;
+/// The same where standard errors are wanted, which the spread of few epochs tells badly.
+pub const DEFAULT_SAMPLES_WITH_UNCERTAINTY: u32 = 512;
 
 /// When to stop; the first that is reached does, at the end of an epoch of the whole image.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -41,6 +44,8 @@ pub struct Job {
     /// Side of the tiles, if asked for.
     pub tile: Option<u32>,
     pub stop: StopRule,
+    /// Whether the cube has standard errors.
+    pub uncertainty: bool,
     pub preview: Option<Preview>,
     pub profile: bool,
     pub devices: Selection,
@@ -52,8 +57,9 @@ pub struct Job {
 
 impl StopRule {
     /// The samples per pixel at which a render with full epochs of `full` samples stops; `None`: only time does.
-    pub fn samples_limit(&self, full: u32) -> Result<Option<u32>> {
+    pub fn samples_limit(&self, full: u32, uncertainty: bool) -> Result<Option<u32>> {
         let wanted = match self {
+            StopRule { samples: None, time: None } if uncertainty => DEFAULT_SAMPLES_WITH_UNCERTAINTY,
             StopRule { samples: None, time: None } => DEFAULT_SAMPLES,
             StopRule { samples: None, .. } => return Ok(None),
             StopRule { samples: Some(wanted), .. } => *wanted,
@@ -65,6 +71,12 @@ impl StopRule {
 }
 
 impl Job {
+    /// What the cube is, in tiles of this size.
+    pub fn header(&self, tile: [u32; 2]) -> Header {
+        let header = plan::header(&self.scene, tile, self.seed);
+        if self.uncertainty { header.with_uncertainty() } else { header }
+    }
+
     /// The tiles to render, of the cube that `header` describes.
     pub(super) fn tiles(&self, header: &Header) -> Result<Range<u32>> {
         header.validate().map_err(Error::Usage)?;
@@ -95,7 +107,7 @@ mod tests {
 
     #[test]
     fn limits_that_cannot_be_counted_are_refused() {
-        let limit = |samples| StopRule { samples: Some(samples), time: None }.samples_limit(64);
+        let limit = |samples| StopRule { samples: Some(samples), time: None }.samples_limit(64, false);
         assert_eq!(limit(u32::MAX - 63).ok(), Some(Some(u32::MAX - 63)));
         assert!(limit(u32::MAX).unwrap_err().to_string().contains("4294967232"));
     }

@@ -3,6 +3,7 @@
 #[cfg(test)]
 mod fault_tests;
 mod heat;
+pub mod integration;
 pub mod job;
 pub mod lights;
 pub mod media;

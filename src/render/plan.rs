@@ -84,6 +84,14 @@ pub fn feature_lines(prepared: &Prepared, waves: &WavePlan) -> Vec<FeatureLine> 
         line("Russian roulette", f.roulette, "4 bytes a path, a load and a store a bounce".into()),
         line("Owen-scrambled Sobol", !f.independent, "nets in every epoch instead of independent numbers".into()),
         line("wavelength strata", f.strata, format!("tables x {}", 1u64 << prepared.tables.stratum_bits)),
+        line(
+            "responses",
+            prepared.integration.is_some(),
+            match &prepared.integration {
+                Some((integration, _)) => format!("{} strata of wavelength", integration.inner.len()),
+                None => "weights of wavelengths, and sums of channels".into(),
+            },
+        ),
         line("exact spectral knots", f.knots, "a search per lookup and channel".into()),
         line(
             "spectra in registers",
@@ -118,6 +126,11 @@ pub fn feature_lines(prepared: &Prepared, waves: &WavePlan) -> Vec<FeatureLine> 
             "environment map",
             f.general.is_some_and(|g| g.map.is_some()),
             format!("{}, two records a bounce", module(s::MAP)),
+        ),
+        line(
+            "heat that depends on the angle",
+            f.general.is_some_and(|g| g.hot),
+            "256 spectra for each hot material that is not diffuse".into(),
         ),
         line(
             "media",

@@ -284,8 +284,10 @@ impl Pool {
         let began = Instant::now();
         oldest.note(counters, epoch, || self.bad_sample(collected));
         let (n_before, samples) = (samples_before(epoch, self.full_epoch), epoch_samples(epoch, self.full_epoch));
-        let unit_len = collected.means.len() / collected.units.len();
-        let units = collected.means.chunks(unit_len);
+        // With responses the device has rendered parts of the channels.
+        let sums = self.prepared.integration.as_ref().map(|(integration, _)| integration.sums(collected.means));
+        let means: &[f32] = sums.as_deref().unwrap_or(collected.means);
+        let units = means.chunks(means.len() / collected.units.len());
         if oldest.group.epochs > 1 {
             // The same arithmetic as in the cube, but nothing is written before the last of these epochs.
             if oldest.means.is_empty() {

@@ -2,11 +2,13 @@
 
 use crate::accel::{Accel, MAX_MATERIALS};
 use crate::gpu::layout::{
-    EMITS_BOTH_SIDES, EMITTER_IS_LAMP, Emitter, Frame, LAMP_DIRECTIONAL, LAMP_POINT, LAMP_SUN, Lamp, Material, NONE,
+    EMITS_BOTH_SIDES, EMITS_BY_ANGLE, EMITTER_IS_LAMP, Emitter, Frame, LAMP_DIRECTIONAL, LAMP_POINT, LAMP_SUN, Lamp,
+    Material, NONE,
 };
 use crate::gpu::self_test::LOOP_LIMIT;
 use crate::gpu::shader::{self, Defines, Module};
 use crate::render::heat;
+use crate::render::integration::Integration;
 use crate::render::lights::{LightPicks, STEPS, light_picks};
 use crate::render::media::Media;
 use crate::render::sky::SkyMap;
@@ -15,7 +17,7 @@ use crate::scene::{
     Attributes, Bsdf, Environment, Filter, Light, Projection, Reflectance, Sampler, Scene, Sides, Texels,
 };
 use crate::spectral::Curve;
-use crate::spectral::table::{Exactness, SpectralTables};
+use crate::spectral::table::{Exactness, SpectralTables, Tabulated};
 use crate::{Error, Result};
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -75,6 +77,8 @@ pub struct General {
     /// Lights without a surface, and how many of them are suns.
     pub lamps: bool,
     pub suns: u32,
+    /// Surfaces that emit by angle.
+    pub hot: bool,
     pub map: Option<Map>,
     pub media: Option<MediaShape>,
 }
@@ -147,14 +151,29 @@ pub struct Prepared {
     /// Spectra that multiply throughput, and spectra that emit; the constant 1 apart.
     pub factors: usize,
     pub sources: usize,
+    /// That the device renders: with responses these are not the scene's.
     pub channels: usize,
+    /// How the scene's channels are made of those, and the device id of the weights; `None` where they are the same.
+    pub integration: Option<(Integration, u32)>,
 }
 
 impl Prepared {
     /// Flattens `scene`. Errors: materials that no shader knows; more materials, spectra or bounces than ids and
     /// counters have bits for.
     pub fn new(scene: &Scene, seed: u64) -> Result<Prepared> {
-        let scene = &*heat::as_emission(scene)?;
+        match Integration::of(&scene.channels) {
+            None => Prepared::flatten(scene, seed, None),
+            Some(integration) => {
+                let inner = Scene { channels: integration.inner.clone(), ..scene.clone() };
+                Prepared::flatten(&inner, seed, Some(integration))
+            }
+        }
+    }
+
+    /// `scene` in the channels that the device renders.
+    fn flatten(scene: &Scene, seed: u64, integration: Option<Integration>) -> Result<Prepared> {
+        let heat = heat::as_emission(scene)?;
+        let scene = &*heat.scene;
         let accel = Accel::build(scene);
         if scene.materials.len() > MAX_MATERIALS {
             return Err(Error::input(&scene.file, format!("more than {MAX_MATERIALS} materials")));
@@ -166,7 +185,8 @@ impl Prepared {
             || !scene.textures.is_empty()
             || !scene.lights.is_empty()
             || sky.is_some()
-            || !scene.media.is_empty();
+            || !scene.media.is_empty()
+            || !heat.by_angle.is_empty();
         let mut media = Media::new(scene, &accel)?;
         let mut surfaces = general.then(|| Surfaces::new(scene));
         let axis = surfaces.as_mut().zip(sky.as_ref()).map(|(surfaces, sky)| {
@@ -181,7 +201,8 @@ impl Prepared {
         if let (Some(surfaces), Some(media)) = (&mut surfaces, &mut media) {
             surfaces.spectra.append(&mut media.spectra);
         }
-        let (tables, ids) = spectral_tables(scene, surfaces.as_ref().map_or(&[], |s| &s.spectra))?;
+        let weights = integration.as_ref().map(|integration| integration.weights.as_slice());
+        let (tables, ids) = spectral_tables(scene, &heat, surfaces.as_ref().map_or(&[], |s| &s.spectra), weights)?;
         if let Some(surfaces) = &mut surfaces {
             surfaces.name_spectra(|position| tables.ids[ids.needed[position]]);
         }
@@ -207,6 +228,10 @@ impl Prepared {
             source: scene.environment.as_ref().and_then(daylight).map_or(0, source),
         });
         let (lamps, lamp_emitters) = lamps(scene, &accel, &picks, source);
+        // Behind all that can be chosen: the spectra of what emits by angle.
+        let first_row = accel.emitters.len() + lamp_emitters.len();
+        let rows = heat.by_angle.iter().flatten().flatten();
+        let rows = rows.map(|&spectrum| Emitter { primitive: source(spectrum), ..Emitter::default() });
         let emitters = accel
             .emitters
             .iter()
@@ -214,14 +239,20 @@ impl Prepared {
             .map(|(&(primitive, object, area), &pick)| {
                 let emission = scene.objects[object].emission.as_ref().expect("emitters come from emitting objects");
                 let sides = if emission.sides == Sides::Both { EMITS_BOTH_SIDES } else { 0 };
-                Emitter { primitive, spectrum: source(emission.radiance) | sides, pick: pick as f32, area: area as f32 }
+                let spectrum = match heat.groups[object] {
+                    None => source(emission.radiance),
+                    Some(group) => (first_row + 2 * group * heat::COSINES) as u32 | EMITS_BY_ANGLE,
+                };
+                Emitter { primitive, spectrum: spectrum | sides, pick: pick as f32, area: area as f32 }
             })
             .chain(lamp_emitters)
+            .chain(rows)
             .collect();
         let environment_spectrum = scene.environment.as_ref().and_then(|e| e.uniform()).map_or(0, source);
         let mut features = features(scene, &accel, &tables, ids.factors.len() + ids.sources.len());
         let suns = scene.lights.iter().filter(|light| matches!(light, Light::Sun { .. })).count() as u32;
         let of = |surfaces: &Surfaces| General {
+            hot: !heat.by_angle.is_empty(),
             lamps: !lamps.is_empty(),
             suns,
             map,
@@ -229,7 +260,7 @@ impl Prepared {
             ..General::of(surfaces, scene)
         };
         features.general = surfaces.as_ref().map(of);
-        features.registers &= !general;
+        features.registers &= !general && integration.is_none();
         let frame = frame(scene, seed, &accel, &picks, environment_spectrum, tables.stratum_bits);
         let max_records = max_records(&frame, features, surfaces.as_ref(), media.as_ref());
         if max_records >= MAX_RECORDS {
@@ -254,6 +285,7 @@ impl Prepared {
             factors: ids.factors.len(),
             sources: ids.sources.len(),
             channels: scene.channels.len(),
+            integration: integration.map(|integration| (integration, tables.ids[ids.response])),
             accel,
             tables,
         };
@@ -388,6 +420,9 @@ impl Prepared {
         let rough_glass = has(&[Kind::RoughBoundary]);
         d.set("GENERAL", true).set("ANISOTROPIC", general.anisotropic).set("DISPERSION", general.dispersion);
         d.constant("STATE_WORDS", self.state_bytes() / 16);
+        if general.hot {
+            d.set("HOT", true).constant("HOT_COSINES", heat::COSINES as u32);
+        }
         for (name, kinds) in [
             ("MIRRORS", &[Kind::Conductor, Kind::Mirror, Kind::Refraction][..]),
             ("MICROFACETS", &[Kind::RoughConductor, Kind::RoughCoat, Kind::RoughBoundary]),
@@ -479,6 +514,9 @@ impl Prepared {
         d.set("FACTORS", self.factors as u32).set("SOURCES", self.sources as u32);
         d.set("WORKGROUP", shape.lanes * shape.pixels);
         d.constant("FIRST_SOURCE", 1 + self.factors as u32);
+        if let Some((_, weights)) = &self.integration {
+            d.set("RESPONSES", true).constant("RESPONSE", *weights);
+        }
         self.spectra_defines(&mut d);
         d.constant("LANES", shape.lanes);
         d.constant("VECTORS", shape.vectors);
@@ -550,6 +588,8 @@ struct SpectrumIds {
     sources: std::collections::BTreeMap<usize, usize>,
     /// Of each that materials of general scenes need.
     needed: Vec<usize>,
+    /// That of the weights of responses, where there are any.
+    response: usize,
     names: Vec<String>,
 }
 
@@ -588,8 +628,13 @@ fn daylight(environment: &Environment) -> Option<usize> {
     }
 }
 
-/// Tables of the constant 1, of what multiplies throughput, then of what emits.
-fn spectral_tables(scene: &Scene, needed: &[Needed]) -> Result<(SpectralTables, SpectrumIds)> {
+/// Tables of the constant 1, of what multiplies throughput, then of what emits; the weights of responses, per channel, last.
+fn spectral_tables(
+    scene: &Scene,
+    heat: &heat::Heat,
+    needed: &[Needed],
+    weights: Option<&[Curve]>,
+) -> Result<(SpectralTables, SpectrumIds)> {
     // General scenes have all of theirs among those needed.
     let plain = if needed.is_empty() { &scene.materials[..] } else { &[] };
     let factors = plain.iter().filter_map(|m| match m.bsdf {
@@ -599,6 +644,7 @@ fn spectral_tables(scene: &Scene, needed: &[Needed]) -> Result<(SpectralTables, 
     let sources = scene.objects.iter().filter_map(|o| o.emission.as_ref().map(|e| e.radiance));
     let sources = sources.chain(scene.environment.as_ref().and_then(|e| e.uniform().or(daylight(e))));
     let sources = sources.chain(scene.lights.iter().map(|light| light.spectrum()));
+    let sources = sources.chain(heat.by_angle.iter().flatten().flatten().copied());
     let mut curves = vec![&Curve::Constant(1.0)];
     let mut names = vec!["1".to_owned()];
     let mut number = |list: std::collections::BTreeSet<usize>| -> std::collections::BTreeMap<usize, usize> {
@@ -630,6 +676,12 @@ fn spectral_tables(scene: &Scene, needed: &[Needed]) -> Result<(SpectralTables, 
         names.push(name.clone());
     }
     let needed = (first..curves.len()).collect();
+    let mut curves: Vec<Tabulated> = curves.into_iter().map(Tabulated::Same).collect();
+    let response = curves.len();
+    if let Some(weights) = weights {
+        curves.push(Tabulated::PerChannel(weights));
+        names.push("responses".to_owned());
+    }
     if curves.len() > MAX_SPECTRA {
         return Err(Error::input(
             &scene.file,
@@ -638,7 +690,7 @@ fn spectral_tables(scene: &Scene, needed: &[Needed]) -> Result<(SpectralTables, 
     }
     Ok((
         SpectralTables::with_exactness(&curves, &exactness, &scene.channels),
-        SpectrumIds { factors, sources, needed, names },
+        SpectrumIds { factors, sources, needed, response, names },
     ))
 }
 

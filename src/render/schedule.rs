@@ -87,9 +87,9 @@ pub struct Summary {
 pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event) -> Result<()>) -> Result<Summary> {
     let started = Instant::now();
     plan::check(&job.scene)?;
-    let samples_limit = job.stop.samples_limit(job.scene.integrator.epoch)?;
+    let samples_limit = job.stop.samples_limit(job.scene.integrator.epoch, job.uncertainty)?;
     let tile = plan::tile_size(&job.scene, job.tile);
-    let header = plan::header(&job.scene, tile, job.seed);
+    let header = job.header(tile);
     let tiles = job.tiles(&header)?;
     check_target(&job.output, &header, job.existing, &tiles)?;
     if let Some(preview) = &job.preview {

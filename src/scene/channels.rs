@@ -2,7 +2,9 @@
 
 use super::decode::{Fields, Item, Keys};
 use super::overrides::CHANNEL_KINDS;
-use crate::spectral::Channels;
+use super::spectrum::report_in_file;
+use crate::format::response::{self, Responses};
+use crate::spectral::{Channels, Response};
 
 /// The most channels a cube may have; far beyond the 5,000 that are meant to be used.
 const MAX_CHANNELS: u32 = 65_536;
@@ -10,12 +12,20 @@ const MAX_CHANNELS: u32 = 65_536;
 const MAX_NM: f64 = 1e6;
 const WAVELENGTHS: &str = "greater than 0 and at most 1000000 (nm)";
 
-const KEYS: Keys = Keys::new(&["equal", "wavenumber", "intervals", "false_colour"]).later(&["responses"]);
+const KEYS: Keys = Keys::new(&["equal", "wavenumber", "intervals", "responses", "false_colour"]);
 const RANGE: Keys = Keys::new(&["from", "to", "count"]);
 
 pub fn decode(item: &Item) -> Option<Channels> {
     let fields = item.table(KEYS)?;
     let kind = fields.exactly_one(&CHANNEL_KINDS, "kind of channels");
+    if let Some(kind) = kind.as_ref().filter(|kind| kind.path == "channels.responses") {
+        let named = responses(kind);
+        let false_colour = match fields.get("false_colour") {
+            Some(item) => Some(self::false_colour(&item, named.as_ref().map(Vec::len))?),
+            None => None,
+        };
+        return Some(Channels::from_responses(named?, false_colour));
+    }
     let bounds = kind.as_ref().and_then(|kind| match kind.path.as_str() {
         "channels.equal" => equal(kind),
         "channels.wavenumber" => wavenumber(kind),
@@ -28,6 +38,22 @@ pub fn decode(item: &Item) -> Option<Channels> {
         None => None,
     };
     Some(Channels::from_bounds(bounds?, false_colour))
+}
+
+/// The responses in the file that `item` names.
+fn responses(item: &Item) -> Option<Vec<(String, Response)>> {
+    let path = item.cx.path(item.text()?);
+    let Responses { named, warning } =
+        response::read_responses(&path).map_err(|problem| report_in_file(item, *problem)).ok()?;
+    if let Some((name, response)) = named.iter().find(|(_, response)| response.support()[1] > MAX_NM) {
+        let message = format!("the response of the channel \"{name}\" reaches {} nm", response.support()[1]);
+        item.error_help(message, format!("wavelengths must be {WAVELENGTHS}"));
+        return None;
+    }
+    if let Some(warning) = warning {
+        item.cx.warn(warning);
+    }
+    Some(named)
 }
 
 fn wavelength(item: &Item) -> Option<f64> {

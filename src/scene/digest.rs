@@ -211,6 +211,8 @@ impl Hash {
 
         self.count(scene.channels.len());
         self.numbers(scene.channels.bounds.iter().flatten());
+        // Nothing without responses, so that other scenes keep their digests.
+        scene.channels.responses.iter().for_each(|response| self.curve(response.curve()));
         match scene.channels.false_colour {
             None => self.tag(0),
             Some(channels) => {

@@ -11,7 +11,7 @@ use super::tree::{Origin, Value};
 use super::{Spectrum, SpectrumId};
 use crate::error::Problem;
 use crate::format::refractive::{self, Index};
-use crate::format::text::{self, SpectrumTable};
+use crate::format::text::{self, SpectrumTable, Unit};
 use crate::spectral::{Channels, Curve, Outside, upsample};
 
 /// Wavelengths, in nm, far beyond any channel, between which a curve's peak is looked for.
@@ -141,7 +141,7 @@ pub struct Spectra<'a> {
 }
 
 const KEYS: Keys =
-    Keys::new(&["file", "constant", "blackbody", "samples", "regular", "rgb", "column", "scale", "outside"]);
+    Keys::new(&["file", "constant", "blackbody", "samples", "regular", "rgb", "column", "unit", "scale", "outside"]);
 
 impl<'a> Spectra<'a> {
     /// Decodes `[spectra]`. `channels` decide what a table leaves uncovered.
@@ -450,16 +450,18 @@ fn source<'a>(item: &Item<'a>) -> Option<Source<'a>> {
     };
     let kind = kind?;
     let data = match kind.path.rsplit('.').next() {
-        Some("file") => file(&kind, fields.get("column")),
+        Some("file") => file(&kind, fields.get("column"), fields.get("unit")),
         Some("constant") => kind.number().map(Data::Constant),
         Some("blackbody") => kind.positive().map(Data::Blackbody),
         Some("samples") => samples(&kind),
         Some("regular") => regular(&kind),
         _ => kind.numbers::<3>("three numbers [r, g, b]").map(Data::Rgb),
     }?;
-    if let (Some(column), false) = (fields.get("column"), fields.has("file")) {
-        column.error_help("goes with `file` only", "remove it");
-        return None;
+    for key in ["column", "unit"] {
+        if let (Some(item), false) = (fields.get(key), fields.has("file")) {
+            item.error_help("goes with `file` only", "remove it");
+            return None;
+        }
     }
     if outside.is_some() && matches!(data, Data::Constant(_) | Data::Blackbody(_)) {
         item.cx.warn(format!("`{}.outside` has no effect: the spectrum is not a table", item.path));
@@ -467,16 +469,25 @@ fn source<'a>(item: &Item<'a>) -> Option<Source<'a>> {
     Some(Source { data, scale: scale?, outside, path: kind.path, at: kind.at })
 }
 
-fn file(item: &Item, column: Option<Item>) -> Option<Data> {
+fn file(item: &Item, column: Option<Item>, unit: Option<Item>) -> Option<Data> {
     let path = item.cx.path(item.text()?);
     let column = match &column {
         Some(column) => Some(column.text()?),
         None => None,
     };
+    const UNITS: [(&str, Unit); 3] = [("nm", Unit::Nanometre), ("um", Unit::Micrometre), ("cm-1", Unit::Wavenumber)];
+    let unit_of_x = match &unit {
+        Some(unit) => Some(unit.choice(&UNITS)?),
+        None => None,
+    };
     if refractive::is_yaml(&path) {
+        if let Some(unit) = unit {
+            unit.error_help("goes with tables only", "remove it: these files are in um");
+            return None;
+        }
         return index_file(item, path, column);
     }
-    match text::read_spectrum(&path, column) {
+    match text::read_spectrum(&path, column, unit_of_x) {
         Ok(table) => Some(table_data(table, path)),
         Err(problem) => {
             report_in_file(item, *problem);
@@ -510,7 +521,8 @@ fn column_kelvin(name: &str) -> Option<f64> {
 }
 
 fn table_data(table: SpectrumTable, file: PathBuf) -> Data {
-    Data::Table { nm: table.nm, value: table.value, lines: Some((file, table.line)) }
+    let lines = (!table.line.is_empty()).then_some((file, table.line));
+    Data::Table { nm: table.nm, value: table.value, lines }
 }
 
 /// A mistake in a file that `item` names: at its line there, or, if the file as a whole is wrong, at the item.

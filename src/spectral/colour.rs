@@ -5,8 +5,8 @@
 
 use std::sync::OnceLock;
 
-use super::data::{CIE1931, columns};
-use super::{Channels, Curve, Outside};
+use super::data::{self, columns};
+use super::{Channels, Curve, Outside, Response};
 
 /// CIE XYZ (D65 white, Y = 1) to linear sRGB, from the primaries and the white point of IEC 61966-2-1.
 pub const XYZ_TO_LINEAR_SRGB: [[f64; 3]; 3] = [
@@ -18,22 +18,61 @@ pub const XYZ_TO_LINEAR_SRGB: [[f64; 3]; 3] = [
 /// Share of each of ∫x̄, ∫ȳ and ∫z̄ that the channels must cover for XYZ to stand for what an eye would see.
 const VISIBLE_SHARE: f64 = 0.95;
 
-/// The colour matching functions x̄, ȳ, z̄ of the CIE 1931 2° standard observer over nm; zero outside 360–830 nm.
-pub fn cie1931() -> &'static [Curve; 3] {
-    static OBSERVER: OnceLock<[Curve; 3]> = OnceLock::new();
-    OBSERVER.get_or_init(|| {
-        let rows: Vec<[f64; 4]> = columns(CIE1931).collect();
-        std::array::from_fn(|i| Curve::Linear {
-            nm: rows.iter().map(|row| row[0]).collect(),
-            value: rows.iter().map(|row| row[i + 1]).collect(),
-            outside: Outside::Zero,
-        })
-    })
+/// Whose colour matching functions.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Observer {
+    /// CIE 1931, 2°
+    #[default]
+    #[value(name = "1931")]
+    Cie1931,
+    /// CIE 1964, 10°
+    #[value(name = "1964")]
+    Cie1964,
+    /// CIE 2015, 2°
+    #[value(name = "2015")]
+    Cie2015,
 }
 
-/// ∫x̄ dλ, ∫ȳ dλ and ∫z̄ dλ over all wavelengths, in nm.
-fn observer_integrals() -> [f64; 3] {
-    cie1931().each_ref().map(|curve| curve.mean(300.0, 900.0) * 600.0)
+impl Observer {
+    pub fn name(self) -> &'static str {
+        match self {
+            Observer::Cie1931 => "CIE 1931",
+            Observer::Cie1964 => "CIE 1964",
+            Observer::Cie2015 => "CIE 2015",
+        }
+    }
+
+    /// x̄, ȳ, z̄ over nm; zero outside their table, which ends at 830 nm.
+    pub fn curves(self) -> &'static [Curve; 3] {
+        static OBSERVERS: [OnceLock<[Curve; 3]>; 3] = [const { OnceLock::new() }; 3];
+        let table = match self {
+            Observer::Cie1931 => data::CIE1931,
+            Observer::Cie1964 => data::CIE1964,
+            Observer::Cie2015 => data::CIE2015,
+        };
+        OBSERVERS[self as usize].get_or_init(|| {
+            let rows: Vec<[f64; 4]> = columns(table).collect();
+            std::array::from_fn(|i| Curve::Linear {
+                nm: rows.iter().map(|row| row[0]).collect(),
+                value: rows.iter().map(|row| row[i + 1]).collect(),
+                outside: Outside::Zero,
+            })
+        })
+    }
+
+    /// ∫x̄ dλ, ∫ȳ dλ and ∫z̄ dλ over all wavelengths, in nm.
+    fn integrals(self) -> [f64; 3] {
+        self.curves().each_ref().map(|curve| curve.mean(300.0, 900.0) * 600.0)
+    }
+
+    /// X, Y and Z as channels whose responses are x̄, ȳ and z̄.
+    pub fn channels(self) -> Channels {
+        let named = ["X", "Y", "Z"].into_iter().zip(self.curves()).filter_map(|(name, curve)| match curve {
+            Curve::Linear { nm, value, .. } => Some((name.to_owned(), Response::new(nm.clone(), value.clone()).ok()?)),
+            _ => None,
+        });
+        Channels::from_responses(named.collect(), None)
+    }
 }
 
 /// Per channel, what 1 W m⁻² sr⁻¹ nm⁻¹ in it adds to X, Y and Z: ∫ x̄/n dλ over the channel, divided by ∫ȳ dλ, where
@@ -41,9 +80,9 @@ fn observer_integrals() -> [f64; 3] {
 ///
 /// So radiance that is constant within each channel is integrated exactly, whatever their widths, gaps count nothing,
 /// and where channels overlap their mean counts; a constant 1 over the whole visible has Y = 1.
-pub fn xyz_weights(channels: &Channels) -> Vec<[f64; 3]> {
-    let running = RunningIntegral::new(channels);
-    let luminous = observer_integrals()[1];
+pub fn xyz_weights(channels: &Channels, observer: Observer) -> Vec<[f64; 3]> {
+    let running = RunningIntegral::new(channels, observer.curves());
+    let luminous = observer.integrals()[1];
     let weight = |from, to| {
         let (a, b) = (running.at(from), running.at(to));
         std::array::from_fn(|i| (b[i] - a[i]) / luminous)
@@ -51,24 +90,24 @@ pub fn xyz_weights(channels: &Channels) -> Vec<[f64; 3]> {
     channels.bounds.iter().map(|&[from, to]| weight(from, to)).collect()
 }
 
-/// ∫ x̄/n, ∫ ȳ/n and ∫ z̄/n from the lowest channel bound up to each bound. A running integral costs one sort where
-/// going through each channel's overlaps would cost K².
-struct RunningIntegral {
+/// ∫ R/n of some curves R from the lowest channel bound up to each bound, n(λ) the number of channels that cover λ. A
+/// running integral costs one sort where going through each channel's overlaps would cost K².
+pub(crate) struct RunningIntegral<const N: usize> {
     nm: Vec<f64>,
-    value: Vec<[f64; 3]>,
+    value: Vec<[f64; N]>,
 }
 
-impl RunningIntegral {
-    fn new(channels: &Channels) -> Self {
+impl<const N: usize> RunningIntegral<N> {
+    pub fn new(channels: &Channels, curves: &[Curve; N]) -> Self {
         let mut ends: Vec<(f64, i64)> = channels.bounds.iter().flat_map(|b| [(b[0], 1), (b[1], -1)]).collect();
         ends.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let (mut nm, mut value) = (vec![ends[0].0], vec![[0.0; 3]]);
-        let (mut covering, mut sum) = (0, [0.0; 3]);
+        let (mut nm, mut value) = (vec![ends[0].0], vec![[0.0; N]]);
+        let (mut covering, mut sum) = (0, [0.0; N]);
         for (end, step) in ends {
             let from = nm[nm.len() - 1];
             if end > from {
                 if covering > 0 {
-                    for (sum, curve) in sum.iter_mut().zip(cie1931()) {
+                    for (sum, curve) in sum.iter_mut().zip(curves) {
                         *sum += curve.mean(from, end) * (end - from) / covering as f64;
                     }
                 }
@@ -81,7 +120,7 @@ impl RunningIntegral {
     }
 
     /// The integral up to `nm`, which is a bound of some channel.
-    fn at(&self, nm: f64) -> [f64; 3] {
+    pub fn at(&self, nm: f64) -> [f64; N] {
         self.value[self.nm.partition_point(|&x| x < nm)]
     }
 }
@@ -113,14 +152,23 @@ impl Projection {
         if let Some(rgb) = channels.false_colour {
             return Self::false_colour(rgb);
         }
-        let xyz = xyz_weights(channels);
-        if covers_the_visible(&xyz) {
-            return Self::xyz(&xyz);
+        if let Some(xyz) = Self::as_seen(channels, Observer::default()) {
+            return xyz;
         }
         let mut order: Vec<usize> = (0..channels.len()).collect();
         order.sort_by(|&a, &b| channels.centre(a).total_cmp(&channels.centre(b)));
         let last = order.len() - 1;
         Self::false_colour([order[0], order[last / 2], order[last]])
+    }
+
+    /// Linear sRGB of what `observer` would see; `None` where the channels do not cover the visible, or are responses: those
+    /// do not tell which wavelengths the light has.
+    pub fn as_seen(channels: &Channels, observer: Observer) -> Option<Self> {
+        if !channels.responses.is_empty() {
+            return None;
+        }
+        let xyz = xyz_weights(channels, observer);
+        covers_the_visible(&xyz, observer).then(|| Self::xyz(&xyz))
     }
 
     fn xyz(xyz: &[[f64; 3]]) -> Self {
@@ -133,7 +181,8 @@ impl Projection {
         Projection { kind: ProjectionKind::Xyz, weights }
     }
 
-    fn false_colour(rgb: [usize; 3]) -> Self {
+    /// The radiance of three channels as red, green and blue.
+    pub fn false_colour(rgb: [usize; 3]) -> Self {
         let mut weights: Vec<(usize, [f64; 3])> = Vec::new();
         for (i, k) in rgb.into_iter().enumerate() {
             match weights.iter_mut().find(|w| w.0 == k) {
@@ -158,8 +207,8 @@ impl Projection {
 }
 
 /// Whether XYZ from channels of these weights shows what an eye would see (see [`Projection::new`]).
-fn covers_the_visible(xyz: &[[f64; 3]]) -> bool {
-    let integrals = observer_integrals();
+fn covers_the_visible(xyz: &[[f64; 3]], observer: Observer) -> bool {
+    let integrals = observer.integrals();
     let taking_part = xyz.iter().filter(|weight| weight[1] > 0.0).count();
     let covered = |i: usize| xyz.iter().map(|weight| weight[i]).sum::<f64>() * integrals[1] / integrals[i];
     taking_part >= 3 && (0..3).all(|i| covered(i) >= VISIBLE_SHARE)
@@ -178,6 +227,29 @@ pub fn srgb_encode(linear: f64) -> f64 {
 /// The inverse of [`srgb_encode`].
 pub fn srgb_decode(encoded: f64) -> f64 {
     if encoded <= 0.040_45 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
+}
+
+/// 8-bit sRGB of one quantity: a colour map that is perceptually uniform (inferno, by N. Smith and S. van der Walt) from the
+/// first to the second number of `range`. What lies beyond its ends has their colours, what is not rendered yet is black.
+pub fn map_srgb8(values: &[f32], range: [f64; 2]) -> Vec<u8> {
+    let [low, high] = range;
+    let colour = |value: f64| match (value - low) / (high - low) {
+        _ if value.is_nan() => [0, 0, 0],
+        // A range of no width: all is at its upper end, or below.
+        t if t.is_nan() => colorous::INFERNO.eval_continuous(1.0).as_array(),
+        t => colorous::INFERNO.eval_continuous(t.clamp(0.0, 1.0)).as_array(),
+    };
+    values.iter().flat_map(|&value| colour(f64::from(value))).collect()
+}
+
+/// The 1st and the 99th percentile of what is finite; 0 and 1 where nothing is.
+pub fn percentiles(values: &[f32]) -> [f64; 2] {
+    let mut finite: Vec<f32> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    if finite.is_empty() {
+        return [0.0, 1.0];
+    }
+    let last = finite.len() - 1;
+    [last / 100, last * 99 / 100].map(|rank| f64::from(*finite.select_nth_unstable_by(rank, f32::total_cmp).1))
 }
 
 /// A linear picture: rows from the top, R, G, B interleaved; NaN where nothing is rendered yet.
@@ -226,9 +298,51 @@ mod tests {
     /// Known sums of the 1 nm table: ∫x̄ = 106.865, ∫ȳ = 106.857, ∫z̄ = 106.892 nm.
     #[test]
     fn observer_has_its_published_sums() {
-        for (got, expected) in observer_integrals().into_iter().zip([106.865, 106.857, 106.892]) {
+        for (got, expected) in Observer::Cie1931.integrals().into_iter().zip([106.865, 106.857, 106.892]) {
             assert!((got - expected).abs() < 1e-3, "{got} {expected}");
         }
+    }
+
+    /// The white point of D65 is published for both classical observers: (0.31272, 0.32903) for 2°, (0.31382, 0.33100) for
+    /// 10° (ISO/CIE 11664-2, from the 1 nm tables; a table of 5 nm differs in the fifth digit).
+    #[test]
+    fn observers_see_daylight_where_the_cie_says() {
+        let (nm, value) = columns::<2>(super::super::data::D65).map(|[nm, value]| (nm, value)).unzip();
+        let curve = Curve::Linear { nm, value, outside: Outside::Zero };
+        let channels = Channels::equal(360.0, 780.0, 420);
+        for (observer, x, y) in [(Observer::Cie1931, 0.31272, 0.32903), (Observer::Cie1964, 0.31382, 0.33100)] {
+            let xyz = xyz_weights(&channels, observer).iter().enumerate().fold([0.0; 3], |s, (k, w)| {
+                let radiance = curve.mean(360.0 + k as f64, 361.0 + k as f64);
+                std::array::from_fn(|i| s[i] + w[i] * radiance)
+            });
+            let total: f64 = xyz.iter().sum();
+            assert!((xyz[0] / total - x).abs() < 5e-5 && (xyz[1] / total - y).abs() < 5e-5, "{observer:?} {xyz:?}");
+        }
+        // Equal energy is white for the observer of 2015 by construction.
+        let [x, y, z] = Observer::Cie2015.integrals();
+        assert!((x / y - 1.0).abs() < 2e-4 && (z / y - 1.0).abs() < 2e-4, "{x} {y} {z}");
+    }
+
+    #[test]
+    fn observers_are_channels_too() {
+        let channels = Observer::Cie1964.channels();
+        assert_eq!(channels.names, ["X", "Y", "Z"]);
+        for k in 0..3 {
+            assert!((channels.integral(k) / Observer::Cie1964.integrals()[k] - 1.0).abs() < 1e-12);
+        }
+        assert_eq!(Projection::as_seen(&channels, Observer::Cie1964), None);
+    }
+
+    #[test]
+    fn maps_run_from_dark_to_bright_between_their_ends() {
+        assert_eq!(percentiles(&[f32::NAN, f32::INFINITY]), [0.0, 1.0]);
+        let ramp: Vec<f32> = (0..=200).map(|i| i as f32).chain([f32::NAN]).collect();
+        assert_eq!(percentiles(&ramp), [2.0, 198.0]);
+        let bytes = map_srgb8(&[f32::NAN, 1.0, 2.0, 3.0, 4.0, 5.0], [2.0, 4.0]);
+        let light = |i: usize| bytes[3 * i..3 * i + 3].iter().map(|&b| u32::from(b)).sum::<u32>();
+        assert_eq!((light(0), light(1), light(4)), (0, light(2), light(5)));
+        assert!(light(2) < light(3) && light(3) < light(4));
+        assert_eq!(map_srgb8(&[7.0], [7.0, 7.0]), map_srgb8(&[9.0], [1.0, 7.0]));
     }
 
     /// The matrix from the primaries' chromaticities and white (0.3127, 0.3290), independently of its digits above.
@@ -250,7 +364,7 @@ mod tests {
         let uneven = channels(&[[700.0, 830.0], [360.0, 361.3], [361.3, 555.55], [555.55, 700.0]]);
         let fine = Channels::equal(360.0, 830.0, 997);
         for c in [whole, uneven, fine] {
-            let total = sum(&xyz_weights(&c));
+            let total = sum(&xyz_weights(&c, Observer::Cie1931));
             assert!((total[1] - 1.0).abs() < 1e-12, "{total:?}");
             assert!((total[0] - 106.865 / 106.857).abs() < 1e-5 && (total[2] - 106.892 / 106.857).abs() < 1e-5);
         }
@@ -258,16 +372,19 @@ mod tests {
 
     #[test]
     fn overlaps_share_and_gaps_count_nothing() {
-        let plain = xyz_weights(&channels(&[[400.0, 500.0], [500.0, 600.0], [600.0, 700.0]]));
-        let twice = xyz_weights(&channels(&[[400.0, 500.0], [500.0, 600.0], [500.0, 600.0], [600.0, 700.0]]));
+        let plain = xyz_weights(&channels(&[[400.0, 500.0], [500.0, 600.0], [600.0, 700.0]]), Observer::Cie1931);
+        let twice = xyz_weights(
+            &channels(&[[400.0, 500.0], [500.0, 600.0], [500.0, 600.0], [600.0, 700.0]]),
+            Observer::Cie1931,
+        );
         for i in 0..3 {
             assert!((twice[1][i] - 0.5 * plain[1][i]).abs() < 1e-14 && twice[1] == twice[2]);
         }
-        let partly = xyz_weights(&channels(&[[400.0, 600.0], [500.0, 700.0]]));
+        let partly = xyz_weights(&channels(&[[400.0, 600.0], [500.0, 700.0]]), Observer::Cie1931);
         assert!((sum(&partly)[1] - sum(&plain)[1]).abs() < 1e-14);
         let (left, middle) = (partly[0][1], plain[1][1]);
         assert!((left - (plain[0][1] + 0.5 * middle)).abs() < 1e-14);
-        let gap = xyz_weights(&channels(&[[400.0, 500.0], [600.0, 700.0], [8000.0, 12000.0]]));
+        let gap = xyz_weights(&channels(&[[400.0, 500.0], [600.0, 700.0], [8000.0, 12000.0]]), Observer::Cie1931);
         for i in 0..3 {
             assert!((gap[0][i] - plain[0][i]).abs() < 1e-15 && (gap[1][i] - plain[2][i]).abs() < 1e-14);
         }
@@ -300,7 +417,7 @@ mod tests {
         let curve = Curve::Linear { nm, value, outside: Outside::Zero };
         let channels = Channels::equal(360.0, 780.0, 420);
         let spectrum: Vec<f32> = (0..420).map(|k| curve.mean(360.0 + k as f64, 361.0 + k as f64) as f32).collect();
-        let xyz = xyz_weights(&channels).iter().zip(&spectrum).fold([0.0; 3], |s, (w, &l)| {
+        let xyz = xyz_weights(&channels, Observer::Cie1931).iter().zip(&spectrum).fold([0.0; 3], |s, (w, &l)| {
             std::array::from_fn(|i| s[i] + w[i] * f64::from(l)) //
         });
         let total: f64 = xyz.iter().sum();

@@ -2,6 +2,10 @@
 
 /// CIE 1931 2° colour matching functions: nm, x̄, ȳ, z̄, every nm from 360 to 830.
 pub const CIE1931: &str = include_str!("data/cie1931_2deg_1nm.csv");
+/// CIE 1964 10° colour matching functions: nm, x̄, ȳ, z̄, every nm from 360 to 830.
+pub const CIE1964: &str = include_str!("data/cie1964_10deg_1nm.csv");
+/// CIE 2015 2° colour matching functions: nm, x̄, ȳ, z̄, every nm from 390 to 830.
+pub const CIE2015: &str = include_str!("data/cie2015_2deg_1nm.csv");
 /// CIE standard illuminant D65: nm, relative power, every 5 nm from 300 to 780.
 pub const D65: &str = include_str!("data/d65_300-780_5nm.csv");
 

@@ -8,7 +8,8 @@ mod derived;
 pub mod planck;
 pub mod skylight;
 pub mod table;
+pub mod temperature;
 pub mod upsample;
 
-pub use channels::Channels;
+pub use channels::{Channels, Response};
 pub use curve::{Curve, Outside};

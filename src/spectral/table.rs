@@ -13,6 +13,24 @@ const MAX_ENTRIES_IN_ALL: usize = 12 << 20;
 /// More strata than this would leave too few bits for the place within one.
 const MAX_STRATUM_BITS: u32 = 12;
 
+/// A spectrum that the device gets.
+#[derive(Debug, Clone, Copy)]
+pub enum Tabulated<'a> {
+    /// One curve in all channels.
+    Same(&'a Curve),
+    /// One curve for each.
+    PerChannel(&'a [Curve]),
+}
+
+impl<'a> Tabulated<'a> {
+    fn of(self, k: usize) -> &'a Curve {
+        match self {
+            Tabulated::Same(curve) => curve,
+            Tabulated::PerChannel(curves) => &curves[k],
+        }
+    }
+}
+
 /// One spectrum over one stratum of one channel: `value + place * slope`, place in [0, 1).
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Line {
@@ -62,12 +80,16 @@ pub struct Bounds {
 
 impl SpectralTables {
     /// Tables for `curves` over `channels`, in the order given (spectra that need knots move to the end).
-    pub fn build(curves: &[&Curve], channels: &Channels) -> SpectralTables {
+    pub fn build(curves: &[Tabulated], channels: &Channels) -> SpectralTables {
         SpectralTables::with_exactness(curves, &[], channels)
     }
 
     /// [`SpectralTables::build`]; the curves at the given positions are held as exactly as said.
-    pub fn with_exactness(curves: &[&Curve], exactness: &[(usize, Exactness)], channels: &Channels) -> SpectralTables {
+    pub fn with_exactness(
+        curves: &[Tabulated],
+        exactness: &[(usize, Exactness)],
+        channels: &Channels,
+    ) -> SpectralTables {
         let channels_padded = channels.len().next_multiple_of(4);
         // All spectra have as many strata as the one that needs most.
         let entries = MAX_ENTRIES.min(MAX_ENTRIES_IN_ALL / curves.len().max(1));
@@ -77,8 +99,8 @@ impl SpectralTables {
             .iter()
             .enumerate()
             .map(|(i, c)| match of(i) {
-                Exactness::Exact => strata_needed(c, channels, 0, LINE_BOUND, Exactness::Peak),
-                kind => strata_needed(c, channels, max_bits, POINTWISE_BOUND, kind),
+                Exactness::Exact => strata_needed(*c, channels, 0, LINE_BOUND, Exactness::Peak),
+                kind => strata_needed(*c, channels, max_bits, POINTWISE_BOUND, kind),
             })
             .collect();
         let stratum_bits = needed.iter().flatten().copied().max().unwrap_or(0);
@@ -110,11 +132,12 @@ impl SpectralTables {
         tables
     }
 
-    fn fill_strata(&mut self, id: usize, curve: &Curve, channels: &Channels, kind: Exactness) -> Bounds {
+    fn fill_strata(&mut self, id: usize, spectrum: Tabulated, channels: &Channels, kind: Exactness) -> Bounds {
         let strata = 1usize << self.stratum_bits;
         let quads = self.channels_padded / 4;
         let mut bounds = Bounds::default();
         for k in 0..channels.len() {
+            let curve = spectrum.of(k);
             let lines = fit_channel(curve, channels, k, strata);
             bounds = bounds.max(channel_bounds(curve, channels, k, &lines, kind));
             for (stratum, line) in lines.iter().enumerate() {
@@ -126,11 +149,11 @@ impl SpectralTables {
         bounds
     }
 
-    fn add_knots(&mut self, curve: &Curve, channels: &Channels) -> Bounds {
+    fn add_knots(&mut self, spectrum: Tabulated, channels: &Channels) -> Bounds {
         let mut bounds = Bounds::default();
         for k in 0..self.channels_padded {
             if k < channels.len() {
-                let [from, to] = channels.bounds[k];
+                let ([from, to], curve) = (channels.bounds[k], spectrum.of(k));
                 let nodes = curve.linear_pieces(from, to).unwrap_or_else(|| smooth_nodes(curve, from, to));
                 let exact = curve.mean(from, to);
                 let knots: Vec<(f64, f64)> =
@@ -179,9 +202,10 @@ impl Bounds {
 }
 
 /// Stratum bits that keep the pointwise bound in every channel, or `None` where `max_bits` do not.
-fn strata_needed(curve: &Curve, channels: &Channels, max_bits: u32, bound: f64, kind: Exactness) -> Option<u32> {
+fn strata_needed(spectrum: Tabulated, channels: &Channels, max_bits: u32, bound: f64, kind: Exactness) -> Option<u32> {
     // What satisfied the channels so far is where the next channel starts.
     (0..channels.len()).try_fold(0, |least, k| {
+        let curve = spectrum.of(k);
         let keeps_bound = |bits: &u32| {
             let lines = fit_channel(curve, channels, k, 1 << bits);
             channel_bounds(curve, channels, k, &lines, kind).pointwise <= bound
@@ -272,6 +296,11 @@ mod tests {
     use super::*;
     use crate::spectral::Outside;
 
+    fn build(curves: &[&Curve], channels: &Channels) -> SpectralTables {
+        let same: Vec<Tabulated> = curves.iter().map(|curve| Tabulated::Same(curve)).collect();
+        SpectralTables::build(&same, channels)
+    }
+
     /// The device's lookup, in f32.
     fn lookup(t: &SpectralTables, curve: usize, k: usize, mu: u32) -> f32 {
         let id = t.ids[curve] as usize;
@@ -319,7 +348,7 @@ mod tests {
     }
 
     fn check(curve: &Curve, channels: &Channels) {
-        let tables = SpectralTables::build(&[&Curve::Constant(1.0), curve], channels);
+        let tables = build(&[&Curve::Constant(1.0), curve], channels);
         check_curve(&tables, 1, curve, channels);
     }
 
@@ -363,7 +392,7 @@ mod tests {
         let channels = Channels::equal(380.0, 780.0, 7);
         let c = 0.123_456_79_f32;
         let curve = table(&[(380.0, f64::from(c)), (612.7, f64::from(c)), (780.0, f64::from(c))], Outside::Hold);
-        let tables = SpectralTables::build(&[&Curve::Constant(1.0), &curve, &Curve::Constant(f64::from(c))], &channels);
+        let tables = build(&[&Curve::Constant(1.0), &curve, &Curve::Constant(f64::from(c))], &channels);
         assert_eq!(tables.stratum_bits, 0);
         for mu in [0, 1, 0x1234_5678, u32::MAX] {
             for k in 0..7 {
@@ -379,12 +408,12 @@ mod tests {
         let channels = Channels::equal(380.0, 780.0, 1000);
         let zigzag: Vec<_> = (0..212).map(|j| (380.0 + 1.9 * j as f64 + 0.01, 0.5 + 0.08 * f64::from(j % 2))).collect();
         let zigzag = table(&zigzag, Outside::Hold);
-        let alone = SpectralTables::build(&[&zigzag], &channels);
+        let alone = build(&[&zigzag], &channels);
         assert!(!alone.has_knots() && alone.stratum_bits > 5, "{} bits", alone.stratum_bits);
         let mut curves = vec![&zigzag];
         let constant = Curve::Constant(0.5);
         curves.resize(400, &constant);
-        let tables = SpectralTables::build(&curves, &channels);
+        let tables = build(&curves, &channels);
         assert!(size_of_val(tables.strata.as_slice()) <= 8 * MAX_ENTRIES_IN_ALL);
         check_curve(&tables, 0, &zigzag, &channels);
         assert_eq!(lookup(&tables, 399, 999, 12345), 0.5);
@@ -394,7 +423,7 @@ mod tests {
     #[test]
     fn aligned_tables_are_exact() {
         let curve = jagged(101, 1);
-        let tables = SpectralTables::build(&[&curve], &Channels::equal(380.0, 780.0, 400));
+        let tables = build(&[&curve], &Channels::equal(380.0, 780.0, 400));
         assert_eq!((tables.stratum_bits, tables.stratified), (0, 1));
         assert!(tables.bounds[0].pointwise < 1e-12, "{:?}", tables.bounds[0]);
     }

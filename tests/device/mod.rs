@@ -69,6 +69,7 @@ pub fn render(scene: &Scene, epochs: u32, samples: u32, settings: Settings) -> E
         gpu.limits.max_storage_buffer_binding_size = binding;
     }
     let prepared = Arc::new(Prepared::new(scene, settings.seed).expect("a scene that fits"));
+    let integration = prepared.integration.clone();
     let mut worker = Worker::new(gpu, prepared, settings.tile, settings.budget).expect("a worker");
     let [x0, y0, x1, y1] = scene.film.crop;
     let [tw, th] = settings.tile;
@@ -87,7 +88,10 @@ pub fn render(scene: &Scene, epochs: u32, samples: u32, settings: Settings) -> E
                 counters.negative += collected.counters.negative;
                 rays += collected.counters.rays();
                 let unit_size = (tw * th) as usize * channels;
-                for (unit, means) in collected.units.iter().zip(collected.means.chunks(unit_size)) {
+                // As the renderer does where responses weight.
+                let sums = integration.as_ref().map(|(integration, _)| integration.sums(collected.means));
+                let means: &[f32] = sums.as_deref().unwrap_or(collected.means);
+                for (unit, means) in collected.units.iter().zip(means.chunks(unit_size)) {
                     for y in unit[1]..unit[3] {
                         for x in unit[0]..unit[2] {
                             let from = ((y - unit[1]) * tw + x - unit[0]) as usize * channels;

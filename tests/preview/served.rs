@@ -83,7 +83,7 @@ fn spectra_are_those_of_the_command_line() {
 #[test]
 fn standard_errors_are_served_where_the_cube_has_them() {
     let folder = tempdir().expect("folder");
-    let cube = patterned(folder.path(), "cube.zarr", header([16, 8], [8, 8], 5));
+    let cube = patterned(folder.path(), "cube.zarr", header([16, 8], [8, 8], 5).with_uncertainty());
     for column in 0..2 {
         let place = |array: &str| cube.path().join(format!("{array}/c/0/0/{column}"));
         let radiance = std::fs::read(place("radiance")).expect("read");

@@ -86,8 +86,14 @@ fn the_document_names_every_event_and_field() {
         vec!["submit", "scene.toml", "-o", "e.zarr", "--spp", "64", "--dry-run", "--json"],
         vec!["compare", "a.zarr", "b.zarr", "--json"],
         vec!["export", "a.zarr", "-o", "b.png", "--json"],
+        vec!["export", "a.zarr", "-o", "c.png", "--colour-map", "--json"],
+        vec!["export", "a.zarr", "-o", "b.csv", "--json"],
+        vec!["sensor", "a.zarr", "--responses", "s.csv", "-o", "s.zarr", "--json"],
         vec!["info", "nothing.zarr", "--json"],
     ];
+    // A band that is narrower than a channel, and one beyond them all.
+    let responses = "nm,narrow,infrared\n450,1,0\n460,1,0\n470,0,0\n800,0,1\n900,0,1\n";
+    std::fs::write(place.path().join("s.csv"), responses).expect("written");
     let documented = documented();
     let all = "all commands".to_owned();
     let mut seen: BTreeMap<(String, String), BTreeSet<String>> = BTreeMap::new();

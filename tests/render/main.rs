@@ -7,10 +7,12 @@ mod json;
 mod memory;
 mod out_of_core;
 mod outcome;
+mod responses;
 mod resume;
 mod running;
 mod several;
 mod sizes;
+mod uncertainty;
 mod wrong;
 
 use std::fs;

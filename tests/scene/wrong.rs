@@ -170,7 +170,7 @@ fn channels() {
         ("interval of three", EQUAL, "intervals = [[400, 500, 600]] #!", "channels.intervals.0", &["two wavelengths"]),
         ("no intervals", EQUAL, "intervals = [] #!", "channels.intervals", &["1 to 65536 intervals"]),
         ("two kinds", EQUAL, "equal = { from = 400, to = 700, count = 3 }\nintervals = [[1, 2]] #!", "channels.intervals", &["only one kind of channels"]),
-        ("responses", EQUAL, "responses = \"sensor.csv\" #!", "channels.responses", &["not supported yet"]),
+        ("responses", EQUAL, "responses = \"sensor.csv\" #!", "channels.responses", &["sensor.csv cannot be read"]),
         ("false colour outside", EQUAL, "equal = { from = 400, to = 700, count = 3 }\nfalse_colour = [0, 1, 3] #!", "channels.false_colour.2", &["from 0 to 2"]),
     ]);
     let text = changed(EQUAL, "").replace("[channels]", "[channels] #!");

@@ -39,6 +39,15 @@ impl<'a> SpectralValues<'a> {
         }
     }
 
+    /// What the response of channel `k` makes of its wavelength: R(λ_k) over its mean on the support, 1 without one.
+    pub fn response(&self, k: usize) -> f64 {
+        let channels = &self.scene.channels;
+        channels
+            .responses
+            .get(k)
+            .map_or(1.0, |response| response.curve().eval(self.wavelength[k]) * channels.width(k) / response.integral())
+    }
+
     /// λ_k in nm.
     pub fn wavelengths(&self) -> &[f64] {
         &self.wavelength

@@ -1,0 +1,156 @@
+//! ENVI: raw numbers beside a header.
+
+use std::io::{Seek, SeekFrom, Write};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use super::{PIECE_BYTES, Progress, check_space, default_bands, long_name};
+use crate::cube::{Quantity, Reader, Rect, Strides, View};
+use crate::files::{Replacement, write_atomically};
+use crate::format::envi::{Image, Interleave};
+use crate::{Error, Result};
+
+/// What stands where nothing is rendered: no radiance and no temperature is negative.
+const MISSING: f32 = -9999.0;
+
+/// Writes the data file and, last, its header beside it. `path` may name either.
+pub fn write(view: &View, path: &Path, interleave: Interleave, progress: &mut Progress) -> Result<Vec<PathBuf>> {
+    let is_header = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("hdr"));
+    let data = if is_header { path.with_extension("img") } else { path.to_owned() };
+    let header = data.with_extension("hdr");
+    if data.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("zarr")) {
+        return Err(Error::Usage(format!("{}: GDAL opens no ENVI file of this name; use .img", data.display())));
+    }
+    check_space(&data, view.bytes())?;
+    let mut file = Replacement::create(&data)?;
+    let mut pieces = Pieces { view, reader: view.reader(), file: &mut file, values: Vec::new(), progress };
+    match interleave {
+        Interleave::Bil => pieces.by_line()?,
+        Interleave::Bip => pieces.by_pixel()?,
+        Interleave::Bsq => pieces.by_band()?,
+    }
+    let [width, height] = view.size().map(|side| side as usize);
+    let channels = view.channels();
+    let each = |value: &dyn Fn(usize) -> f64| (0..channels.len()).map(value).collect();
+    let image = Image {
+        description: long_name(view),
+        size: [width, height, channels.len()],
+        interleave,
+        units: match view.quantity() {
+            Quantity::Radiance | Quantity::Xyz(_) => "W m^-2 sr^-1 nm^-1",
+            Quantity::Integrated => "W m^-2 sr^-1",
+            Quantity::Temperature => "K",
+        },
+        ignore: MISSING,
+        origin: view.origin(),
+        default_bands: default_bands(view),
+        wavelength_nm: each(&|k| channels.centre(k)),
+        fwhm_nm: each(&|k| channels.fwhm(k)),
+        names: channels.names.clone(),
+    };
+    file.finish()?;
+    write_atomically(&header, image.header().as_bytes())?;
+    Ok(vec![data, header])
+}
+
+struct Pieces<'a, 'p> {
+    view: &'a View<'a>,
+    reader: Reader<'a>,
+    file: &'a mut Replacement,
+    values: Vec<f32>,
+    progress: &'a mut Progress<'p>,
+}
+
+/// `count` in pieces of at most `most`, which is taken as at least 1.
+fn pieces(count: usize, most: usize) -> impl Iterator<Item = Range<usize>> {
+    let most = most.max(1);
+    (0..count.div_ceil(most)).map(move |i| i * most..(i * most + most).min(count))
+}
+
+impl Pieces<'_, '_> {
+    /// [line][band][sample].
+    fn by_line(&mut self) -> Result<()> {
+        let (width, bands) = (self.view.size()[0] as usize, self.view.channels().len());
+        for rows in self.rows(width * bands * 4) {
+            for part in pieces(bands, PIECE_BYTES / (4 * width)) {
+                let strides = Strides { row: width * part.len(), pixel: 1, band: width };
+                // More than one line at a time only where all bands fit.
+                self.read(rows, part, strides)?;
+                self.write()?;
+            }
+            self.tell(rows)?;
+        }
+        Ok(())
+    }
+
+    /// [line][sample][band].
+    fn by_pixel(&mut self) -> Result<()> {
+        let (width, bands) = (self.view.size()[0] as usize, self.view.channels().len());
+        for rows in self.rows(width * bands * 4) {
+            for part in pieces(width, PIECE_BYTES / (4 * bands)) {
+                let strides = Strides { row: part.len() * bands, pixel: bands, band: 1 };
+                let (x0, x1) = (rows.x0 + part.start as u32, rows.x0 + part.end as u32);
+                self.read(Rect { x0, x1, ..rows }, 0..bands, strides)?;
+                self.write()?;
+            }
+            self.tell(rows)?;
+        }
+        Ok(())
+    }
+
+    /// [band][line][sample]: a row of tiles at a time, so that the cube is read once.
+    fn by_band(&mut self) -> Result<()> {
+        let [width, height] = self.view.size().map(|side| side as usize);
+        let (rect, tile) = (self.view.rect(), self.view.cube().grid().tile[1]);
+        let mut y0 = rect.y0;
+        while y0 < rect.y1 {
+            let rows = Rect { y0, y1: ((y0 / tile + 1) * tile).min(rect.y1), ..rect };
+            let plane = width * rows.height() as usize;
+            for part in pieces(self.view.channels().len(), PIECE_BYTES / (4 * plane)) {
+                self.read(rows, part.clone(), Strides { row: width, pixel: 1, band: plane })?;
+                let values = std::mem::take(&mut self.values);
+                for (band, values) in part.zip(values.chunks_exact(plane)) {
+                    let at = 4 * (band * height + (y0 - rect.y0) as usize) as u64 * width as u64;
+                    let file = self.file.file();
+                    let written =
+                        file.seek(SeekFrom::Start(at)).and_then(|_| file.write_all(bytemuck::cast_slice(values)));
+                    written.map_err(|error| self.file.failed(error))?;
+                }
+                self.values = values;
+            }
+            self.tell(rows)?;
+            y0 = rows.y1;
+        }
+        Ok(())
+    }
+
+    /// The lines of the view in groups that lie in one row of tiles and take about a piece.
+    fn rows(&self, line_bytes: usize) -> impl Iterator<Item = Rect> + use<> {
+        let (rect, tile) = (self.view.rect(), self.view.cube().grid().tile[1]);
+        let most = (PIECE_BYTES / line_bytes).max(1) as u32;
+        let mut y0 = rect.y0;
+        std::iter::from_fn(move || {
+            let y1 = y0.saturating_add(most).min((y0 / tile + 1) * tile).min(rect.y1);
+            let rows = (y0 < rect.y1).then_some(Rect { y0, y1, ..rect });
+            y0 = y1;
+            rows
+        })
+    }
+
+    fn read(&mut self, rect: Rect, bands: Range<usize>, strides: Strides) -> Result<()> {
+        self.values.resize(rect.pixels() as usize * bands.len(), 0.0);
+        self.reader.read(rect, bands, strides, &mut self.values)?;
+        self.values.iter_mut().filter(|value| value.is_nan()).for_each(|value| *value = MISSING);
+        Ok(())
+    }
+
+    fn write(&mut self) -> Result<()> {
+        let written = self.file.file().write_all(bytemuck::cast_slice(&self.values));
+        written.map_err(|error| self.file.failed(error))
+    }
+
+    fn tell(&mut self, rows: Rect) -> Result<()> {
+        let width = u64::from(rows.width());
+        (self.progress)(u64::from(rows.y1 - self.view.rect().y0) * width, self.view.rect().pixels())
+    }
+}

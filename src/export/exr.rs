@@ -1,0 +1,284 @@
+//! Spectral OpenEXR (A. Fichet, R. Pacanowski, A. Wilkie 2021, JCGT 10(3)): a channel a band, named by its wavelength, and
+//! R, G, B for viewers that know nothing of spectra.
+
+use std::io::{BufWriter, Write};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use exr::block::writer::ChunksWriter;
+use exr::block::{BlockIndex, UncompressedBlock};
+use exr::math::{RoundingMode, Vec2};
+use exr::meta::attribute::{
+    AttributeValue, ChannelDescription, LevelMode, LineOrder, SampleType, Text, TileDescription,
+};
+use exr::meta::header::Header;
+use exr::meta::{BlockDescription, MetaData};
+use exr::prelude::Compression;
+use smallvec::SmallVec;
+
+use super::{Progress, check_space};
+use crate::cube::{Quantity, Rect, Strides, View};
+use crate::files::Replacement;
+use crate::{Error, Result};
+
+/// OpenImageIO, and what is built on it, refuses files with more channels unless told otherwise.
+pub const WIDELY_READ: usize = 1024;
+
+/// Side of a tile in pixels, and the most bytes of one before compression.
+const TILE: u32 = 32;
+const TILE_BYTES: usize = 64 << 20;
+
+/// Writes one file; or with `split` several of at most so many bands each, in ascending wavelength, named after their
+/// ranges.
+pub fn write(
+    view: &View,
+    path: &Path,
+    strict_units: bool,
+    split: Option<usize>,
+    progress: &mut Progress,
+) -> Result<Vec<PathBuf>> {
+    if matches!(view.quantity(), Quantity::Temperature | Quantity::Xyz(_)) {
+        let what = "spectral OpenEXR holds spectra only; export temperatures and colours to another format";
+        return Err(Error::Usage(format!("{}: {what}", path.display())));
+    }
+    let channels = view.channels();
+    let mut order: Vec<usize> = (0..channels.len()).collect();
+    order.sort_by(|&a, &b| channels.centre(a).total_cmp(&channels.centre(b)));
+    check_names(view, &order)?;
+    // As if nothing could be compressed.
+    check_space(path, view.bytes())?;
+    let parts: Vec<&[usize]> = order.chunks(split.unwrap_or(usize::MAX).max(1)).collect();
+    let pixels = view.rect().pixels();
+    let mut written = Vec::new();
+    for (i, part) in parts.iter().enumerate() {
+        let target = if parts.len() == 1 { path.to_owned() } else { part_path(path, view, part) };
+        let bands = part.iter().map(|&b| view.bands()[b]).collect();
+        let of_part = view.clone().with_bands(bands)?;
+        let mut tell = |done: u64, _: u64| progress(i as u64 * pixels + done, parts.len() as u64 * pixels);
+        write_file(&of_part, &target, strict_units, &mut tell)?;
+        written.push(target);
+    }
+    Ok(written)
+}
+
+/// `name.400-500nm.exr`.
+fn part_path(path: &Path, view: &View, part: &[usize]) -> PathBuf {
+    let end = |b: usize| view.channels().centre(b);
+    let (from, to) = (end(part[0]), end(part[part.len() - 1]));
+    let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or("exr");
+    path.with_extension(format!("{from:.3}-{to:.3}nm.{extension}"))
+}
+
+/// The name of a band: its centre in nanometres, with a decimal comma, since a point separates layers.
+fn band_name(nm: f64) -> String {
+    format!("S0.{nm:.6}nm").replacen(".", "\u{0}", 1).replace('.', ",").replace('\u{0}', ".")
+}
+
+/// Bands are told apart by their centres only.
+fn check_names(view: &View, order: &[usize]) -> Result<()> {
+    let channels = view.channels();
+    let same = |pair: &&[usize]| band_name(channels.centre(pair[0])) == band_name(channels.centre(pair[1]));
+    match order.windows(2).find(same) {
+        None => Ok(()),
+        Some(pair) => Err(Error::Usage(format!(
+            "{}: the channels {} and {} have one centre, {} nm, and spectral OpenEXR names channels by it; choose others \
+             with --bands, or another format",
+            view.cube().path().display(),
+            channels.names[pair[0]],
+            channels.names[pair[1]],
+            channels.centre(pair[0]),
+        ))),
+    }
+}
+
+/// What a channel of the file holds.
+#[derive(Clone, Copy)]
+enum Source {
+    /// Red, green or blue.
+    Colour(usize),
+    Band(usize),
+}
+
+fn write_file(view: &View, path: &Path, strict_units: bool, progress: &mut Progress) -> Result<()> {
+    let mut named: Vec<(String, Source)> =
+        (0..view.channels().len()).map(|b| (band_name(view.channels().centre(b)), Source::Band(b))).collect();
+    named.extend(["R", "G", "B"].into_iter().enumerate().map(|(i, name)| (name.to_owned(), Source::Colour(i))));
+    // The order of the file's channels is that of their names' bytes.
+    named.sort_by(|a, b| a.0.cmp(&b.0));
+    let sources: Vec<Source> = named.iter().map(|(_, source)| *source).collect();
+    let header = header(view, &named, strict_units)?;
+
+    let mut replacement = Replacement::create(path)?;
+    let mut ended = None;
+    let mut file = BufWriter::with_capacity(1 << 20, replacement.file());
+    let result = exr::block::write(&mut file, SmallVec::from_vec(vec![header]), true, |meta, writer| {
+        let written = write_tiles(view, path, &sources, &meta, writer, progress);
+        written.map_err(|error| {
+            // What the crate can carry through is only its own errors.
+            let what = error.to_string();
+            ended = Some(error);
+            exr::error::Error::Invalid(what.into())
+        })
+    });
+    let flushed = file.flush();
+    drop(file);
+    if let Some(error) = ended {
+        return Err(error);
+    }
+    result.map_err(|error| replacement.failed(error))?;
+    flushed.map_err(|error| replacement.failed(error))?;
+    replacement.finish()
+}
+
+fn header(view: &View, named: &[(String, Source)], strict_units: bool) -> Result<Header> {
+    let text = |text: &str| {
+        Text::new_or_none(text).ok_or_else(|| Error::Internal(format!("`{text}` cannot stand in an EXR header")))
+    };
+    let mut channels = SmallVec::new();
+    for (name, _) in named {
+        channels.push(ChannelDescription {
+            name: text(name)?,
+            sample_type: SampleType::F32,
+            quantize_linearly: false,
+            sampling: Vec2(1, 1),
+        });
+    }
+    let [width, height] = view.size();
+    let mut side = TILE.min(width.max(height).next_power_of_two());
+    while side > 1 && (side * side) as usize * named.len() * 4 > TILE_BYTES {
+        side /= 2;
+    }
+    let blocks = BlockDescription::Tiles(TileDescription {
+        tile_size: Vec2(side as usize, side as usize),
+        level_mode: LevelMode::Singular,
+        rounding_mode: RoundingMode::Down,
+    });
+    let mut header = Header::new(text("radiance")?, Vec2(width as usize, height as usize), channels).with_encoding(
+        Compression::ZIP16,
+        blocks,
+        LineOrder::Increasing,
+    );
+    // A single unnamed part is what every reader expects.
+    header.own_attributes.layer_name = None;
+    let units = match view.quantity() {
+        Quantity::Radiance if !strict_units => "W.m^-2.sr^-1.nm^-1",
+        _ => "W.m^-2.sr^-1",
+    };
+    let preview = match view.cube().projection().kind {
+        crate::spectral::colour::ProjectionKind::Xyz => "linear sRGB of CIE 1931 XYZ divided by the integral of ybar",
+        crate::spectral::colour::ProjectionKind::FalseColour(_) => "false colour",
+    };
+    let about = format!("Spectile {}; R, G, B: {preview}", env!("CARGO_PKG_VERSION"));
+    let other = &mut header.own_attributes.other;
+    for (key, value) in [("spectralLayoutVersion", "1.0"), ("emissiveUnits", units), ("comments", about.as_str())] {
+        if key == "comments" {
+            header.own_attributes.comments = Some(text(value)?);
+        } else {
+            other.insert(text(key)?, AttributeValue::Text(text(value)?));
+        }
+    }
+    // How wide each band is: its response, one over its interval, under its own name.
+    for (name, source) in named {
+        if let Source::Band(b) = source {
+            let [from, to] = view.channels().bounds[*b];
+            if view.channels().responses.is_empty() {
+                other.insert(text(name)?, AttributeValue::Text(text(&format!("{from}nm:1;{to}nm:1;"))?));
+            }
+        }
+    }
+    Ok(header)
+}
+
+/// One tile after another, several of them compressed at the same time.
+fn write_tiles(
+    view: &View,
+    path: &Path,
+    sources: &[Source],
+    meta: &MetaData,
+    writer: &mut impl ChunksWriter,
+    progress: &mut Progress,
+) -> Result<()> {
+    let header = &meta.headers[0];
+    let side = header.max_block_pixel_size().x() as u32;
+    let tile_bytes = (side * side) as usize * sources.len() * 4;
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    // Compression holds a tile twice.
+    let together = threads.min(TILE_BYTES / tile_bytes).max(1);
+    let failed = |error: exr::error::Error| Error::storage(path, format!("cannot be written: {error}"));
+    let indices: Vec<_> = exr::block::enumerate_ordered_header_block_indices(&meta.headers).collect();
+    let mut tiles = Tiles { view, reader: view.reader(), sources, bands: Vec::new(), colours: Vec::new() };
+    let mut done = 0;
+    for group in indices.chunks(together) {
+        let blocks = group.iter().map(|(at, index)| Ok((*at, tiles.block(*index)?))).collect::<Result<Vec<_>>>()?;
+        let compressed: Vec<_> = std::thread::scope(|scope| {
+            let compress = |(at, block): (usize, UncompressedBlock)| {
+                scope.spawn(move || block.compress_to_chunk(&meta.headers).map(|chunk| (at, chunk)))
+            };
+            let running: Vec<_> = blocks.into_iter().map(compress).collect();
+            running.into_iter().map(|thread| thread.join()).collect()
+        });
+        for chunk in compressed {
+            let chunk = chunk.map_err(|_| Error::Internal("a thread that compresses panicked".into()))?;
+            let (at, chunk) = chunk.map_err(failed)?;
+            writer.write_chunk(at, chunk).map_err(failed)?;
+        }
+        done += group.iter().map(|(_, index)| index.pixel_size.area() as u64).sum::<u64>();
+        progress(done, view.rect().pixels())?;
+    }
+    Ok(())
+}
+
+struct Tiles<'a> {
+    view: &'a View<'a>,
+    reader: crate::cube::Reader<'a>,
+    sources: &'a [Source],
+    /// [row][band][column], and [row][rgb][column].
+    bands: Vec<f32>,
+    colours: Vec<f32>,
+}
+
+impl Tiles<'_> {
+    /// For every row, for every channel, the values of the row.
+    fn block(&mut self, index: BlockIndex) -> Result<UncompressedBlock> {
+        let rect = self.view.rect();
+        let (x0, y0) = (rect.x0 + index.pixel_position.x() as u32, rect.y0 + index.pixel_position.y() as u32);
+        let (width, height) = (index.pixel_size.x(), index.pixel_size.y());
+        let tile = Rect { x0, y0, x1: x0 + width as u32, y1: y0 + height as u32 };
+        let count = self.view.channels().len();
+        self.bands.resize(width * height * count, 0.0);
+        self.reader.read(tile, 0..count, Strides { row: width * count, pixel: 1, band: width }, &mut self.bands)?;
+        self.colours.clear();
+        self.colours.resize(width * height * 3, f32::NAN);
+        let projection = self.view.cube().projection();
+        self.reader.spectra(tile, |x, y, spectrum| {
+            let at = (y - y0) as usize * 3 * width + (x - x0) as usize;
+            (0..3).zip(projection.rgb(spectrum)).for_each(|(i, value)| self.colours[at + i * width] = value);
+        })?;
+        let mut data = Vec::with_capacity(width * height * self.sources.len() * 4);
+        for row in 0..height {
+            for source in self.sources {
+                let line: Range<usize> = match source {
+                    Source::Band(b) => (row * count + b) * width..(row * count + b + 1) * width,
+                    Source::Colour(i) => (row * 3 + i) * width..(row * 3 + i + 1) * width,
+                };
+                let values = match source {
+                    Source::Band(_) => &self.bands[line],
+                    Source::Colour(_) => &self.colours[line],
+                };
+                data.extend_from_slice(bytemuck::cast_slice(values));
+            }
+        }
+        Ok(UncompressedBlock { index, data })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::band_name;
+
+    #[test]
+    fn names_have_a_decimal_comma() {
+        assert_eq!(band_name(550.0), "S0.550,000000nm");
+        assert_eq!(band_name(10_000.123_456_7), "S0.10000,123457nm");
+    }
+}

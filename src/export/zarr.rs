@@ -1,0 +1,254 @@
+//! Zarr v3, compressed: chunks of a size that suits reading a picture of one band as well as the spectra of a region,
+//! several of them in a file (a shard).
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use serde_json::{Map, Value, json};
+use zarrs::array::{Array, ArrayBytes, ArrayMetadata};
+use zarrs::filesystem::FilesystemStore;
+
+use super::{PIECE_BYTES, Progress, check_space, long_name, units};
+use crate::cube::{Quantity, Rect, Strides, View};
+use crate::files::NewFolder;
+use crate::{Error, Result};
+
+/// About so many bands and pixels a side go into a chunk: 256 KiB.
+const CHUNK_BANDS: usize = 64;
+const CHUNK_SIDE: u32 = 32;
+/// The most pixels a side of a shard.
+const SHARD_SIDE: u32 = 256;
+const LEVEL: u32 = 3;
+
+/// How a view is cut.
+struct Layout {
+    /// Bands, lines and columns of a chunk, and of a file.
+    chunk: [u64; 3],
+    file: [u64; 3],
+}
+
+impl Layout {
+    fn new(view: &View, shards: bool) -> Layout {
+        let bands = view.channels().len();
+        let groups = bands.div_ceil(CHUNK_BANDS);
+        let chunk_bands = bands.div_ceil(groups);
+        let side = CHUNK_SIDE;
+        let chunk = [chunk_bands as u64, side.into(), side.into()];
+        if !shards {
+            return Layout { chunk, file: chunk };
+        }
+        // All bands of a square of pixels, as long as that fits into memory.
+        let bytes = |side: u32| chunk_bands * groups * (side * side) as usize * 4;
+        let [width, height] = view.size();
+        let mut file_side = side;
+        while file_side < SHARD_SIDE && file_side < width.max(height) && bytes(2 * file_side) <= PIECE_BYTES {
+            file_side *= 2;
+        }
+        Layout { chunk, file: [(chunk_bands * groups) as u64, file_side.into(), file_side.into()] }
+    }
+}
+
+/// Writes a store, which must not exist yet.
+pub fn write(view: &View, path: &Path, shards: bool, progress: &mut Progress) -> Result<Vec<PathBuf>> {
+    // As if nothing could be compressed.
+    check_space(path, view.bytes())?;
+    let folder = NewFolder::create(path)?;
+    let failed = |what: &dyn std::fmt::Display| Error::storage(path, format!("cannot be written: {what}"));
+    let layout = Layout::new(view, shards);
+    let arrays = arrays(view, &layout)?;
+    let store = FilesystemStore::new(folder.path()).map_err(|error| failed(&error))?;
+    let store = Arc::new(store);
+    for (name, metadata) in &arrays {
+        let target = folder.path().join(name);
+        fs::create_dir_all(&target)
+            .and_then(|()| fs::write(target.join("zarr.json"), format!("{metadata:#}\n")))
+            .map_err(|error| failed(&error))?;
+    }
+    let open = |name: &str| -> Result<Array<FilesystemStore>> {
+        let metadata = arrays.iter().find(|(of, _)| *of == name).map_or(Value::Null, |(_, metadata)| metadata.clone());
+        let metadata: ArrayMetadata = serde_json::from_value(metadata).map_err(|error| failed(&error))?;
+        Array::new_with_metadata(Arc::clone(&store), &format!("/{name}"), metadata).map_err(|error| failed(&error))
+    };
+    let channels = view.channels();
+    let each = |value: &dyn Fn(usize) -> f64| (0..channels.len()).map(value).collect::<Vec<f64>>();
+    let ([left, top], [width, height]) = (view.origin(), view.size());
+    let centres = |from: u32, count: u32| (0..count).map(|i| f64::from(from + i) + 0.5).collect::<Vec<f64>>();
+    for (name, indices, values) in [
+        ("wavelength", vec![0], each(&|k| channels.centre(k))),
+        ("wavelength_width", vec![0], each(&|k| channels.width(k))),
+        ("wavelength_bounds", vec![0, 0], channels.bounds.iter().flatten().copied().collect()),
+        ("response_integral", vec![0], each(&|k| channels.integral(k))),
+        ("x", vec![0], centres(left, width)),
+        ("y", vec![0], centres(top, height)),
+    ] {
+        let bytes: Vec<u8> = bytemuck::cast_slice(&values).to_vec();
+        open(name)?.store_chunk(&indices, ArrayBytes::new_flen(bytes)).map_err(|error| failed(&error))?;
+    }
+    let views = views(view)?;
+    let (count, pixels) = (views.len() as u64, view.rect().pixels());
+    for (i, of) in (0..).zip(&views) {
+        let mut tell = |done: u64, _: u64| progress(i * pixels + done, count * pixels);
+        write_values(of, &layout, &open(variable(of))?, &failed, &mut tell)?;
+    }
+    let group = group(view, &arrays);
+    fs::write(folder.path().join("zarr.json"), format!("{group:#}\n")).map_err(|error| failed(&error))?;
+    folder.finish()?;
+    Ok(vec![path.to_owned()])
+}
+
+fn write_values(
+    view: &View,
+    layout: &Layout,
+    array: &Array<FilesystemStore>,
+    failed: &dyn Fn(&dyn std::fmt::Display) -> Error,
+    progress: &mut Progress,
+) -> Result<()> {
+    let (mut reader, rect, bands) = (view.reader(), view.rect(), view.channels().len());
+    let [deep, side, _] = layout.file.map(|n| n as usize);
+    let strides = Strides { row: side, pixel: 1, band: side * side };
+    let mut values = vec![f32::NAN; deep * side * side];
+    for (row, y0) in (0..).zip((rect.y0..rect.y1).step_by(side)) {
+        let y1 = y0.saturating_add(side as u32).min(rect.y1);
+        for (column, x0) in (0..).zip((rect.x0..rect.x1).step_by(side)) {
+            let x1 = x0.saturating_add(side as u32).min(rect.x1);
+            for (group, first) in (0..).zip((0..bands).step_by(deep)) {
+                // Beyond the edges chunks are padded with the fill value.
+                values.fill(f32::NAN);
+                let part = first..(first + deep).min(bands);
+                reader.read(Rect { x0, y0, x1, y1 }, part, strides, &mut values)?;
+                array
+                    .store_chunk(&[group, row, column], ArrayBytes::new_flen(bytemuck::cast_slice::<f32, u8>(&values)))
+                    .map_err(|error| failed(&error))?;
+            }
+        }
+        progress(u64::from(y1 - rect.y0) * u64::from(rect.width()), rect.pixels())?;
+    }
+    Ok(())
+}
+
+/// What is written: values, and their standard errors where the cube has them and they are of the same quantity.
+fn views<'a>(view: &View<'a>) -> Result<Vec<View<'a>>> {
+    let same = matches!(view.quantity(), Quantity::Radiance | Quantity::Integrated);
+    let mut views = vec![view.clone()];
+    if same && !view.is_of_errors() && view.cube().header().has_uncertainty() {
+        views.push(view.clone().of_errors()?);
+    }
+    Ok(views)
+}
+
+/// The name of the array with the values.
+fn variable(view: &View) -> &'static str {
+    match view.quantity() {
+        _ if view.is_of_errors() => "standard_error",
+        Quantity::Radiance | Quantity::Integrated => "radiance",
+        Quantity::Temperature => "brightness_temperature",
+        Quantity::Xyz(_) => "xyz",
+    }
+}
+
+fn group(view: &View, arrays: &[(&str, Value)]) -> Value {
+    let header = view.cube().header();
+    let mut attributes = header.attributes.clone();
+    attributes.extend([
+        ("Conventions".into(), json!("CF-1.11")),
+        ("title".into(), json!("Spectral image")),
+        ("source".into(), json!(format!("Spectile {}", env!("CARGO_PKG_VERSION")))),
+        ("channel_names".into(), json!(view.channels().names)),
+    ]);
+    if !view.channels().responses.is_empty() {
+        attributes.insert("responses".into(), json!(view.channels().responses));
+    }
+    let metadata: Map<String, Value> = arrays.iter().map(|(name, value)| ((*name).into(), value.clone())).collect();
+    json!({
+        "zarr_format": 3,
+        "node_type": "group",
+        "attributes": attributes,
+        "consolidated_metadata": { "kind": "inline", "must_understand": false, "metadata": metadata },
+    })
+}
+
+fn arrays(view: &View, layout: &Layout) -> Result<Vec<(&'static str, Value)>> {
+    let bands = view.channels().len() as u64;
+    let [width, height] = view.size().map(u64::from);
+    let little = json!({ "name": "bytes", "configuration": { "endian": "little" } });
+    let compressed = json!([little, { "name": "zstd", "configuration": { "level": LEVEL, "checksum": false } }]);
+    let codecs = if layout.chunk == layout.file {
+        compressed
+    } else {
+        json!([{ "name": "sharding_indexed", "configuration": {
+            "chunk_shape": layout.chunk,
+            "codecs": compressed,
+            "index_codecs": [little, { "name": "crc32c" }],
+            "index_location": "end",
+        } }])
+    };
+    let array = |data_type: &str, shape: &[u64], file: &[u64], codecs: Value, names: &[&str], attributes: Value| {
+        json!({
+            "zarr_format": 3,
+            "node_type": "array",
+            "shape": shape,
+            "data_type": data_type,
+            "chunk_grid": { "name": "regular", "configuration": { "chunk_shape": file } },
+            "chunk_key_encoding": { "name": "default", "configuration": { "separator": "/" } },
+            "fill_value": "NaN",
+            "codecs": codecs,
+            "attributes": attributes,
+            "dimension_names": names,
+            "storage_transformers": [],
+        })
+    };
+    let coordinate = |shape: &[u64], names: &[&str], attributes: Value| {
+        array("float64", shape, shape, json!([little]), names, attributes)
+    };
+    let pixel = |side: &str| json!({ "long_name": format!("pixel centre on the full film, from the {side}"), "units": "pixel" });
+    let mut arrays = Vec::new();
+    for of in views(view)? {
+        let attributes = json!({
+            "long_name": long_name(&of),
+            "units": units(&of),
+            "coordinates": "wavelength_width response_integral",
+        });
+        let names = ["wavelength", "y", "x"];
+        let shape = [bands, height, width];
+        arrays.push((variable(&of), array("float32", &shape, &layout.file, codecs.clone(), &names, attributes)));
+    }
+    arrays.extend([
+        (
+            "wavelength",
+            coordinate(
+                &[bands],
+                &["wavelength"],
+                json!({
+                    "standard_name": "radiation_wavelength",
+                    "long_name": "centre of the channel",
+                    "units": "nm",
+                    "bounds": "wavelength_bounds",
+                }),
+            ),
+        ),
+        (
+            "wavelength_width",
+            coordinate(&[bands], &["wavelength"], json!({ "long_name": "width of the channel", "units": "nm" })),
+        ),
+        (
+            "wavelength_bounds",
+            coordinate(
+                &[bands, 2],
+                &["wavelength", "bnds"],
+                json!({ "long_name": "lower and upper end of the channel", "units": "nm" }),
+            ),
+        ),
+        (
+            "response_integral",
+            coordinate(
+                &[bands],
+                &["wavelength"],
+                json!({ "long_name": "integral of the channel's response (its width where it has none)", "units": "nm" }),
+            ),
+        ),
+        ("y", coordinate(&[height], &["y"], pixel("top"))),
+        ("x", coordinate(&[width], &["x"], pixel("left"))),
+    ]);
+    Ok(arrays)
+}

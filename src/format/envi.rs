@@ -1,0 +1,414 @@
+//! Headers of ENVI images and spectral libraries: `ENVI` on the first line, then `key = value`, lists in braces, comments
+//! after `;`.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use crate::error::Problem;
+
+/// How the values of an image follow each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Interleave {
+    /// Line by line, in each band by band
+    Bil,
+    /// Pixel by pixel, in each band by band
+    Bip,
+    /// Band by band
+    Bsq,
+}
+
+impl Interleave {
+    pub fn name(self) -> &'static str {
+        match self {
+            Interleave::Bil => "bil",
+            Interleave::Bip => "bip",
+            Interleave::Bsq => "bsq",
+        }
+    }
+}
+
+/// The number types of ENVI that are real.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DataType {
+    U8,
+    I16,
+    I32,
+    F32,
+    F64,
+    U16,
+    U32,
+    I64,
+    U64,
+}
+
+impl DataType {
+    fn from_number(number: u64) -> Option<DataType> {
+        Some(match number {
+            1 => DataType::U8,
+            2 => DataType::I16,
+            3 => DataType::I32,
+            4 => DataType::F32,
+            5 => DataType::F64,
+            12 => DataType::U16,
+            13 => DataType::U32,
+            14 => DataType::I64,
+            15 => DataType::U64,
+            _ => return None,
+        })
+    }
+
+    pub fn bytes(self) -> usize {
+        match self {
+            DataType::U8 => 1,
+            DataType::I16 | DataType::U16 => 2,
+            DataType::I32 | DataType::F32 | DataType::U32 => 4,
+            DataType::F64 | DataType::I64 | DataType::U64 => 8,
+        }
+    }
+
+    /// The number in `bytes`, which are [`DataType::bytes`] many.
+    pub fn decode(self, bytes: &[u8], big_endian: bool) -> f64 {
+        let mut word = [0u8; 8];
+        let n = self.bytes();
+        for (i, byte) in bytes.iter().take(n).enumerate() {
+            word[if big_endian { n - 1 - i } else { i }] = *byte;
+        }
+        let bits = u64::from_le_bytes(word);
+        match self {
+            DataType::U8 | DataType::U16 | DataType::U32 | DataType::U64 => bits as f64,
+            DataType::I16 => f64::from(bits as u16 as i16),
+            DataType::I32 => f64::from(bits as u32 as i32),
+            DataType::I64 => bits as i64 as f64,
+            DataType::F32 => f64::from(f32::from_bits(bits as u32)),
+            DataType::F64 => f64::from_bits(bits),
+        }
+    }
+}
+
+/// What a header says of the layout, and of the bands. Everything else is in `other`, by lower-case key.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Header {
+    pub samples: usize,
+    pub lines: usize,
+    pub bands: usize,
+    pub header_offset: u64,
+    pub data_type: DataType,
+    pub interleave: Interleave,
+    pub big_endian: bool,
+    /// Of each band (of each sample, in a library), nm; where the header gives them.
+    pub wavelength_nm: Option<Vec<f64>>,
+    pub other: BTreeMap<String, String>,
+}
+
+impl Header {
+    /// A list `{ a, b }` among [`Header::other`].
+    pub fn list(&self, key: &str) -> Option<Vec<&str>> {
+        self.other.get(key).map(|text| split_list(text))
+    }
+
+    /// Whether this describes a spectral library: `lines` spectra of `samples` values.
+    pub fn is_library(&self) -> bool {
+        self.other.get("file type").is_some_and(|kind| kind.eq_ignore_ascii_case("ENVI Spectral Library"))
+    }
+
+    /// Bytes that the data file must have at least.
+    pub fn data_bytes(&self) -> Option<u64> {
+        let values = (self.samples as u64).checked_mul(self.lines as u64)?.checked_mul(self.bands as u64)?;
+        values.checked_mul(self.data_type.bytes() as u64)?.checked_add(self.header_offset)
+    }
+}
+
+fn split_list(text: &str) -> Vec<&str> {
+    let inner = text.trim().trim_start_matches('{').trim_end_matches('}');
+    inner.split(',').map(str::trim).filter(|item| !item.is_empty()).collect()
+}
+
+/// The header that goes with a data file, or the other way round: `name.hdr` or `name.img.hdr` with `name.img`.
+pub fn header_path(data: &Path) -> Option<PathBuf> {
+    let appended = {
+        let mut name = data.as_os_str().to_owned();
+        name.push(".hdr");
+        PathBuf::from(name)
+    };
+    [appended, data.with_extension("hdr"), data.with_extension("HDR")].into_iter().find(|path| path.is_file())
+}
+
+/// Reads a header; `path` stands in messages.
+pub fn parse(bytes: &[u8], path: &Path) -> Result<Header, Box<Problem>> {
+    let text = String::from_utf8_lossy(bytes);
+    let wrong = |line: Option<usize>, message: String, help: &str| {
+        let help = (!help.is_empty()).then(|| help.to_owned());
+        Box::new(Problem { file: path.to_owned(), line, message, help, ..Problem::default() })
+    };
+    let mut lines = (1..).zip(text.lines());
+    if lines.next().is_none_or(|(_, line)| line.trim_start_matches('\u{feff}').trim() != "ENVI") {
+        return Err(wrong(None, "is no ENVI header: its first line is not `ENVI`".into(), ""));
+    }
+    let mut entries: BTreeMap<String, (usize, String)> = BTreeMap::new();
+    while let Some((number, line)) = lines.next() {
+        if line.trim().is_empty() || line.trim_start().starts_with(';') {
+            continue;
+        }
+        let Some((key, value)) = line.split_once('=') else {
+            let shown: String = line.chars().take(60).collect();
+            return Err(wrong(Some(number), format!("`{}` is no `key = value`", shown.escape_debug()), ""));
+        };
+        let mut value = value.trim().to_owned();
+        if value.starts_with('{') {
+            while !value.contains('}') {
+                let Some((_, more)) = lines.next() else {
+                    return Err(wrong(Some(number), "opens a list with { that never ends".into(), "close it with }"));
+                };
+                if !more.trim_start().starts_with(';') {
+                    value.push(' ');
+                    value.push_str(more.trim());
+                }
+            }
+        }
+        let key = key.split_whitespace().collect::<Vec<_>>().join(" ").to_lowercase();
+        entries.insert(key, (number, value));
+    }
+
+    let mut take = |key: &str| entries.remove(key);
+    let mut number = |key: &str, default: Option<u64>| match take(key) {
+        Some((line, text)) => text.parse::<u64>().map(|n| (Some(line), n)).map_err(|_| {
+            wrong(Some(line), format!("`{key}` must be a whole number, but is `{}`", text.escape_debug()), "")
+        }),
+        None => default.map(|n| (None, n)).ok_or_else(|| wrong(None, format!("says nothing about `{key}`"), "")),
+    };
+    let count = |(line, n): (Option<usize>, u64), key: &str| {
+        let fits = usize::try_from(n).ok().filter(|n| *n > 0 && *n <= isize::MAX as usize);
+        fits.ok_or_else(|| wrong(line, format!("`{key}` must be at least 1, but is {n}"), ""))
+    };
+    let samples = count(number("samples", None)?, "samples")?;
+    let lines = count(number("lines", None)?, "lines")?;
+    let bands = count(number("bands", Some(1))?, "bands")?;
+    let (_, header_offset) = number("header offset", Some(0))?;
+    let (line, code) = number("data type", None)?;
+    let data_type = DataType::from_number(code).ok_or_else(|| {
+        wrong(line, format!("`data type` {code} is none that can be read"), "1, 2, 3, 4, 5, 12, 13, 14 and 15 can")
+    })?;
+    let (line, order) = number("byte order", Some(0))?;
+    if order > 1 {
+        return Err(wrong(line, format!("`byte order` must be 0 or 1, but is {order}"), ""));
+    }
+    let interleave = match take("interleave") {
+        None => Interleave::Bsq,
+        Some((line, text)) => match text.to_lowercase().as_str() {
+            "bil" => Interleave::Bil,
+            "bip" => Interleave::Bip,
+            "bsq" => Interleave::Bsq,
+            _ => {
+                let message = format!("`interleave` must be bil, bip or bsq, but is `{}`", text.escape_debug());
+                return Err(wrong(line.into(), message, ""));
+            }
+        },
+    };
+    let mut header = Header {
+        samples,
+        lines,
+        bands,
+        header_offset,
+        data_type,
+        interleave,
+        big_endian: order == 1,
+        wavelength_nm: None,
+        other: BTreeMap::new(),
+    };
+    if header.data_bytes().is_none() {
+        return Err(wrong(None, "describes an image of more bytes than can be counted".into(), ""));
+    }
+    let wavelengths = take("wavelength");
+    header.other = entries.into_iter().map(|(key, (_, value))| (key, value)).collect();
+    let expected = if header.is_library() { samples } else { bands };
+    if let Some((line, text)) = wavelengths {
+        let factor = match header.other.get("wavelength units").map(|unit| unit.to_lowercase()).as_deref() {
+            // Wavelengths of reflected light below 100 are micrometres, as every instrument's are.
+            None | Some("unknown") => None,
+            Some("nanometers" | "nanometres" | "nm") => Some(Some(1.0)),
+            Some("micrometers" | "micrometres" | "microns" | "micron" | "um" | "µm") => Some(Some(1e3)),
+            Some("millimeters" | "mm") => Some(Some(1e6)),
+            Some("wavenumber" | "wavenumbers" | "cm-1") => Some(None),
+            Some(unit) => {
+                let message = format!("gives wavelengths in `{}`", unit.escape_debug());
+                return Err(wrong(Some(line), message, "give them in Nanometers, Micrometers or Wavenumber"));
+            }
+        };
+        let items = split_list(&text);
+        let parsed: Option<Vec<f64>> =
+            items.iter().map(|item| item.parse().ok().filter(|v: &f64| v.is_finite() && *v > 0.0)).collect();
+        let Some(values) = parsed.filter(|values| values.len() == expected) else {
+            let message = format!("`wavelength` must be a list of {expected} numbers above 0, but has {}", items.len());
+            return Err(wrong(Some(line), message, ""));
+        };
+        let in_micrometres = values.iter().all(|v| *v < 100.0);
+        let to_nm = |v: f64| match factor {
+            Some(Some(factor)) => v * factor,
+            Some(None) => 1e7 / v,
+            None if in_micrometres => v * 1e3,
+            None => v,
+        };
+        header.wavelength_nm = Some(values.into_iter().map(to_nm).collect());
+    }
+    Ok(header)
+}
+
+/// What a header of an image that Spectile writes says.
+pub struct Image<'a> {
+    pub description: &'a str,
+    /// Columns, lines and bands.
+    pub size: [usize; 3],
+    pub interleave: Interleave,
+    pub units: &'a str,
+    /// The value of what is not rendered.
+    pub ignore: f32,
+    /// Column and line of the first pixel in the whole picture, from 0.
+    pub origin: [u32; 2],
+    /// Bands, from 0, shown as red, green and blue.
+    pub default_bands: [usize; 3],
+    pub wavelength_nm: Vec<f64>,
+    pub fwhm_nm: Vec<f64>,
+    pub names: Vec<String>,
+}
+
+impl Image<'_> {
+    /// The text of the header.
+    pub fn header(&self) -> String {
+        let mut text = String::from("ENVI\n");
+        let mut entry = |key: &str, value: &str| {
+            // Writing to a string cannot fail.
+            let _ = writeln!(text, "{key} = {value}");
+        };
+        let list = |items: &mut dyn Iterator<Item = String>| format!("{{ {} }}", items.collect::<Vec<_>>().join(", "));
+        let numbers = |values: &[f64]| list(&mut values.iter().map(f64::to_string));
+        let [samples, lines, bands] = self.size;
+        entry("description", &format!("{{ {} }}", plain(self.description)));
+        entry("samples", &samples.to_string());
+        entry("lines", &lines.to_string());
+        entry("bands", &bands.to_string());
+        entry("header offset", "0");
+        entry("file type", "ENVI Standard");
+        entry("data type", "4");
+        entry("interleave", self.interleave.name());
+        entry("byte order", "0");
+        if self.origin != [0, 0] {
+            entry("x start", &(self.origin[0] + 1).to_string());
+            entry("y start", &(self.origin[1] + 1).to_string());
+        }
+        entry("data ignore value", &self.ignore.to_string());
+        entry("data units", self.units);
+        entry("wavelength units", "Nanometers");
+        entry("default bands", &list(&mut self.default_bands.iter().map(|band| (band + 1).to_string())));
+        entry("wavelength", &numbers(&self.wavelength_nm));
+        entry("fwhm", &numbers(&self.fwhm_nm));
+        entry("bbl", &list(&mut (0..bands).map(|_| "1".to_owned())));
+        entry("band names", &list(&mut self.names.iter().map(|name| plain(name))));
+        text
+    }
+}
+
+/// Without what would end a list or an item of one.
+fn plain(text: &str) -> String {
+    text.chars().map(|c| if matches!(c, ',' | '{' | '}' | '\n' | '\r' | ';') { ' ' } else { c }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Header, Box<Problem>> {
+        parse(text.as_bytes(), Path::new("a.hdr"))
+    }
+
+    const SMALL: &str = "ENVI\nsamples = 2\nlines = 3\nbands = 2\ndata type = 4\n";
+
+    #[test]
+    fn headers_of_others_are_read() {
+        let text = format!(
+            "{SMALL}; a comment\nInterleave = BIP\nbyte order = 1\nheader  offset = 16\nwavelength units = Micrometers\n\
+             wavelength = {{\n 0.4,\n 0.5 }}\nspectra names = {{ a, b }}\nsensor type = Unknown\n"
+        );
+        let header = read(&text).unwrap();
+        assert_eq!((header.samples, header.lines, header.bands, header.header_offset), (2, 3, 2, 16));
+        assert_eq!((header.interleave, header.big_endian, header.data_bytes()), (Interleave::Bip, true, Some(64)));
+        assert_eq!(header.wavelength_nm, Some(vec![400.0, 500.0]));
+        assert_eq!(header.list("spectra names"), Some(vec!["a", "b"]));
+        let library = read(
+            "ENVI\r\nfile type = ENVI Spectral Library\nsamples = 3\nlines = 2\nbands = 1\ndata type = 5\n\
+             wavelength = { 400, 500, 600 }",
+        )
+        .unwrap();
+        assert!(library.is_library() && library.wavelength_nm.is_some_and(|nm| nm == [400.0, 500.0, 600.0]));
+        let unsaid = read(&format!("{SMALL}wavelength = {{ 0.4, 2.5 }}")).unwrap();
+        assert_eq!(unsaid.wavelength_nm, Some(vec![400.0, 2500.0]));
+    }
+
+    #[test]
+    fn what_is_written_is_read() {
+        let image = Image {
+            description: "of a test, {1}",
+            size: [2, 3, 2],
+            interleave: Interleave::Bil,
+            units: "W m^-2 sr^-1 nm^-1",
+            ignore: -9999.0,
+            origin: [10, 20],
+            default_bands: [1, 0, 0],
+            wavelength_nm: vec![400.1, 1.0 / 3.0],
+            fwhm_nm: vec![1.0, 2.0],
+            names: vec!["a, b".into(), "c".into()],
+        };
+        let header = read(&image.header()).unwrap();
+        assert_eq!((header.samples, header.lines, header.bands), (2, 3, 2));
+        assert_eq!(header.wavelength_nm, Some(image.wavelength_nm.clone()));
+        assert_eq!(header.list("band names"), Some(vec!["a  b", "c"]));
+        assert_eq!(header.list("default bands"), Some(vec!["2", "1", "1"]));
+        assert_eq!((header.other["x start"].as_str(), header.other["y start"].as_str()), ("11", "21"));
+    }
+
+    #[test]
+    fn numbers_of_every_type_and_order() {
+        for (kind, little, value) in [
+            (DataType::U8, vec![200], 200.0),
+            (DataType::I16, vec![0xfe, 0xff], -2.0),
+            (DataType::U16, vec![0xfe, 0xff], 65534.0),
+            (DataType::I32, (-7i32).to_le_bytes().to_vec(), -7.0),
+            (DataType::U32, u32::MAX.to_le_bytes().to_vec(), 4294967295.0),
+            (DataType::I64, (-7i64).to_le_bytes().to_vec(), -7.0),
+            (DataType::U64, 7u64.to_le_bytes().to_vec(), 7.0),
+            (DataType::F32, 0.5f32.to_le_bytes().to_vec(), 0.5),
+            (DataType::F64, 0.1f64.to_le_bytes().to_vec(), 0.1),
+        ] {
+            assert_eq!(kind.decode(&little, false), value, "{kind:?}");
+            let big: Vec<u8> = little.into_iter().rev().collect();
+            assert_eq!((kind.decode(&big, true), big.len()), (value, kind.bytes()), "{kind:?}");
+        }
+    }
+
+    #[test]
+    fn mistakes_name_their_line() {
+        for (text, line, words) in [
+            ("", None, "first line"),
+            ("ENVI\nsamples\n", Some(2), "no `key = value`"),
+            ("ENVI\nsamples = 2\n", None, "nothing about `lines`"),
+            ("ENVI\nsamples = -2\nlines = 1\n", Some(2), "whole number"),
+            ("ENVI\nsamples = 0\nlines = 1\ndata type = 4\n", Some(2), "at least 1"),
+            ("ENVI\nsamples = 1\nlines = 1\ndata type = 6\n", Some(4), "none that can be read"),
+            ("ENVI\nsamples = 1\nlines = 1\ndata type = 4\nbyte order = 2\n", Some(5), "0 or 1"),
+            ("ENVI\nsamples = 1\nlines = 1\ndata type = 4\ninterleave = x\n", Some(5), "bil, bip or bsq"),
+            ("ENVI\nsamples = 1\nlines = 1\ndata type = 4\nwavelength = { 1, 2 }\n", Some(5), "list of 1"),
+            ("ENVI\nsamples = 1\nlines = 1\ndata type = 4\nwavelength = { -1 }\n", Some(5), "above 0"),
+            ("ENVI\nsamples = 1\nlines = 1\ndata type = 4\nwavelength = { 1\n", Some(5), "never ends"),
+            (
+                "ENVI\nsamples = 1\nlines = 1\ndata type = 4\nwavelength units = Index\nwavelength = { 1 }\n",
+                Some(6),
+                "`index`",
+            ),
+            ("ENVI\nsamples = 9999999999999\nlines = 9999999999999\ndata type = 4\n", None, "counted"),
+        ] {
+            let problem = read(text).unwrap_err();
+            assert_eq!(problem.line, line, "{text:?}: {problem}");
+            assert!(problem.message.contains(words), "{text:?}: {problem}");
+        }
+    }
+}

@@ -1,0 +1,397 @@
+//! Spectra as the libraries of remote sensing keep them: ENVI spectral libraries (`.sli` and a header), ECOSTRESS (and ASTER)
+//! text, and USGS text, whose wavelengths are in a file of their own.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::envi;
+use super::text::{SpectrumTable, Unit, ascending, named, read};
+use crate::error::Problem;
+
+type Read<T> = Result<T, Box<Problem>>;
+
+fn wrong<T>(path: &Path, line: Option<usize>, message: impl Into<String>, help: &str) -> Read<T> {
+    let help = (!help.is_empty()).then(|| help.to_owned());
+    Err(Box::new(Problem { file: path.to_owned(), line, message: message.into(), help, ..Problem::default() }))
+}
+
+/// Whether `path` is an ENVI spectral library: its data, or its header.
+pub fn is_envi(path: &Path, bytes: &[u8]) -> bool {
+    let extension = path.extension().unwrap_or_default();
+    extension.eq_ignore_ascii_case("sli") || (extension.eq_ignore_ascii_case("hdr") && bytes.starts_with(b"ENVI"))
+}
+
+/// The spectrum called `name` (absent: the only one) of an ENVI spectral library.
+pub fn read_envi(path: &Path, name: Option<&str>) -> Read<SpectrumTable> {
+    let is_header = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("hdr"));
+    let (header_path, data) = if is_header {
+        (path.to_owned(), path.with_extension("sli"))
+    } else {
+        match envi::header_path(path) {
+            Some(header) => (header, path.to_owned()),
+            None => return wrong(path, None, "has no header beside it", "its name is that of the library, with .hdr"),
+        }
+    };
+    let header = envi::parse(&read(&header_path)?, &header_path)?;
+    parse_envi(&header, &header_path, &read(&data)?, &data, name)
+}
+
+/// [`read_envi`] on the content of both files.
+pub fn parse_envi(
+    header: &envi::Header,
+    header_path: &Path,
+    data: &[u8],
+    data_path: &Path,
+    name: Option<&str>,
+) -> Read<SpectrumTable> {
+    if !header.is_library() || header.bands != 1 {
+        let help = "its file type must be ENVI Spectral Library, with one band";
+        return wrong(header_path, None, "describes no spectral library", help);
+    }
+    let Some(nm) = header.wavelength_nm.clone() else {
+        return wrong(header_path, None, "says nothing about `wavelength`", "a spectral library has a list of them");
+    };
+    let names = header.list("spectra names").unwrap_or_default();
+    if !names.is_empty() && names.len() != header.lines {
+        let message = format!("has {} `spectra names` for {} spectra", names.len(), header.lines);
+        return wrong(header_path, None, message, "names are separated by commas, and hold none");
+    }
+    let index = match name {
+        None if header.lines == 1 => 0,
+        None => {
+            return wrong(
+                data_path,
+                None,
+                format!("has {} spectra", header.lines),
+                &format!("pick one with `column`: {}", list(&names)),
+            );
+        }
+        Some(wanted) => match names.iter().position(|name| *name == wanted) {
+            Some(index) => index,
+            None => {
+                let message = format!("has no spectrum \"{wanted}\"");
+                return wrong(data_path, None, message, &format!("its spectra are {}", list(&names)));
+            }
+        },
+    };
+    if header.data_bytes().is_none_or(|expected| (data.len() as u64) < expected) {
+        let expected = header.data_bytes().unwrap_or(u64::MAX);
+        return wrong(data_path, None, format!("has {} bytes where its header asks for {expected}", data.len()), "");
+    }
+    let scale = match header.other.get("reflectance scale factor").map(|text| text.parse::<f64>()) {
+        None => 1.0,
+        Some(Ok(scale)) if scale.is_finite() && scale > 0.0 => scale,
+        Some(_) => return wrong(header_path, None, "has a `reflectance scale factor` that is no number above 0", ""),
+    };
+    let ignored = header.other.get("data ignore value").and_then(|text| text.parse::<f64>().ok());
+    let size = header.data_type.bytes();
+    let first = header.header_offset as usize + index * header.samples * size;
+    let mut table = SpectrumTable { nm: Vec::new(), value: Vec::new(), line: Vec::new() };
+    for (i, nm) in nm.into_iter().enumerate() {
+        let value = header.data_type.decode(&data[first + i * size..][..size], header.big_endian);
+        if ignored.is_some_and(|ignored| value == ignored || (value.is_nan() && ignored.is_nan())) {
+            continue;
+        }
+        if !value.is_finite() {
+            return wrong(data_path, None, format!("holds {value} at {nm} nm"), "");
+        }
+        table.nm.push(nm);
+        table.value.push(value / scale);
+    }
+    ascending(table, data_path, "")
+}
+
+/// A few names, for people.
+fn list(names: &[&str]) -> String {
+    const SHOWN: usize = 12;
+    match names.len() {
+        0 => "it names none".to_owned(),
+        n if n <= SHOWN => names.join(", "),
+        n => format!("{} and {} more", names[..SHOWN].join(", "), n - SHOWN),
+    }
+}
+
+/// Whether this is text of ECOSTRESS's kind: lines `Key: value`, the first of them the name.
+pub fn is_ecostress(bytes: &[u8]) -> bool {
+    let first = bytes.split(|b| *b == b'\n').map(<[u8]>::trim_ascii).find(|line| !line.is_empty());
+    first.is_some_and(|line| line.starts_with(b"Name:"))
+}
+
+/// An ECOSTRESS spectrum: lines `Key: value`, an empty one, then pairs of numbers. Percent become fractions.
+pub fn parse_ecostress(bytes: &[u8], path: &Path) -> Read<SpectrumTable> {
+    // Latin-1: every byte is the character of that number.
+    let text: String = bytes.iter().map(|&byte| char::from(byte)).collect();
+    let pair = |line: &str| -> Option<[f64; 2]> {
+        let mut words = line.split_whitespace().map(|word| word.parse::<f64>().ok().filter(|v| v.is_finite()));
+        let pair = [words.next()??, words.next()??];
+        words.next().is_none().then_some(pair)
+    };
+    let mut unit: Option<Unit> = None;
+    let (mut percent, mut y_first, mut promised) = (false, false, None);
+    let mut table = SpectrumTable { nm: Vec::new(), value: Vec::new(), line: Vec::new() };
+    let mut pairs = 0usize;
+    for (number, line) in (1..).zip(text.lines()) {
+        if let Some([a, b]) = pair(line) {
+            let Some(unit) = unit else {
+                return wrong(path, Some(number), "begins with numbers before `X Units` is said", "");
+            };
+            let (x, y) = if y_first { (b, a) } else { (a, b) };
+            pairs += 1;
+            if x > 0.0 {
+                table.nm.push(unit.to_nm(x));
+                table.value.push(if percent { y / 100.0 } else { y });
+                table.line.push(number);
+            }
+            continue;
+        }
+        let Some((key, value)) = line.split_once(':') else {
+            // Values without a partner are in the library's own files, and are nobody's.
+            let all_numbers = line.split_whitespace().all(|word| word.parse::<f64>().is_ok());
+            if pairs > 0 && !all_numbers {
+                return wrong(path, Some(number), "is not a pair of numbers", "");
+            }
+            pairs += usize::from(pairs > 0 && !line.trim().is_empty());
+            continue;
+        };
+        let value = value.trim().to_lowercase();
+        match key.trim().to_lowercase().as_str() {
+            "x units" => {
+                unit = Some(match unit_of(&value) {
+                    Some(unit) => unit,
+                    None => {
+                        let message = format!("gives wavelengths in `{}`", value.escape_debug());
+                        return wrong(path, Some(number), message, "micrometers, nanometers and cm-1 can be read");
+                    }
+                });
+            }
+            "y units" => percent = value.contains("percent"),
+            "first column" => y_first = value == "y",
+            "number of x values" => promised = value.parse::<usize>().ok().map(|n| (number, n)),
+            _ => {}
+        }
+    }
+    if let Some((line, promised)) = promised.filter(|(_, promised)| *promised != pairs) {
+        return wrong(
+            path,
+            Some(line),
+            format!("promises {promised} values, but {pairs} follow"),
+            "the file may be cut",
+        );
+    }
+    ascending(table, path, "")
+}
+
+/// The unit that a header names in words.
+fn unit_of(text: &str) -> Option<Unit> {
+    if text.contains("wavenumber") || text.contains("cm-1") {
+        Some(Unit::Wavenumber)
+    } else if text.contains("micro") || text.contains("um") {
+        Some(Unit::Micrometre)
+    } else if text.contains("nano") || text.contains("nm") {
+        Some(Unit::Nanometre)
+    } else {
+        None
+    }
+}
+
+/// Values of the USGS library at or below this are deleted points (-1.23e34).
+const DELETED: f64 = -1e30;
+
+/// Whether this is text of the USGS spectral library: ` splib07a Record=…: title`.
+pub fn is_usgs(bytes: &[u8]) -> bool {
+    let first = bytes.split(|b| *b == b'\n').next().unwrap_or_default();
+    let text = String::from_utf8_lossy(first);
+    text.contains("Record=") && text.contains(':')
+}
+
+/// A column of numbers under one header line.
+struct Column {
+    title: String,
+    values: Vec<f64>,
+}
+
+fn parse_column(bytes: &[u8], path: &Path) -> Read<Column> {
+    let text = String::from_utf8_lossy(bytes);
+    let mut lines = (1..).zip(text.lines());
+    let title = lines.next().map_or("", |(_, line)| line).trim().to_owned();
+    let mut values = Vec::new();
+    for (number, line) in lines {
+        let line = line.trim();
+        if line.is_empty() {
+            continue;
+        }
+        match line.parse::<f64>() {
+            Ok(value) if value.is_finite() => values.push(value),
+            _ => {
+                let shown: String = line.chars().take(40).collect();
+                return wrong(path, Some(number), format!("`{}` is not a finite number", shown.escape_debug()), "");
+            }
+        }
+    }
+    Ok(Column { title, values })
+}
+
+/// A USGS spectrum with the wavelengths of the file in its folder that has as many: `…_Wavelengths_SPECTROMETER_….txt`. If
+/// several have, the one whose spectrometer the spectrum's name holds.
+pub fn read_usgs(bytes: &[u8], path: &Path) -> Read<SpectrumTable> {
+    let spectrum = parse_column(bytes, path)?;
+    let folder = crate::files::parent(path);
+    let name_of = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let mut candidates: Vec<(PathBuf, Column)> = Vec::new();
+    let mut entries: Vec<PathBuf> = fs::read_dir(folder).into_iter().flatten().flatten().map(|e| e.path()).collect();
+    entries.sort();
+    for entry in entries.into_iter().filter(|entry| name_of(entry).to_lowercase().contains("wavelengths")) {
+        let column = parse_column(&read(&entry)?, &entry)?;
+        if column.values.len() == spectrum.values.len() {
+            candidates.push((entry, column));
+        }
+    }
+    if candidates.len() > 1 {
+        let name = name_of(path).to_uppercase();
+        let spectrometer = |candidate: &Path| {
+            let of_candidate = name_of(candidate).to_uppercase();
+            let after = of_candidate.split("WAVELENGTHS_").nth(1).unwrap_or_default().to_owned();
+            after.split(['_', '.']).next().unwrap_or_default().to_owned()
+        };
+        candidates.retain(|(candidate, _)| {
+            let spectrometer = spectrometer(candidate);
+            !spectrometer.is_empty() && name.contains(&spectrometer)
+        });
+    }
+    let count = spectrum.values.len();
+    let help =
+        "the USGS library keeps them in files such as splib07a_Wavelengths_ASD_….txt; put the right one beside it";
+    match &candidates[..] {
+        [(file, wavelengths)] => pair_usgs(&spectrum, wavelengths, path, file),
+        [] => {
+            wrong(path, None, format!("has {count} values, but no file of {count} wavelengths is in its folder"), help)
+        }
+        several => {
+            let names: Vec<String> = several.iter().map(|(file, _)| name_of(file)).collect();
+            wrong(path, None, format!("has {count} values, and so have {}", names.join(", ")), help)
+        }
+    }
+}
+
+fn pair_usgs(spectrum: &Column, wavelengths: &Column, path: &Path, of: &Path) -> Read<SpectrumTable> {
+    let title = wavelengths.title.to_lowercase();
+    let unit = if title.contains("nanomet") || title.contains("(nm)") { Unit::Nanometre } else { Unit::Micrometre };
+    let mut table = SpectrumTable { nm: Vec::new(), value: Vec::new(), line: Vec::new() };
+    for (i, (&x, &value)) in wavelengths.values.iter().zip(&spectrum.values).enumerate() {
+        if value <= DELETED || x <= DELETED {
+            continue;
+        }
+        if x <= 0.0 {
+            return wrong(of, Some(i + 2), format!("the wavelength must be greater than 0, but is {x}"), "");
+        }
+        table.nm.push(unit.to_nm(x));
+        table.value.push(value);
+        table.line.push(i + 2);
+    }
+    ascending(table, path, "")
+}
+
+/// Columns that a reader of one spectrum has no use for.
+pub fn no_columns(path: &Path, column: Option<&str>) -> Read<()> {
+    match column {
+        None => Ok(()),
+        Some(column) => {
+            wrong(path, None, format!("holds one spectrum, and no column {}", named(column)), "remove `column`")
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ECOSTRESS: &str = "Name: Construction Concrete\nType: manmade\nOwner: caf\u{e9}: none\nFirst Column: X\n\
+        X Units: Wavelength (micrometers)\nY Units:Reflectance (percent)\nNumber of X Values:4\n\
+        Additional Information: none.txt\n\n 14.0\t5.5\n 2.5\t20.0\n 0.4 10.0\n 0.0 99.0\n";
+
+    fn latin1(text: &str) -> Vec<u8> {
+        text.chars().map(|c| u8::try_from(u32::from(c)).unwrap_or(b'?')).collect()
+    }
+
+    #[test]
+    fn ecostress_is_reversed_and_scaled() {
+        let bytes = latin1(ECOSTRESS);
+        assert!(is_ecostress(&bytes));
+        let table = parse_ecostress(&bytes, Path::new("c.spectrum.txt")).unwrap();
+        assert_eq!((table.nm, table.value), (vec![400.0, 2500.0, 14_000.0], vec![0.1, 0.2, 0.055]));
+        assert_eq!(table.line, [12, 11, 10]);
+    }
+
+    #[test]
+    fn wrong_ecostress_files_say_where() {
+        for (from, to, line, words) in [
+            ("Values:4", "Values:5", Some(7), "promises 5 values, but 4"),
+            ("(micrometers)", "(furlongs)", Some(5), "furlongs"),
+            ("X Units: Wavelength (micrometers)\n", "", Some(9), "before `X Units`"),
+            (" 2.5\t20.0\n", " 2.5\ttwenty\n", Some(11), "not a pair"),
+            (" 2.5\t20.0\n", " 25\t20.0\n", Some(10), "follows"),
+        ] {
+            let text = ECOSTRESS.replacen(from, to, 1);
+            let problem = parse_ecostress(&latin1(&text), Path::new("c.txt")).unwrap_err();
+            assert!(problem.message.contains(words), "{problem}");
+            assert_eq!(problem.line, line, "{problem}");
+        }
+    }
+
+    #[test]
+    fn usgs_spectra_find_their_wavelengths() {
+        let folder = tempfile::tempdir().expect("folder");
+        let put = |name: &str, text: &str| fs::write(folder.path().join(name), text).expect("written");
+        put("splib07a_Quartz_BECKb_AREF.txt", " splib07a Record=1: Quartz\n 0.5\n-1.23e34\n 0.7\n");
+        let path = folder.path().join("splib07a_Quartz_BECKb_AREF.txt");
+        let read = || {
+            let bytes = fs::read(&path).expect("read");
+            assert!(is_usgs(&bytes));
+            read_usgs(&bytes, &path)
+        };
+        assert!(read().unwrap_err().message.contains("no file of 3 wavelengths"));
+        put("splib07a_Wavelengths_BECK_Beckman.txt", " splib07a Record=2: Wavelengths in microns\n 0.4\n 0.5\n 0.6\n");
+        put("splib07a_Wavelengths_NIC4_x.txt", " splib07a Record=3: Wavelengths\n 1\n 2\n");
+        let table = read().unwrap();
+        assert_eq!((table.nm, table.value, table.line), (vec![400.0, 600.0], vec![0.5, 0.7], vec![2, 4]));
+        put("splib07a_Wavelengths_ASD_x.txt", " splib07a Record=3: Wavelengths (nm)\n 1\n 2\n 3\n");
+        assert_eq!(read().unwrap().nm, [400.0, 600.0]);
+        fs::rename(folder.path().join("splib07a_Wavelengths_ASD_x.txt"), folder.path().join("wavelengths.txt"))
+            .expect("renamed");
+        fs::rename(folder.path().join("splib07a_Wavelengths_BECK_Beckman.txt"), folder.path().join("Wavelengths2.txt"))
+            .expect("renamed");
+        assert!(read().is_err(), "none of two names the spectrometer");
+        put("wavelengths.txt", " x Record=1: y\n 1\n x\n 3\n");
+        assert_eq!(read().unwrap_err().line, Some(3));
+    }
+
+    fn library(names: &str) -> String {
+        format!(
+            "ENVI\nfile type = ENVI Spectral Library\nsamples = 3\nlines = 2\nbands = 1\ndata type = 4\ninterleave = bsq\n\
+             byte order = 0\nwavelength units = Micrometers\nreflectance scale factor = 100\nwavelength = {{ 0.6, 0.5, 0.4 }}\n\
+             spectra names = {{ {names} }}\n"
+        )
+    }
+
+    #[test]
+    fn envi_libraries_pick_a_spectrum() {
+        let path = Path::new("a.hdr");
+        let header = envi::parse(library("dry soil, wet").as_bytes(), path).unwrap();
+        let data: Vec<u8> = [1f32, 2.0, 3.0, 10.0, 20.0, 30.0].iter().flat_map(|v| v.to_le_bytes()).collect();
+        let read = |header: &envi::Header, data: &[u8], name: Option<&str>| {
+            parse_envi(header, path, data, Path::new("a.sli"), name)
+        };
+        let table = read(&header, &data, Some("wet")).unwrap();
+        assert_eq!((table.nm, table.value), (vec![400.0, 500.0, 600.0], vec![0.3, 0.2, 0.1]));
+        for (data, name, words) in [
+            (&data[..], None, "has 2 spectra"),
+            (&data[..], Some("dust"), "no spectrum \"dust\""),
+            (&data[..20], Some("wet"), "20 bytes where its header asks for 24"),
+        ] {
+            let problem = read(&header, data, name).unwrap_err();
+            assert!(problem.message.contains(words), "{problem}");
+        }
+        let three = envi::parse(library("a, b, c").as_bytes(), path).unwrap();
+        assert!(read(&three, &data, Some("a")).unwrap_err().message.contains("3 `spectra names`"));
+    }
+}

@@ -1,0 +1,368 @@
+//! `spectile export` through the real binary, read back by programs that were not written here, and its memory.
+//!
+//! SPECTILE_PYTHON names a Python that has tests/python/requirements.txt. Without it those tests say so and check what can be
+//! checked without, except where CI=true.
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use common::{Written, create, header, pattern, unit};
+use serde_json::{Value, json};
+use spectile::cube::{Cube, Header};
+use spectile::spectral::Channels;
+use tempfile::tempdir;
+
+fn run(folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_spectile"));
+    command.current_dir(folder).args(arguments).output().expect("the binary runs")
+}
+
+/// The last JSON object of an export that must succeed, and what it said on stderr.
+fn export(folder: &Path, arguments: &[&str]) -> (Value, String) {
+    let output = run(folder, &[&["export", "cube.zarr", "--json"], arguments].concat());
+    let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{arguments:?}: {stderr}");
+    let stdout = String::from_utf8_lossy(&output.stdout);
+    let done: Value = serde_json::from_str(stdout.lines().last().expect("a line")).expect("JSON");
+    assert_eq!(done["event"], "done");
+    (done, stderr)
+}
+
+fn refused(folder: &Path, arguments: &[&str], words: &str) {
+    let output = run(folder, &[&["export", "cube.zarr"], arguments].concat());
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {stderr}");
+    assert!(stderr.contains(words), "{arguments:?}: {stderr}");
+}
+
+/// A cube of odd sizes on the film's [100, 50], the tiles `missing` not rendered.
+fn cube(folder: &Path, channels: Channels, missing: &[u32]) -> Written {
+    let shape = Header { channels, origin: [100, 50], ..header([70, 37], [16, 8], 1) };
+    let cube = create(folder, "cube.zarr", shape);
+    for tile in (0..cube.grid().count()).filter(|tile| !missing.contains(tile)) {
+        cube.merge_unit(tile, 1, &unit(&cube, tile, pattern)).expect("merged");
+    }
+    cube
+}
+
+/// What a part of a cube must be in somebody else's format.
+struct Part<'a> {
+    cube: &'a Cube,
+    bands: Vec<usize>,
+    /// x0, y0, x1, y1.
+    crop: [u32; 4],
+    /// Bands are multiplied by their widths.
+    integrated: bool,
+}
+
+impl Part<'_> {
+    /// [y][x][band], by the slow way through single pixels.
+    fn values(&self) -> (Vec<f32>, Vec<f32>) {
+        let [x0, y0, x1, y1] = self.crop;
+        let channels = self.cube.channels();
+        let (mut values, mut colours) = (Vec::new(), Vec::new());
+        for y in y0..y1 {
+            for x in x0..x1 {
+                let spectrum = self.cube.spectrum(x, y).expect("readable");
+                let colour = spectrum.as_ref().map_or([f32::NAN; 3], |s| self.cube.projection().rgb(s));
+                colours.extend(colour);
+                values.extend(self.bands.iter().map(|&k| match &spectrum {
+                    None => f32::NAN,
+                    Some(s) if self.integrated => (f64::from(s[k]) * channels.width(k)) as f32,
+                    Some(s) => s[k],
+                }));
+            }
+        }
+        (values, colours)
+    }
+
+    /// Has Python compare `files` with it.
+    fn check(&self, folder: &Path, format: &str, files: &Value, more: Value) {
+        let Some(python) = std::env::var_os("SPECTILE_PYTHON").filter(|python| !python.is_empty()) else {
+            assert!(std::env::var("CI").as_deref() != Ok("true"), "CI must set SPECTILE_PYTHON");
+            eprintln!("skipped: SPECTILE_PYTHON names no Python with tests/python/requirements.txt");
+            return;
+        };
+        let (values, colours) = self.values();
+        fs::write(folder.join("values.bin"), bytemuck::cast_slice::<f32, u8>(&values)).expect("written");
+        fs::write(folder.join("rgb.bin"), bytemuck::cast_slice::<f32, u8>(&colours)).expect("written");
+        let channels = self.cube.channels().select(&self.bands);
+        let each = |value: &dyn Fn(usize) -> f64| (0..channels.len()).map(value).collect::<Vec<f64>>();
+        let [x0, y0, x1, y1] = self.crop;
+        let mut expected = json!({
+            "format": format,
+            "files": files,
+            "values": "values.bin",
+            "rgb": "rgb.bin",
+            "size": [x1 - x0, y1 - y0],
+            "origin": [self.cube.header().origin[0] + x0, self.cube.header().origin[1] + y0],
+            "wavelength": each(&|k| channels.centre(k)),
+            "fwhm": each(&|k| channels.width(k)),
+            "names": channels.names,
+        });
+        for (key, value) in more.as_object().expect("an object") {
+            expected[key] = value.clone();
+        }
+        let path = folder.join("expected.json");
+        fs::write(&path, expected.to_string()).expect("written");
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python/read_exports.py");
+        // A warning is an error: users should not see any.
+        let output = Command::new(python).args(["-W", "error"]).arg(script).arg(&path).output().expect("Python runs");
+        assert!(output.status.success(), "{format}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+}
+
+fn whole(cube: &Cube) -> Part<'_> {
+    let [x1, y1] = cube.header().size;
+    Part { cube, bands: (0..cube.channels().len()).collect(), crop: [0, 0, x1, y1], integrated: false }
+}
+
+#[test]
+fn envi_in_every_order_is_read_by_spectral_and_rasterio() {
+    let folder = tempdir().expect("folder");
+    let cube = cube(folder.path(), Channels::equal(380.0, 780.0, 21), &[3, 8]);
+    for interleave in ["bil", "bip", "bsq"] {
+        let (done, _) = export(folder.path(), &["-o", "all.img", "--interleave", interleave]);
+        assert_eq!(done["files"], json!(["all.img", "all.hdr"]));
+        let more = json!({ "interleave": interleave, "units": "W m^-2 sr^-1 nm^-1", "default_bands": [13, 8, 4] });
+        whole(&cube).check(folder.path(), "envi", &done["files"], more);
+        // The extension says the order too.
+        let (done, _) = export(
+            folder.path(),
+            &["-o", &format!("part.{interleave}"), "--crop", "5,7,66,30", "--bands", "20,3..9", "--integrated"],
+        );
+        let bands = [20].into_iter().chain(3..9).collect();
+        let part = Part { cube: &cube, bands, crop: [5, 7, 66, 30], integrated: true };
+        let more = json!({ "interleave": interleave, "units": "W m^-2 sr^-1", "default_bands": [6, 6, 2] });
+        part.check(folder.path(), "envi", &done["files"], more);
+    }
+    // Bit for bit without Python too.
+    let (done, _) = export(folder.path(), &["-o", "raw.bip"]);
+    let expected: Vec<f32> =
+        whole(&cube).values().0.into_iter().map(|v| if v.is_nan() { -9999.0 } else { v }).collect();
+    let path = folder.path().join(done["files"][0].as_str().expect("a name"));
+    assert_eq!(fs::read(path).expect("read"), bytemuck::cast_slice::<f32, u8>(&expected));
+}
+
+#[test]
+fn openexr_is_read_by_openexr_and_colour() {
+    let folder = tempdir().expect("folder");
+    let cube = cube(folder.path(), Channels::equal(380.0, 20_000.0, 45), &[8]);
+    let (done, stderr) = export(folder.path(), &["-o", "all.exr"]);
+    assert_eq!(stderr, "");
+    whole(&cube).check(folder.path(), "exr", &done["files"], json!({ "units": "W.m^-2.sr^-1.nm^-1" }));
+    let (done, _) = export(folder.path(), &["-o", "strict.exr", "--exr-strict-units"]);
+    whole(&cube).check(folder.path(), "exr", &done["files"], json!({ "units": "W.m^-2.sr^-1" }));
+    let (done, _) =
+        export(folder.path(), &["-o", "part.exr", "--bands", "30,600nm,2..4", "--crop", "1,2,60,31", "--integrated"]);
+    let part = Part { cube: &cube, bands: vec![30, 0, 2, 3], crop: [1, 2, 60, 31], integrated: true };
+    part.check(folder.path(), "exr", &done["files"], json!({ "units": "W.m^-2.sr^-1" }));
+    let (done, _) = export(folder.path(), &["-o", "split.exr", "--exr-split", "20"]);
+    assert_eq!(done["files"].as_array().map(Vec::len), Some(3), "{done}");
+    whole(&cube).check(folder.path(), "exr-split", &done["files"], json!({ "split": 20 }));
+}
+
+#[test]
+fn many_channels_in_openexr_are_warned_of() {
+    let folder = tempdir().expect("folder");
+    let shape = Header { channels: Channels::equal(400.0, 700.0, 1500), ..header([8, 8], [8, 8], 1) };
+    let cube = create(folder.path(), "cube.zarr", shape);
+    cube.merge_unit(0, 1, &unit(&cube, 0, pattern)).expect("merged");
+    let (done, stderr) = export(folder.path(), &["-o", "all.exr"]);
+    assert!(stderr.contains("1503 channels") && stderr.contains("--exr-split"), "{stderr}");
+    whole(&cube).check(folder.path(), "exr", &done["files"], json!({ "units": "W.m^-2.sr^-1.nm^-1" }));
+    let (_, stderr) = export(folder.path(), &["-o", "all.exr", "--exr-split", "1000"]);
+    assert_eq!(stderr, "");
+    // Channels that one name would stand for.
+    let folder = tempdir().expect("folder");
+    let channels = Channels::from_bounds(vec![[400.0, 500.0], [425.0, 475.0]], None);
+    create(folder.path(), "cube.zarr", Header { channels, ..header([8, 8], [8, 8], 2) });
+    refused(folder.path(), &["-o", "same.exr"], "have one centre, 450 nm");
+    assert_eq!(fs::read_dir(folder.path()).expect("list").count(), 1);
+}
+
+#[test]
+fn compressed_zarr_is_read_by_xarray() {
+    let folder = tempdir().expect("folder");
+    // More bands than a chunk has, in no order.
+    let mut channels = Channels::equal(380.0, 780.0, 100);
+    channels.bounds.rotate_left(30);
+    let cube = cube(folder.path(), channels, &[3, 8]);
+    let more = |sharded: bool, units: &str| json!({ "sharded": sharded, "units": units, "variable": "radiance" });
+    let (done, _) = export(folder.path(), &["-o", "all.zarr"]);
+    whole(&cube).check(folder.path(), "zarr", &done["files"], more(true, "W m-2 sr-1 nm-1"));
+    let (done, _) = export(folder.path(), &["-o", "loose.zarr", "--zarr-no-shards"]);
+    whole(&cube).check(folder.path(), "zarr", &done["files"], more(false, "W m-2 sr-1 nm-1"));
+    let (done, _) =
+        export(folder.path(), &["-o", "part.zarr", "--bands", "7..9,1", "--crop", "9,0,70,37", "--integrated"]);
+    let part = Part { cube: &cube, bands: vec![7, 8, 1], crop: [9, 0, 70, 37], integrated: true };
+    part.check(folder.path(), "zarr", &done["files"], more(true, "W m-2 sr-1"));
+    refused(folder.path(), &["-o", "part.zarr"], "exists already");
+}
+
+#[test]
+fn tables_are_read_by_pandas() {
+    let folder = tempdir().expect("folder");
+    let cube = cube(folder.path(), Channels::equal(380.0, 780.0, 4), &[3]);
+    let (done, _) = export(folder.path(), &["-o", "all.csv"]);
+    whole(&cube).check(folder.path(), "csv", &done["files"], json!({}));
+}
+
+#[test]
+fn blocks_put_together_are_the_picture() {
+    let folder = tempdir().expect("folder");
+    let cube = cube(folder.path(), Channels::equal(380.0, 780.0, 5), &[]);
+    let (done, _) =
+        export(folder.path(), &["-o", "blocks", "--format", "envi", "--interleave", "bip", "--blocks", "32"]);
+    assert_eq!(done["files"], json!(["blocks"]));
+    let text = fs::read_to_string(folder.path().join("blocks/index.json")).expect("an index");
+    let index: Value = serde_json::from_str(&text).expect("JSON");
+    assert_eq!((&index["size"], &index["origin"]), (&json!([70, 37]), &json!([100, 50])));
+    assert_eq!(index["bands"][4]["bounds_nm"], json!([700.0, 780.0]));
+    let blocks = index["blocks"].as_array().expect("blocks");
+    assert_eq!(blocks.len(), 3 * 2);
+    let mut picture = vec![0.0f32; 70 * 37 * 5];
+    for block in blocks {
+        let range = |axis: &str, from: usize| {
+            let end = |i: usize| block[axis][i].as_u64().expect("a number") as usize - from;
+            end(0)..end(1)
+        };
+        let (columns, rows) = (range("x", 100), range("y", 50));
+        let file = folder.path().join("blocks").join(block["files"][0].as_str().expect("a name"));
+        let bytes = fs::read(&file).expect("a file");
+        let mut values = bytes.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b));
+        for y in rows {
+            for x in columns.clone() {
+                (0..5).for_each(|k| picture[(y * 70 + x) * 5 + k] = values.next().expect("a value"));
+            }
+        }
+        assert_eq!(values.next(), None);
+    }
+    assert_eq!(picture, whole(&cube).values().0);
+}
+
+#[test]
+fn what_cannot_be_exported_is_refused() {
+    let folder = tempdir().expect("folder");
+    cube(folder.path(), Channels::equal(380.0, 780.0, 4), &[]);
+    for (arguments, words) in [
+        (vec!["-o", "a.img", "--bands", "4"], "the bands of this cube are 0..4"),
+        (vec!["-o", "a.img", "--bands", "1,0..3"], "the band 1 twice"),
+        (vec!["-o", "a.img", "--bands", "9um"], "no band holds 9000 nm"),
+        (vec!["-o", "a.img", "--crop", "0,0,71,37"], "70 x 37 pixels"),
+        (vec!["-o", "a.img", "--crop", "5,0,5,37"], "X0 < X1"),
+        (vec!["-o", "a.bsq", "--interleave", "bip"], "contradicts"),
+        (vec!["-o", "a.exr", "--interleave", "bip"], "--interleave goes with envi"),
+        (vec!["-o", "a.img", "--exr-split", "5"], "--exr-split goes with exr"),
+        (vec!["-o", "a.img", "--zarr-no-shards"], "--zarr-no-shards goes with zarr"),
+        (vec!["-o", "a.csv", "--exposure", "1"], "--exposure goes with png"),
+        (vec!["-o", "a", "--blocks", "8"], "--format"),
+        (vec!["-o", "a.tif"], "names no format"),
+        (vec!["-o", "a.zarr", "--format", "envi"], "GDAL"),
+        (vec!["-o", "cube.zarr"], "exists already"),
+    ] {
+        refused(folder.path(), &arguments, words);
+    }
+    let output = run(folder.path(), &["export", "cube.zarr", "-o", "no/where.img"]);
+    assert_eq!(output.status.code(), Some(5));
+    // Nothing is left of any of them.
+    assert_eq!(fs::read_dir(folder.path()).expect("list").count(), 1);
+}
+
+/// Anonymous memory of exports of a sparse cube, whose holes read as zeros.
+#[cfg(target_os = "linux")]
+mod memory {
+    use super::*;
+
+    /// The peak, bytes, of an export of `arguments`.
+    fn peak(folder: &Path, arguments: &[&str]) -> u64 {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_spectile"));
+        let mut child =
+            command.current_dir(folder).args(["export", "cube.zarr"]).args(arguments).spawn().expect("started");
+        let mut peak = 0;
+        loop {
+            let status = fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap_or_default();
+            let line = status.lines().find_map(|line| line.strip_prefix("RssAnon:"));
+            let bytes = line.and_then(|line| line.trim().strip_suffix(" kB")?.parse::<u64>().ok()).unwrap_or(0) << 10;
+            peak = peak.max(bytes);
+            if let Some(status) = child.try_wait().expect("a child") {
+                assert!(status.success(), "{arguments:?}");
+                return peak;
+            }
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+    }
+
+    /// A cube of so many pixels a side and channels, of which one pixel is not a hole; and how many bytes it has.
+    fn sparse(folder: &Path, side: u32, channels: usize) -> (Written, u64) {
+        let cube = create(folder, "cube.zarr", header([side, side], [64, 64], channels));
+        let bytes = cube.header().chunk_bytes();
+        let [columns, rows] = cube.grid().tiles();
+        for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
+            let path = folder.join(format!("cube.zarr/radiance/c/0/{row}/{column}"));
+            fs::create_dir_all(path.parent().expect("a folder")).expect("made");
+            let file = fs::File::create(path).expect("made");
+            file.set_len(bytes).expect("a hole");
+            if (row, column) == (1, 1) {
+                use std::os::unix::fs::FileExt;
+                let spectrum: Vec<f32> = (0..channels).map(|k| k as f32 + 0.5).collect();
+                file.write_all_at(bytemuck::cast_slice(&spectrum), 0).expect("written");
+            }
+        }
+        let count = u64::from(cube.grid().count());
+        (cube, count * bytes)
+    }
+
+    fn bounded(side: u32, channels: usize, most: u64, formats: &[&[&str]]) {
+        let folder = tempdir().expect("folder");
+        let (_cube, bytes) = sparse(folder.path(), side, channels);
+        for arguments in formats {
+            let peak = peak(folder.path(), arguments);
+            println!("{arguments:?}: {} MiB of a cube of {} MiB", peak >> 20, bytes >> 20);
+            assert!(peak <= most, "{arguments:?}: {} MiB of {} allowed", peak >> 20, most >> 20);
+        }
+        assert!(bytes > 4 * most, "the cube is larger than that");
+        // And what came out is what was in: pixel 64, 64 of the last band but two.
+        let file = fs::read(folder.path().join("bands.bsq")).expect("written");
+        let values: &[f32] = bytemuck::cast_slice(&file);
+        let plane = (side * side) as usize;
+        assert_eq!(values.len(), 10 * plane);
+        let at = 64 * side as usize + 64;
+        assert_eq!(values[7 * plane + at], (channels - 10 + 7) as f32 + 0.5);
+        assert_eq!(values.iter().filter(|&&v| v != 0.0).count(), 10);
+    }
+
+    #[test]
+    fn of_a_sparse_cube_is_bounded() {
+        // 640 MiB; what is held is 32 MiB at a time, and Python's readers are not part of it.
+        let last: &str = "630..640";
+        bounded(
+            512,
+            640,
+            150 << 20,
+            &[
+                &["-o", "bands.bsq", "--bands", last],
+                &["-o", "bands.zarr", "--bands", last],
+                &["-o", "bands.exr", "--bands", last],
+                &["-o", "all.bil"],
+                &["-o", "all.zarr"],
+                &["-o", "all.exr", "--crop", "0,0,256,256"],
+            ],
+        );
+    }
+
+    #[test]
+    #[ignore = "reads 20 GiB of holes: a minute"]
+    fn of_a_sparse_cube_of_twenty_gibibytes_is_below_500_mib() {
+        let formats: &[&[&str]] = &[
+            &["-o", "bands.bsq", "--bands", "4990..5000"],
+            &["-o", "bands.bil", "--bands", "4990..5000"],
+            &["-o", "bands.zarr", "--bands", "400nm..402nm"],
+            &["-o", "bands.exr", "--bands", "700nm..702nm"],
+        ];
+        bounded(1040, 5000, 500 << 20, formats);
+    }
+}
