@@ -225,14 +225,12 @@ fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
                 let march_from = bitcast<vec4<f32>>(records[r + 1u]).xyz;
                 let march_to = bitcast<vec4<f32>>(records[r + 2u]).xyz;
                 r += 2u;
-                if ((record.x & MODE_ON_F) == 0u) {
+                let on_factor = (record.x & MODE_ON_F) != 0u;
 #repeat VECTORS v
-                    march(record, march_from, march_to, quad_$v, s, weight, &throughput_$v, &radiance_$v);
-#end
-                    continue;
-                }
-#repeat VECTORS v
-                march(record, march_from, march_to, quad_$v, s, 0.0, &factor_$v, &radiance_$v);
+                var through_$v = select(throughput_$v, factor_$v, on_factor);
+                march(record, march_from, march_to, quad_$v, s, select(weight, 0.0, on_factor), &through_$v, &radiance_$v);
+                throughput_$v = select(through_$v, throughput_$v, on_factor);
+                factor_$v = select(factor_$v, through_$v, on_factor);
                 if ((record.x & MODE_GATHER) != 0u) {
                     radiance_$v += throughput_$v * factor_$v * spectrum_value(record.x >> 16u, quad_$v, s);
                     factor_$v = vec4<f32>(0.0);

@@ -84,13 +84,12 @@ fn march(record: vec4<u32>, start: vec3<f32>, to: vec3<f32>, quad: u32, s: Spect
 fn absorption(list: u32, kelvin: f32, quad: u32, s: SpectralSample) -> vec4<f32> {
     var sum = vec4<f32>(0.0);
     var at = list + 1u;
-    // Without loops: their iterations are scarce (KERNELS).
-#repeat MOST_ABSORBERS n
-    if ($nu < volumes[list]) {
+    for (var n = 0u; n < volumes[list]; n += 1u) {
         let strength = bitcast<f32>(volumes[at]);
         let columns = volumes[at + 1u];
         let column = at + 2u;
         at = column + 2u * columns;
+        // Without a loop: iterations are scarce (KERNELS).
         var above = 0u;
 #repeat MOST_COLUMNS c
         above += select(0u, 1u, bitcast<f32>(volumes[column + 2u * min($cu, columns - 1u)]) < kelvin && $cu < columns);
@@ -106,7 +105,6 @@ fn absorption(list: u32, kelvin: f32, quad: u32, s: SpectralSample) -> vec4<f32>
         }
         sum += strength * value;
     }
-#end
     return sum;
 }
 #endif

@@ -88,8 +88,8 @@ pub struct General {
 pub struct MediaShape {
     pub outer: u32,
     pub stretches: u32,
-    /// Id of the wavelength's spectrum, and how large lists of absorbers are, where there are grids.
-    pub grids: Option<[u32; 3]>,
+    /// Id of the wavelength's spectrum, and the most columns of an absorber, where there are grids.
+    pub grids: Option<[u32; 2]>,
 }
 
 /// An environment map, as shaders are composed for it.
@@ -212,7 +212,7 @@ impl Prepared {
         let media_shape = media.as_ref().map(|m| MediaShape {
             outer: m.outer,
             stretches: m.stretches,
-            grids: m.wavelength.map(|w| [tables.ids[ids.needed[media_spectra + w]], m.most_absorbers, m.most_columns]),
+            grids: m.wavelength.map(|w| [tables.ids[ids.needed[media_spectra + w]], m.most_columns]),
         });
 
         let factor = |s: usize| tables.ids[ids.factors[&s]];
@@ -301,12 +301,11 @@ impl Prepared {
         Ok(prepared)
     }
 
-    /// Iterations that evaluation may take for one path: its records, and the voxels on its ways, a vector of channels at a
-    /// time.
+    /// Iterations that evaluation may take for one path: its records, and the voxels on its ways with the absorbers in each.
     pub fn path_iterations(&self) -> u32 {
-        let cells = self.media.as_ref().map_or(0, |media| media.cells);
+        let cells = self.media.as_ref().map_or(0, |media| media.cells.saturating_mul(1 + media.most_absorbers));
         let ways = self.frame.max_bounces.saturating_mul(2) + 1;
-        (self.frame.max_records + 1).saturating_add(ways.saturating_mul(2 * cells))
+        (self.frame.max_records + 1).saturating_add(ways.saturating_mul(cells))
     }
 
     /// Most records that one path can have: at each vertex what it emits and what next-event estimation found.
@@ -443,8 +442,8 @@ impl Prepared {
         d.set("ROUGH_BASE", general.rough_base).set("OP_ETA_TABLE", rough_glass || general.rough_base);
         if let Some(media) = &general.media {
             d.set("MEDIA", true).constant("OUTER_VOLUME", media.outer).constant("MOST_STRETCHES", media.stretches);
-            if let Some([wavelength, absorbers, columns]) = media.grids {
-                d.set("GRIDS", true).set("MOST_ABSORBERS", absorbers).set("MOST_COLUMNS", columns);
+            if let Some([wavelength, columns]) = media.grids {
+                d.set("GRIDS", true).set("MOST_COLUMNS", columns);
                 d.constant("WAVELENGTH", wavelength);
             }
         }
@@ -489,6 +488,10 @@ impl Prepared {
         let quads = self.tables.channels_padded as u32 / 4;
         match self.features.general {
             None => EvaluateShape::new(quads, software),
+            // A march through voxels is long, and compiled for each quad.
+            Some(general) if general.media.is_some_and(|m| m.grids.is_some()) => {
+                EvaluateShape::among(quads, software, &[1])
+            }
             Some(_) => EvaluateShape::general(quads, software),
         }
     }
