@@ -3,13 +3,15 @@
 
 use glam::DVec3;
 
-use super::microfacet::{AZIMUTHS, LATTICE, Lattice, azimuth_at, cosine_at, in_parallel, lambda, smith_ratio, turn};
+use super::microfacet::{LATTICE, Lattice, azimuth_at, cosine_at, in_parallel, lambda, smith_ratio, turn};
 
 /// Cosines between direction and facet for which there is a weight, spread as cubes: metals change fastest near grazing.
 pub const FACET_COSINES: usize = 256;
 /// Cosines of directions: cubes, and a few where masking sets in.
 const CUBES: usize = 256;
 const MASKED: usize = 128;
+/// Azimuths over a quarter turn where roughness differs along and across.
+const AZIMUTHS: usize = 65;
 
 /// Weights w_j over direction such that Σ w_j f(c_j) is the mean over visible facets of f(o·h) G2/G1, f linear between
 /// [`facet_cosine`]s: with f = F the single-scattering albedo, with f = 1 - F what is absorbed at once.
@@ -39,7 +41,8 @@ impl FacetCosines {
         cosines.dedup();
         let lattice = Lattice::new(LATTICE);
         let weights = in_parallel(rows * cosines.len(), |node| {
-            let (sin, cos) = if rows == 1 { (0.0, 1.0) } else { azimuth_at(node / cosines.len(), alpha).sin_cos() };
+            let (sin, cos) =
+                if rows == 1 { (0.0, 1.0) } else { azimuth_at(node / cosines.len(), alpha, AZIMUTHS).sin_cos() };
             let z = cosines[node % cosines.len()];
             let r = ((1.0 - z) * (1.0 + z)).max(0.0).sqrt();
             weights(alpha, DVec3::new(r * cos, r * sin, z), &lattice)
@@ -65,7 +68,7 @@ impl FacetCosines {
         if self.alpha[0] == self.alpha[1] || across == 0.0 {
             return row(0);
         }
-        let turn = turn(direction.y.abs().atan2(direction.x.abs()), self.alpha);
+        let turn = turn(direction.y.abs().atan2(direction.x.abs()), self.alpha, AZIMUTHS);
         let first = (turn as usize).min(AZIMUTHS - 2);
         let a = row(first);
         a + (turn - first as f64) * (row(first + 1) - a)

@@ -15,7 +15,7 @@ use super::fresnel;
 
 /// Nodes along the cosine, and around the normal over a quarter turn.
 const COSINES: usize = 128;
-pub(super) const AZIMUTHS: usize = 33;
+const AZIMUTHS: usize = 33;
 /// Points of the lattice for a node of a table, and its generator: two Fibonacci numbers.
 pub(super) const LATTICE: (usize, usize) = (10_946, 6_765);
 /// Four times the points of a table's node, and no common factor with them.
@@ -42,7 +42,7 @@ impl ReflectionAlbedo {
         let mut albedo = ReflectionAlbedo { alpha, loss: Vec::new(), mean_loss: 0.0 };
         let lattice = Lattice::new(LATTICE);
         albedo.loss = in_parallel(rows, |row| {
-            let (sin, cos) = azimuth_at(row, alpha).sin_cos();
+            let (sin, cos) = azimuth_at(row, alpha, AZIMUTHS).sin_cos();
             let (towards, effective) = (DVec3::new(cos, sin, 0.0), (alpha[0] * cos).hypot(alpha[1] * sin));
             std::array::from_fn(|i| {
                 let z = cosine_at(i, effective);
@@ -74,7 +74,7 @@ impl ReflectionAlbedo {
         }
         let (x, y) = (direction.x.abs() / across, direction.y.abs() / across);
         let at = position(direction.z, (self.alpha[0] * x).hypot(self.alpha[1] * y));
-        let turn = turn(y.atan2(x), self.alpha);
+        let turn = turn(y.atan2(x), self.alpha, AZIMUTHS);
         let row = (turn as usize).min(self.loss.len() - 2);
         let (a, b) = (between(&self.loss[row], at), between(&self.loss[row + 1], at));
         a + (turn - row as f64) * (b - a)
@@ -188,17 +188,17 @@ impl SideAlbedo {
 
 /// Position of an azimuth from 0 to π/2 among the nodes: half of it the azimuth, half that in the space in which the
 /// distribution is round.
-pub(super) fn turn(azimuth: f64, alpha: [f64; 2]) -> f64 {
+pub(super) fn turn(azimuth: f64, alpha: [f64; 2], rows: usize) -> f64 {
     let (sin, cos) = azimuth.sin_cos();
-    (AZIMUTHS - 1) as f64 * 0.5 * (azimuth + (alpha[1] * sin).atan2(alpha[0] * cos)) / FRAC_PI_2
+    (rows - 1) as f64 * 0.5 * (azimuth + (alpha[1] * sin).atan2(alpha[0] * cos)) / FRAC_PI_2
 }
 
 /// The azimuth at node `row`, by bisection of [`turn`].
-pub(super) fn azimuth_at(row: usize, alpha: [f64; 2]) -> f64 {
+pub(super) fn azimuth_at(row: usize, alpha: [f64; 2], rows: usize) -> f64 {
     let (mut low, mut high) = (0.0, FRAC_PI_2);
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
-        if turn(middle, alpha) < row as f64 { low = middle } else { high = middle }
+        if turn(middle, alpha, rows) < row as f64 { low = middle } else { high = middle }
     }
     if row == 0 { 0.0 } else { high }
 }
@@ -417,7 +417,7 @@ mod tests {
         }
         for alpha in [[0.1, 0.2], [1.0, 0.01]] {
             for row in 0..AZIMUTHS {
-                assert!((turn(azimuth_at(row, alpha), alpha) - row as f64).abs() < 1e-9);
+                assert!((turn(azimuth_at(row, alpha, AZIMUTHS), alpha, AZIMUTHS) - row as f64).abs() < 1e-9);
             }
         }
     }
