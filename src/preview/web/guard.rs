@@ -18,6 +18,8 @@ const BURST: f64 = 600.0;
 const ADDRESSES: usize = 1024;
 /// Bytes of a request's target.
 const LONGEST_TARGET: usize = 1024;
+/// Bytes of all its headers, names included; browsers send one or two thousand.
+const LONGEST_HEADERS: usize = 32 << 10;
 
 /// The other end of a connection.
 #[derive(Debug, Clone, Copy)]
@@ -77,6 +79,9 @@ impl Guard {
         }
         if uri.path_and_query().map_or(0, |target| target.as_str().len()) > LONGEST_TARGET {
             return Err((StatusCode::URI_TOO_LONG, "the address is too long"));
+        }
+        if headers.iter().map(|(name, value)| name.as_str().len() + value.len()).sum::<usize>() > LONGEST_HEADERS {
+            return Err((StatusCode::REQUEST_HEADER_FIELDS_TOO_LARGE, "the headers are too long"));
         }
         let host = single(headers, HOST).ok_or((StatusCode::BAD_REQUEST, "one Host header is needed"))?;
         if !self.is_own_name(host) {
