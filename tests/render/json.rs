@@ -75,7 +75,7 @@ fn the_document_names_every_event_and_field() {
     let wide = ["--set", "materials.grey.diffuse.reflectance={ samples = [[450, 0.1], [600, 0.2]] }", "--set", short];
     let runs: Vec<Vec<&str>> = vec![
         render(&["a.zarr", "--spp", "130", "--preview", "a.png", "--profile", "--time", "1h"]),
-        render(&["b.zarr", "--spp", "1"]),
+        render(&["b.zarr", "--spp", "1", "--listen", "127.0.0.1:0"]),
         render(&[&["c.zarr"], &wide[..]].concat()),
         render(&["a.zarr"]),
         render(&["d.zarr", "--set", "film.width=0"]),
