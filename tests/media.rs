@@ -7,7 +7,7 @@ mod device;
 mod scene_builder;
 mod statistics;
 
-use device::{Settings, render};
+use device::{Settings, measure, render};
 use glam::{DVec2, DVec3};
 use scene_builder::heat::*;
 use scene_builder::surfaces::glass_curve;
@@ -15,16 +15,6 @@ use scene_builder::*;
 use spectile::scene::{Field, Filter, Light, Projection, Scene, Shape, Sides};
 use spectile::spectral::{Channels, Curve, Outside, planck as law};
 use statistics::{Bound, Estimate, ORIGIN_OFFSET, assert_estimates};
-
-/// 16 x 16 pixels that look along one ray, `epochs` times 64 samples: replicas of one measurement.
-fn measure(mut scene: Scene, epochs: u32, seed: u64) -> Vec<Estimate> {
-    scene.film.width = 16;
-    scene.film.height = 16;
-    scene.film.crop = [0, 0, 16, 16];
-    let rendered = render(&scene, epochs, 64, Settings { seed, ..Settings::default() });
-    rendered.assert_clean();
-    rendered.replicas()
-}
 
 /// Every sample is `expected`, within `relative` and the least normal f32.
 #[track_caller]
@@ -39,18 +29,6 @@ fn assert_exact(scene: &Scene, expected: &[f64], relative: f64) {
     }
 }
 
-fn down(height: f64) -> spectile::scene::Camera {
-    look(DVec3::new(0.1, 0.2, height), DVec3::new(0.1, 0.2, -9.0), DVec3::Y, narrow())
-}
-
-/// A box of gas one metre deep before a lamp or a wall.
-fn slab(depth: f64, kelvin: Option<f64>, wall: impl FnOnce(Builder) -> Builder) -> Builder {
-    wall(Builder::new().camera(down(3.0)))
-        .medium(depth, kelvin.map(Field::Constant), Field::Constant(1.0))
-        .null_box(DVec3::new(-1.0, -1.0, 0.5), DVec3::new(1.0, 1.0, 1.5))
-}
-
-const DEPTHS: [f64; 10] = [1e-9, 1e-6, 1e-3, 0.1, 0.5, 1.0, 2.0, 5.0, 20.0, 1e6];
 /// Half size of the scene of `slab` with a wall of radius 2, m.
 const HALF_SIZE: f64 = 2.0;
 
@@ -71,11 +49,6 @@ fn beer_lambert_and_isothermal_slabs() {
         assert!(depth != 1.0 || (want - 8.85884247e-3).abs() < 1e-10, "the published digits");
         assert_exact(&slab(depth, Some(300.0), wall).build(), &[want], of_depth.min(1e-4) + 2e-5);
     }
-}
-
-/// The temperature for which Planck's radiance at 10 um is `radiance`: 1/x = log(1 + c₁/(λ⁵ L)).
-fn kelvin_of(radiance: f64) -> f64 {
-    law::C2 / (1e-5 * (law::C1L / 1e-25 * 1e-9 / radiance).ln_1p())
 }
 
 /// S = 1 + t in cells of the middle's temperature: each cell of depth h is off by at most h²/8 of what it sends.

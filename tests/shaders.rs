@@ -8,7 +8,8 @@ use naga::valid::{Capabilities, ValidationFlags, Validator};
 use scene_builder::*;
 use spectile::gpu::adapter::STORAGE_BUFFERS;
 use spectile::gpu::shader::{Module, Source, compose};
-use spectile::render::prepare::{EvaluateShape, Features, Prepared, WindowList, Windows};
+use spectile::render::compose::{EvaluateShape, WindowList, Windows};
+use spectile::render::prepare::{Features, Prepared};
 use spectile::scene::{Attributes, Field, Filter, Projection, Sampler, Scene, Shape, Sides, Texels, TextureKind};
 use spectile::spectral::{Channels, Curve};
 

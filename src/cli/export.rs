@@ -11,7 +11,6 @@ use crate::cube::{Cube, Quantity, Rect, View};
 use crate::export;
 use crate::format::envi::Interleave;
 use crate::format::png;
-use crate::render::worker::check_interrupt;
 use crate::spectral::colour::{Observer, Projection, map_srgb8, percentiles};
 use crate::{Error, Result, files};
 
@@ -253,23 +252,10 @@ fn interleave(args: &Args) -> Result<Interleave> {
 
 /// Writes the files, with a bar on a terminal; an interrupt leaves nothing behind.
 fn write(args: &Args, view: &View, format: export::Format) -> Result<Vec<PathBuf>> {
-    let interrupt = super::interrupt::watch()?;
-    let bar = super::progress::bar(args.json);
-    let mut progress = |done: u64, all: u64| {
-        if let Some(bar) = &bar {
-            bar.set_length(all);
-            bar.set_position(done);
-        }
-        check_interrupt(&interrupt)
-    };
-    let result = match args.blocks {
-        None => export::write(view, &args.output, format, &mut progress),
-        Some(side) => export::write_blocks(view, &args.output, format, side, &mut progress),
-    };
-    if let Some(bar) = &bar {
-        bar.finish_and_clear();
-    }
-    result
+    super::progress::watched(args.json, |progress| match args.blocks {
+        None => export::write(view, &args.output, format, progress),
+        Some(side) => export::write_blocks(view, &args.output, format, side, progress),
+    })
 }
 
 fn report(args: &Args, view: &View, format: export::Format, written: &[PathBuf], output: &Output) -> Result<()> {

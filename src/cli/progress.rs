@@ -13,6 +13,7 @@ use crate::files::format_bytes;
 use crate::render::job::Job;
 use crate::render::plan;
 use crate::render::schedule::{Event, PREVIEW_PIXELS, Status, Summary};
+use crate::render::worker::check_interrupt;
 use crate::{Error, Result};
 
 /// Epochs below which an error estimate is only rough (DESIGN section 8).
@@ -21,13 +22,28 @@ const ROUGH_BELOW: u32 = 8;
 const LINE_EVERY: Duration = Duration::from_secs(1);
 const LINE_AT_LEAST_EVERY: Duration = Duration::from_secs(10);
 
-/// A bar for work that is not a render, on a terminal.
-pub fn bar(json: bool) -> Option<ProgressBar> {
-    (!json && std::io::stderr().is_terminal()).then(|| {
+/// Tells how much of how much is done; an error asks for the end.
+pub type Steps<'a> = &'a mut dyn FnMut(u64, u64) -> Result<()>;
+
+/// Does work that is not a render: with a bar on a terminal, and until a signal ends it.
+pub fn watched<T>(json: bool, work: impl FnOnce(Steps) -> Result<T>) -> Result<T> {
+    let interrupt = super::interrupt::watch()?;
+    let bar = (!json && std::io::stderr().is_terminal()).then(|| {
         let bar = ProgressBar::with_draw_target(Some(1), ProgressDrawTarget::stderr_with_hz(5));
         let style = ProgressStyle::with_template("{bar:30} {percent} %  {eta} left").expect("a valid template");
         bar.with_style(style)
-    })
+    });
+    let result = work(&mut |done, all| {
+        if let Some(bar) = &bar {
+            bar.set_length(all);
+            bar.set_position(done);
+        }
+        check_interrupt(&interrupt)
+    });
+    if let Some(bar) = &bar {
+        bar.finish_and_clear();
+    }
+    result
 }
 
 pub struct Reporter<'a> {

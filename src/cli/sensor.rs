@@ -7,7 +7,6 @@ use serde_json::json;
 use super::Output;
 use crate::cube::{Cube, Existing, integrate};
 use crate::format::response;
-use crate::render::worker::check_interrupt;
 use crate::{Error, Result};
 
 /// Integrate a cube with the responses of a sensor, after the fact
@@ -64,20 +63,9 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     }
     let about = args.responses.file_name().unwrap_or_default().to_string_lossy();
     let existing = if args.overwrite { Existing::Replace } else { Existing::Refuse };
-    let interrupt = super::interrupt::watch()?;
-    let bar = super::progress::bar(args.json);
-    let mut progress = |done: u64, all: u64| {
-        if let Some(bar) = &bar {
-            bar.set_length(all);
-            bar.set_position(done);
-        }
-        check_interrupt(&interrupt)
-    };
-    let result = integrate(&cube, &responses.named, &about, &args.output, existing, &mut progress);
-    if let Some(bar) = &bar {
-        bar.finish_and_clear();
-    }
-    let findings = result?;
+    let findings = super::progress::watched(args.json, |progress| {
+        integrate(&cube, &responses.named, &about, &args.output, existing, progress)
+    })?;
 
     if !findings.left_out.is_empty() {
         let each: Vec<String> =

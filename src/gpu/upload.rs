@@ -3,7 +3,8 @@
 use crate::files::format_bytes;
 use crate::gpu::adapter::Gpu;
 use crate::gpu::buffer;
-use crate::render::prepare::{Prepared, WindowList, Windows};
+use crate::render::compose::{WindowList, Windows};
+use crate::render::prepare::Prepared;
 use crate::{Error, Result};
 
 const NODE_BYTES: u64 = 80;

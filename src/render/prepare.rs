@@ -6,7 +6,6 @@ use crate::gpu::layout::{
     Material, NONE,
 };
 use crate::gpu::self_test::LOOP_LIMIT;
-use crate::gpu::shader::{self, Defines, Module};
 use crate::render::heat;
 use crate::render::integration::Integration;
 use crate::render::lights::{LightPicks, STEPS, light_picks};
@@ -125,7 +124,7 @@ impl General {
         }
     }
 
-    fn has(&self, kinds: &[Kind]) -> bool {
+    pub(super) fn has(&self, kinds: &[Kind]) -> bool {
         kinds.iter().any(|&kind| self.kinds >> kind as u32 & 1 == 1)
     }
 }
@@ -313,189 +312,6 @@ impl Prepared {
         self.frame.max_records
     }
 
-    /// Switches and constants of every pass. `windows`: primitives and nodes per binding, see `gpu::upload`.
-    pub fn defines(&self, windows: &Windows) -> Defines {
-        let f = &self.features;
-        let mut d = Defines::default();
-        d.constant("STACK_SIZE", self.accel.depth);
-        d.set("CAMERA_THIN_LENS", f.thin_lens).set("CAMERA_ORTHOGRAPHIC", f.orthographic).set("GAUSSIAN", f.gaussian);
-        d.set("INDEPENDENT", f.independent).set("ROULETTE", f.roulette).set("SHAPES", f.shapes);
-        if let Some(general) = &f.general {
-            self.general_defines(general, &mut d);
-            if general.dispersion {
-                d.set("STRATA", f.strata).set("KNOTS", f.knots).set("KNOT_STEPS", self.tables.knot_steps());
-                self.spectra_defines(&mut d);
-            }
-        }
-        d.set("EMITTERS", f.emitters).set("ENVIRONMENT", f.environment).set("LIGHTS", f.emitters || f.environment);
-        for (count, many, size_name, list) in [
-            ("NODE_WINDOWS", "MANY_NODE_WINDOWS", "NODE_WINDOW", &windows.nodes),
-            ("PRIMITIVE_WINDOWS", "MANY_PRIMITIVE_WINDOWS", "PRIMITIVE_WINDOW", &windows.primitives),
-        ] {
-            d.set(count, list.count);
-            if list.count > 1 {
-                d.set(many, true).constant(size_name, list.size);
-            }
-        }
-        d
-    }
-
-    /// The modules of each pass, the pass itself last.
-    pub fn camera_modules(&self) -> Vec<Module> {
-        vec![shader::TYPES, shader::RNG, shader::GEOMETRY, shader::FRAME, shader::GENERATE_CAMERA]
-    }
-
-    pub fn bounce_modules(&self) -> Vec<Module> {
-        let mut modules =
-            vec![shader::TYPES, shader::RNG, shader::GEOMETRY, shader::FRAME, shader::SCENE, shader::TRIANGLE];
-        if self.features.shapes {
-            modules.push(shader::SHAPES);
-        }
-        modules.push(shader::BVH);
-        if self.features.emitters || self.features.environment || self.features.general.is_some() {
-            modules.push(shader::LIGHT);
-        }
-        let Some(general) = &self.features.general else {
-            modules.push(shader::GENERATE_BOUNCE);
-            return modules;
-        };
-        if general.attributes {
-            modules.push(shader::ATTRIBUTES);
-        }
-        if general.textures {
-            modules.push(shader::TEXTURE);
-        }
-        if general.lamps {
-            modules.push(shader::LAMP);
-        }
-        if general.map.is_some() {
-            modules.push(shader::MAP);
-        }
-        modules.extend([shader::RECORD, shader::TABLES, shader::MATERIAL, shader::GGX, shader::BSDF]);
-        if general.media.is_some() {
-            modules.extend([shader::VOLUME, shader::MEDIUM]);
-        }
-        if general.anisotropic {
-            modules.push(shader::TANGENT);
-        }
-        if general.dispersion {
-            if self.features.knots {
-                modules.push(shader::KNOTS);
-            }
-            modules.push(shader::CHANNEL);
-        }
-        modules.push(shader::GENERATE_VERTEX);
-        modules
-    }
-
-    pub fn evaluate_modules(&self) -> Vec<Module> {
-        let mut modules = vec![shader::TYPES, shader::FRAME];
-        if self.features.knots {
-            modules.push(shader::KNOTS);
-        }
-        if let Some(general) = &self.features.general {
-            modules.push(shader::RECORD);
-            if general.has(&[Kind::BoundaryAgain]) || general.rough_base {
-                modules.push(shader::TABLES);
-            }
-            if general.map.is_some() {
-                modules.push(shader::MAP_VALUE);
-            }
-            if let Some(media) = &general.media {
-                modules.push(shader::EXTINCTION);
-                if media.grids.is_some() {
-                    modules.push(shader::VOLUME);
-                }
-            }
-            modules.push(shader::PROGRAM);
-        }
-        modules.push(shader::EVALUATE_PIXEL);
-        modules
-    }
-
-    /// What general scenes compile into every pass.
-    fn general_defines(&self, general: &General, d: &mut Defines) {
-        let has = |kinds: &[Kind]| general.has(kinds);
-        let rough_glass = has(&[Kind::RoughBoundary]);
-        d.set("GENERAL", true).set("ANISOTROPIC", general.anisotropic).set("DISPERSION", general.dispersion);
-        d.constant("STATE_WORDS", self.state_bytes() / 16);
-        if general.hot {
-            d.set("HOT", true).constant("HOT_COSINES", heat::COSINES as u32);
-        }
-        for (name, kinds) in [
-            ("MIRRORS", &[Kind::Conductor, Kind::Mirror, Kind::Refraction][..]),
-            ("MICROFACETS", &[Kind::RoughConductor, Kind::RoughCoat, Kind::RoughBoundary]),
-            ("GLASS", &[Kind::Mirror, Kind::RoughBoundary]),
-            ("CONDUCTOR", &[Kind::Conductor]),
-            ("ROUGH_CONDUCTOR", &[Kind::RoughConductor]),
-            ("CONDUCTOR_AGAIN", &[Kind::ConductorAgain]),
-            ("MIRROR", &[Kind::Mirror]),
-            ("REFRACTION", &[Kind::Refraction]),
-            ("ROUGH_GLASS", &[Kind::RoughBoundary]),
-            ("ROUGH_COAT", &[Kind::RoughCoat]),
-            ("BASE", &[Kind::Base]),
-            ("OP_CONDUCTOR", &[Kind::Conductor, Kind::RoughConductor]),
-            ("OP_FRESNEL", &[Kind::Mirror, Kind::Refraction, Kind::RoughBoundary, Kind::RoughCoat, Kind::Base]),
-        ] {
-            d.set(name, has(kinds));
-        }
-        d.set("ROUGH_BASE", general.rough_base).set("OP_ETA_TABLE", rough_glass || general.rough_base);
-        if let Some(media) = &general.media {
-            d.set("MEDIA", true).constant("OUTER_VOLUME", media.outer).constant("MOST_STRETCHES", media.stretches);
-            if let Some([wavelength, columns]) = media.grids {
-                d.set("GRIDS", true).set("MOST_COLUMNS", columns);
-                d.constant("WAVELENGTH", wavelength);
-            }
-        }
-        d.set("OP_ONLY", general.dispersion);
-        d.set("TEXTURES", general.textures).set("TEXTURED", general.textured).set("KEPT", general.textured_base);
-        d.set("COLOURS", general.colours).set("MIXTURES", general.mixtures).set("SHARES", general.shares);
-        d.set("TEXEL_NUMBERS", general.mixtures || general.shares);
-        d.set("ATTRIBUTES", general.attributes).set("SMOOTH", general.smooth);
-        if let Some(surfaces) = &self.surfaces {
-            if let Some(first) = surfaces.textures.as_ref().and_then(|textures| textures.first_share) {
-                d.constant("FIRST_SHARE", first);
-            }
-            if let Some(place) = surfaces.visible_place {
-                d.constant("VISIBLE_PLACE", place);
-            }
-        }
-        let chooses = self.features.emitters || general.lamps;
-        d.set("CHOOSES", chooses).set("AIMS", chooses || general.map.is_some()).set("LAMPS", general.lamps);
-        if general.suns > 0 {
-            d.constant("SUNS", general.suns);
-        }
-        if let Some(map) = general.map {
-            d.set("MAP", true).set("OP_MAP", true).constant("MAP_SOURCE", map.source);
-            d.constant("MAP_AXIS", map.axis).constant("MAP_WIDTH", map.size[0]).constant("MAP_HEIGHT", map.size[1]);
-            if let Some(bands) = map.bands {
-                d.set("MAP_SPECTRAL", true).constant("MAP_BANDS", bands);
-            }
-        }
-        d.set("OP_ROUGH_TRANSMIT", general.spread).set("RAW_RECORDS", general.spread);
-    }
-
-    /// How spectral tables are laid out.
-    fn spectra_defines(&self, d: &mut Defines) {
-        d.constant("SPECTRA", self.tables.stratified as u32);
-        d.constant("CHANNELS", self.channels as u32);
-        d.constant("CHANNELS_PADDED", self.tables.channels_padded as u32);
-        d.constant("QUADS", self.tables.channels_padded as u32 / 4);
-    }
-
-    /// Workgroups of `evaluate_pixel` on a software device or a GPU.
-    pub fn evaluate_shape(&self, software: bool) -> EvaluateShape {
-        let quads = self.tables.channels_padded as u32 / 4;
-        match self.features.general {
-            None => EvaluateShape::new(quads, software),
-            // A march through voxels is long, and compiled for each quad.
-            Some(general) if general.media.is_some_and(|m| m.grids.is_some()) => {
-                EvaluateShape::among(quads, software, &[1])
-            }
-            Some(_) => EvaluateShape::general(quads, software),
-        }
-    }
-
     /// Bytes of a record.
     pub fn record_bytes(&self) -> u32 {
         if self.features.general.is_some() { 16 } else { 8 }
@@ -504,84 +320,6 @@ impl Prepared {
     /// Bytes of a path's state between two bounces.
     pub fn state_bytes(&self) -> u32 {
         if self.features.general.is_some_and(|g| g.dispersion || g.media.is_some()) { 48 } else { 32 }
-    }
-
-    /// Switches and constants of `evaluate_pixel`, for workgroups as `shape` says.
-    pub fn evaluate_defines(&self, shape: EvaluateShape) -> Defines {
-        let mut d = Defines::default();
-        d.set("STRATA", self.features.strata).set("KNOTS", self.features.knots);
-        d.set("REGISTERS", self.features.registers).set("KNOT_STEPS", self.tables.knot_steps());
-        if let Some(general) = &self.features.general {
-            self.general_defines(general, &mut d);
-        }
-        d.set("FACTORS", self.factors as u32).set("SOURCES", self.sources as u32);
-        d.set("WORKGROUP", shape.lanes * shape.pixels);
-        d.constant("FIRST_SOURCE", 1 + self.factors as u32);
-        if let Some((_, weights)) = &self.integration {
-            d.set("RESPONSES", true).constant("RESPONSE", *weights);
-        }
-        self.spectra_defines(&mut d);
-        d.constant("LANES", shape.lanes);
-        d.constant("VECTORS", shape.vectors);
-        d.constant("PIXELS_PER_GROUP", shape.pixels);
-        d
-    }
-}
-
-/// How nodes and primitives are spread over bindings.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Windows {
-    pub nodes: WindowList,
-    pub primitives: WindowList,
-}
-
-/// `count` windows of `size` elements each (the last may be shorter).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct WindowList {
-    pub count: u32,
-    pub size: u32,
-}
-
-/// Threads of one workgroup of `evaluate_pixel`: `lanes` threads for each of `pixels` pixels, `vectors` quads of channels
-/// a thread.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct EvaluateShape {
-    pub vectors: u32,
-    pub lanes: u32,
-    pub pixels: u32,
-    /// Workgroups that share a pixel's channels.
-    pub blocks: u32,
-}
-
-impl EvaluateShape {
-    /// For `quads` quads of channels: groups of 64 to 256 threads, few of them idle.
-    ///
-    /// On software devices loads count most, and more channels a thread share them: measured on lavapipe, a thread's time
-    /// goes as 2.2 + vectors. A GPU hides loads behind other threads, and needs the registers for that.
-    pub fn new(quads: u32, software: bool) -> EvaluateShape {
-        EvaluateShape::among(quads, software, &[1, 2, 4])
-    }
-
-    /// For general scenes, whose code per quad is long: compiling it, and registers, set the limit.
-    pub fn general(quads: u32, software: bool) -> EvaluateShape {
-        EvaluateShape::among(quads, software, &[1, 2])
-    }
-
-    fn among(quads: u32, software: bool, candidates: &[u32]) -> EvaluateShape {
-        let width = if software { 8 } else { 32 };
-        let of = |vectors: u32| {
-            let threads = quads.div_ceil(vectors);
-            if threads < width {
-                let lanes = threads.next_power_of_two();
-                return EvaluateShape { vectors, lanes, pixels: (64 / lanes).max(1), blocks: 1 };
-            }
-            let blocks = threads.div_ceil(256);
-            EvaluateShape { vectors, lanes: threads.div_ceil(blocks).next_multiple_of(width), pixels: 1, blocks }
-        };
-        let cost = |s: &EvaluateShape| f64::from(s.lanes * s.blocks) * (2.2 + f64::from(s.vectors));
-        let candidates = if software { candidates } else { &[1] };
-        let shapes = candidates.iter().map(|&v| of(v));
-        shapes.min_by(|a, b| cost(a).total_cmp(&cost(b))).expect("at least one candidate")
     }
 }
 
@@ -779,28 +517,5 @@ fn frame(
         max_records: 0,
         stratum_bits,
         unused: 0,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::EvaluateShape;
-
-    #[test]
-    fn evaluation_groups_cover_all_channels_with_few_idle_threads() {
-        for software in [true, false] {
-            let width = if software { 8 } else { 32 };
-            for quads in (1..300).chain([500, 512, 1250, 2500]) {
-                let s = EvaluateShape::new(quads, software);
-                let (threads, needed) = (s.lanes * s.blocks, quads.div_ceil(s.vectors));
-                // Each of a pixel's workgroups has channels: evaluation counts on that.
-                assert_eq!(quads.div_ceil(s.lanes * s.vectors), s.blocks, "{quads}: {s:?}");
-                assert!(threads >= needed && s.lanes * s.pixels <= 256, "{quads}: {s:?}");
-                assert!(threads < 2 * needed || threads < needed + width * s.blocks, "{quads}: {s:?}");
-            }
-        }
-        assert_eq!(EvaluateShape::new(100, false), EvaluateShape { vectors: 1, lanes: 128, pixels: 1, blocks: 1 });
-        assert_eq!(EvaluateShape::new(100, true), EvaluateShape { vectors: 4, lanes: 32, pixels: 1, blocks: 1 });
-        assert_eq!(EvaluateShape::new(2, true), EvaluateShape { vectors: 2, lanes: 1, pixels: 64, blocks: 1 });
     }
 }

@@ -13,8 +13,9 @@ use crate::gpu::layout::{Counters, Proof, Wave};
 use crate::gpu::pass::Pass;
 use crate::gpu::shader;
 use crate::gpu::upload::{self, SceneBuffers};
+use crate::render::compose::EvaluateShape;
 use crate::render::patience::Patience;
-use crate::render::prepare::{EvaluateShape, Prepared};
+use crate::render::prepare::Prepared;
 use crate::render::wave::{self, Budget, DeviceLimits, WavePlan};
 use crate::{Error, Result};
 

@@ -113,6 +113,16 @@ pub fn render(scene: &Scene, epochs: u32, samples: u32, settings: Settings) -> E
     Epochs { width, height, channels, means, counters, rays }
 }
 
+/// 16 x 16 pixels that look along one ray, `epochs` times 64 samples: replicas of one measurement.
+pub fn measure(mut scene: Scene, epochs: u32, seed: u64) -> Vec<Estimate> {
+    scene.film.width = 16;
+    scene.film.height = 16;
+    scene.film.crop = [0, 0, 16, 16];
+    let rendered = render(&scene, epochs, 64, Settings { seed, ..Settings::default() });
+    rendered.assert_clean();
+    rendered.replicas()
+}
+
 impl Epochs {
     /// Mean of every value over the epochs, [y][x][k].
     pub fn values(&self) -> Vec<Estimate> {

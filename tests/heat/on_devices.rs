@@ -7,21 +7,11 @@ use spectile::render::prepare::Prepared;
 use spectile::scene::{Filter, Projection, Scene, Sides};
 use spectile::spectral::{Channels, Curve, Outside, planck as law};
 
-use crate::device::{Settings, render};
+use crate::device::{Settings, measure, render};
 use crate::scene_builder::closed_forms::{self, Case};
 use crate::scene_builder::heat::*;
 use crate::scene_builder::*;
 use crate::statistics::*;
-
-/// 16 x 16 pixels that look along one ray, `epochs` times 64 samples: replicas of one measurement.
-fn measure(mut scene: Scene, epochs: u32, seed: u64) -> Vec<Estimate> {
-    scene.film.width = 16;
-    scene.film.height = 16;
-    scene.film.crop = [0, 0, 16, 16];
-    let rendered = render(&scene, epochs, 64, Settings { seed, ..Settings::default() });
-    rendered.assert_clean();
-    rendered.replicas()
-}
 
 #[test]
 fn hot_grey_plates() {

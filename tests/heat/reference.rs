@@ -133,18 +133,6 @@ fn planck_of_hot_surfaces() {
     }
 }
 
-/// A box of gas one metre deep before a lamp or a hot wall.
-fn slab(depth: f64, kelvin: Option<f64>, wall: impl FnOnce(Builder) -> Builder) -> Builder {
-    let base = Builder::new().camera(look(3.0 * DVec3::Z, DVec3::new(0.1, 0.2, 0.0), DVec3::Y, narrow()));
-    // Straight down: the way through the box is a metre.
-    let camera = look(DVec3::new(0.1, 0.2, 3.0), DVec3::new(0.1, 0.2, 0.0), DVec3::Y, narrow());
-    wall(base.camera(camera))
-        .medium(depth, kelvin.map(Field::Constant), Field::Constant(1.0))
-        .null_box(DVec3::new(-1.0, -1.0, 0.5), DVec3::new(1.0, 1.0, 1.5))
-}
-
-const DEPTHS: [f64; 10] = [1e-9, 1e-6, 1e-3, 0.1, 0.5, 1.0, 2.0, 5.0, 20.0, 1e6];
-
 #[test]
 fn beer_lambert_and_isothermal_slabs() {
     let ten = || Channels::from_bounds(vec![[9_999.999, 10_000.001]], None);
@@ -161,11 +149,6 @@ fn beer_lambert_and_isothermal_slabs() {
         assert!(depth != 1.0 || (want - 8.85884247e-3).abs() < 1e-10, "the published digits");
         assert_exact(&scene.build(), &[want], 1e-6);
     }
-}
-
-/// The temperature for which Planck's radiance at 10 um is `radiance`: 1/x = log(1 + c₁/(λ⁵ L)).
-fn kelvin_of(radiance: f64) -> f64 {
-    law::C2 / (1e-5 * (law::C1L / 1e-25 * 1e-9 / radiance).ln_1p())
 }
 
 /// S = 1 + t in cells of the middle's temperature: each cell of depth h is off by at most h²/8 of what it sends.
@@ -250,7 +233,6 @@ fn lorentz_equivalent_width() {
 /// Inside a gas, in a gas within a gas, in the medium outside everything, before and behind a null boundary of nothing.
 #[test]
 fn cameras_and_nested_media() {
-    let down = |height: f64| look(DVec3::new(0.1, 0.2, height), DVec3::new(0.1, 0.2, -9.0), DVec3::Y, narrow());
     let lamp = |b: Builder| b.lamp(disk(DVec3::ZERO, DVec3::Z, 50.0), 1.0, Sides::Front);
     let cube = |half: f64| (DVec3::new(-half, -half, 5.0 - half), DVec3::new(half, half, 5.0 + half));
     // Boxes of 0.3 and 0.7 per metre around z = 5, half sides 2 and 1; outside 0.1; the inner one is met last or first.

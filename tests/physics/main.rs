@@ -15,20 +15,9 @@ mod irradiance;
 mod sides;
 mod spectra;
 
-use device::{Settings, render};
+use device::{Settings, measure, render};
 use spectile::scene::Scene;
 use spectile::spectral::{Curve, Outside};
-use statistics::*;
-
-/// 16 x 16 pixels that look along one ray, `epochs` times 64 samples: replicas of one measurement.
-fn measure(mut scene: Scene, epochs: u32, seed: u64) -> Vec<Estimate> {
-    scene.film.width = 16;
-    scene.film.height = 16;
-    scene.film.crop = [0, 0, 16, 16];
-    let rendered = render(&scene, epochs, 64, Settings { seed, ..Settings::default() });
-    rendered.assert_clean();
-    rendered.replicas()
-}
 
 /// Every pixel of every epoch has the expected value in every channel.
 fn assert_exact(what: &str, scene: &Scene, samples: u32, expected: f64, allowance: f64) {

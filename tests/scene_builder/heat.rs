@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
-use spectile::scene::{Absorber, Field, Grid, Interior, Medium, Mesh, Object, Shape};
-use spectile::spectral::{Channels, Curve, Outside};
+use spectile::scene::{Absorber, Camera, Field, Grid, Interior, Medium, Mesh, Object, Shape};
+use spectile::spectral::{Channels, Curve, Outside, planck as law};
 
 use super::{Builder, IntoCurve, disk, look, narrow};
 
@@ -137,4 +137,24 @@ pub fn lorentz_line(x: f64, published: f64) -> (Curve, Channels, f64) {
     let expected = 1.0 - (published * half_width - wings) / (2.0 * half);
     let channels = Channels::from_bounds(vec![[middle - half, middle + half]], None);
     (Curve::Linear { nm, value, outside: Outside::Zero }, channels, expected)
+}
+
+/// Straight down from a height, beside the axis.
+pub fn down(height: f64) -> Camera {
+    look(DVec3::new(0.1, 0.2, height), DVec3::new(0.1, 0.2, -9.0), DVec3::Y, narrow())
+}
+
+/// A box of gas before a lamp or a wall; the way through it is a metre.
+pub fn slab(depth: f64, kelvin: Option<f64>, wall: impl FnOnce(Builder) -> Builder) -> Builder {
+    wall(Builder::new().camera(down(3.0)))
+        .medium(depth, kelvin.map(Field::Constant), Field::Constant(1.0))
+        .null_box(DVec3::new(-1.0, -1.0, 0.5), DVec3::new(1.0, 1.0, 1.5))
+}
+
+/// From the thinnest to the thickest (VALIDATION section 3).
+pub const DEPTHS: [f64; 10] = [1e-9, 1e-6, 1e-3, 0.1, 0.5, 1.0, 2.0, 5.0, 20.0, 1e6];
+
+/// The temperature for which Planck's radiance at 10 um is `radiance`: 1/x = log(1 + c₁/(λ⁵ L)).
+pub fn kelvin_of(radiance: f64) -> f64 {
+    law::C2 / (1e-5 * (law::C1L / 1e-25 * 1e-9 / radiance).ln_1p())
 }
