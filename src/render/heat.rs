@@ -9,7 +9,7 @@ use glam::DVec3;
 use crate::scattering::fresnel::{conductor, dielectric, mean_conductor, mean_dielectric};
 use crate::scattering::{DielectricAlbedo, FACET_COSINES, FacetCosines, ReflectionAlbedo, facet_cosine, index_range};
 use crate::scene::{Bsdf, Emission, MaterialId, Reflectance, SMOOTH, Scene, Sides, Spectrum, SpectrumId, Weight};
-use crate::spectral::{Channels, Curve, Outside, planck};
+use crate::spectral::{Channels, Curve, planck};
 use crate::{Error, Result};
 
 /// Cosines (j / (n - 1))³ at which the emission of a side is known; between them it is linear in j.
@@ -256,30 +256,13 @@ fn radiance(emitted: Option<&Curve>, leaves: &[Leaf], cosine: f64, back: bool, c
         };
         leaves.iter().map(&mut of_leaf).sum::<f64>() + lamp.iter().sum::<f64>()
     };
-    // From bound to bound, each stretch by its own peak: the tail of Planck's law is as exact as its top.
-    let mut edges: Vec<f64> = channels.bounds.iter().flatten().copied().collect();
-    edges.sort_by(f64::total_cmp);
-    edges.dedup();
-    let (mut nm, mut value) = (Vec::new(), Vec::new());
-    for edge in edges.windows(2) {
-        if !channels.bounds.iter().any(|b| b[0] <= edge[0] && edge[1] <= b[1]) {
-            continue;
-        }
-        // The wavelength itself is one of the curves that the sum is made of.
-        let wavelength = Curve::Linear { nm: edge.to_vec(), value: edge.to_vec(), outside: Outside::Hold };
-        let curves: Vec<&Curve> = std::iter::once(&wavelength).chain(tables.iter().copied()).collect();
-        let stretch = Channels::from_bounds(vec![[edge[0], edge[1]]], None);
-        if let Curve::Linear { nm: x, value: y, .. } = Curve::derived(&curves, &stretch, |v| at(v[0], &v[1..])) {
-            nm.extend(x);
-            value.extend(y);
-        }
-    }
-    Curve::Linear { nm, value, outside: Outside::Hold }
+    Curve::derived_by_stretch(&tables, channels, at)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::spectral::Outside;
 
     fn leaf<'a>(reflectance: Option<&'a Curve>, weight: f64, kelvin: f64) -> Leaf<'a> {
         let absorber = if reflectance.is_some() { Absorber::Diffuse } else { Absorber::Black };

@@ -5,7 +5,7 @@ use glam::{DAffine3, DVec3};
 use crate::accel::Accel;
 use crate::gpu::layout::{NONE, Primitive};
 use crate::scene::{Bsdf, Field, Interior, MaterialId, Medium, Projection, Scene, SpectrumId};
-use crate::spectral::{Channels, Curve, Outside, planck};
+use crate::spectral::{Curve, Outside, planck};
 use crate::{Error, Result};
 
 use super::surfaces::Needed;
@@ -283,21 +283,7 @@ fn source(scene: &Scene, kelvin: f64, index: Option<&Curve>) -> Curve {
     if index.is_constant() {
         return Curve::Blackbody { kelvin, scale: index.eval(scene.channels.centre(0)).powi(2) };
     }
-    // From bound to bound, each stretch by its own peak: the tail of Planck's law is as exact as its top.
-    let mut edges: Vec<f64> = scene.channels.bounds.iter().flatten().copied().collect();
-    edges.sort_by(f64::total_cmp);
-    edges.dedup();
-    let (mut nm, mut value) = (Vec::new(), Vec::new());
-    for edge in edges.windows(2) {
-        let wavelength = Curve::Linear { nm: edge.to_vec(), value: edge.to_vec(), outside: Outside::Hold };
-        let stretch = Channels::from_bounds(vec![[edge[0], edge[1]]], None);
-        let at = |v: &[f64]| planck::radiance(v[0], kelvin) * v[1] * v[1];
-        if let Curve::Linear { nm: x, value: y, .. } = Curve::derived(&[&wavelength, index], &stretch, at) {
-            nm.extend(x);
-            value.extend(y);
-        }
-    }
-    Curve::Linear { nm, value, outside: Outside::Hold }
+    Curve::derived_by_stretch(&[index], &scene.channels, |nm, v| planck::radiance(nm, kelvin) * v[0] * v[0])
 }
 
 /// Spectra and factors whose sum is the absorption of a homogeneous medium, m⁻¹.

@@ -37,6 +37,31 @@ impl Curve {
     }
 }
 
+impl Curve {
+    /// As [`Curve::derived`] with the wavelength in nm as well, f(nm, values): from bound to bound of `channels`, each stretch by
+    /// its own peak, so that the tail of Planck's law is as exact as its top.
+    pub fn derived_by_stretch(curves: &[&Curve], channels: &Channels, f: impl Fn(f64, &[f64]) -> f64) -> Curve {
+        let mut edges: Vec<f64> = channels.bounds.iter().flatten().copied().collect();
+        edges.sort_by(f64::total_cmp);
+        edges.dedup();
+        let (mut nm, mut value) = (Vec::new(), Vec::new());
+        for edge in edges.windows(2) {
+            if !channels.bounds.iter().any(|b| b[0] <= edge[0] && edge[1] <= b[1]) {
+                continue;
+            }
+            // The wavelength itself is one of the curves.
+            let wavelength = Curve::Linear { nm: edge.to_vec(), value: edge.to_vec(), outside: Outside::Hold };
+            let all: Vec<&Curve> = std::iter::once(&wavelength).chain(curves.iter().copied()).collect();
+            let stretch = Channels::from_bounds(vec![[edge[0], edge[1]]], None);
+            if let Curve::Linear { nm: x, value: y, .. } = Curve::derived(&all, &stretch, |v| f(v[0], &v[1..])) {
+                nm.extend(x);
+                value.extend(y);
+            }
+        }
+        Curve::Linear { nm, value, outside: Outside::Hold }
+    }
+}
+
 /// Adds a node, unless it is the last one.
 fn push(nm: &mut Vec<f64>, value: &mut Vec<f64>, node: (f64, f64)) {
     let close = |a: f64, b: f64| (a - b).abs() <= 1e-8 * a.abs().max(b.abs());
