@@ -16,33 +16,6 @@
 @group(1) @binding(12) var<storage, read_write> queue: array<u32>;
 @group(1) @binding(13) var<storage, read_write> queue_lengths: array<atomic<u32>>;
 
-#if HOT
-const EMITS_BY_ANGLE: u32 = 0x20000000u;
-
-// A random number beside those of the bounce.
-fn hot_numbers(path: u32) -> vec2<f32> {
-    let slot = wave.pixel_begin + path / wave.samples;
-    let index = wave.sample_begin + path % wave.samples;
-    let in_tile = slot % wave.tile_pixels;
-    let pixel = units[slot / wave.tile_pixels].xy + vec2<u32>(in_tile % wave.tile_width, in_tile / wave.tile_width);
-    let key = pixel_key(frame.seed_low, frame.seed_high, pixel.x, pixel.y, wave.epoch) ^ 0x85ebca6bu;
-    return random_pair(key, DIMENSION_BOUNCE + step.bounce * DIMENSIONS_PER_VERTEX, index, wave.epoch_mask);
-}
-
-// What an emitter sends out at a cosine: where that depends on the angle, one of the two spectra nearest to it, by chance,
-// so that the mean is linear between them.
-fn emitted_spectrum(emitter: Emitter, front: bool, cosine: f32, u: f32) -> u32 {
-    if ((emitter.spectrum & EMITS_BY_ANGLE) == 0u) {
-        return emitter.spectrum & SPECTRUM_MASK;
-    }
-    let x = pow(clamp(cosine, 1.0e-9, 1.0), 1.0 / 3.0) * f32(HOT_COSINES - 1u);
-    let node = min(u32(x), HOT_COSINES - 2u);
-    let nearer = select(0u, 1u, u < x - f32(node));
-    let row = (emitter.spectrum & 0x1fffffffu) + select(HOT_COSINES, 0u, front);
-    return emitters[row + node + nearer].primitive;
-}
-#endif
-
 const DIMENSION_LOBE: u32 = 3u;
 const DIMENSIONS_PER_VERTEX: u32 = 4u;
 
@@ -178,6 +151,11 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 #endif
     let from_front = dot(surface.normal, ray.direction) < 0.0;
 
+    let material = surface_materials[surface.material];
+    // The geometric normal on the side of the ray.
+    let face = select(-surface.normal, surface.normal, from_front);
+    var v = vertex_at(hit, surface, from_front, -ray.direction);
+
     // What it emits.
 #if EMITTERS
     if (surface.emitter != NONE) {
@@ -188,45 +166,29 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
                 weight = power_heuristic(density, light_density(surface.emitter, ray.origin, ray.direction, distance, surface.normal));
             }
             let begin = list.count;
+#if RADIATORS
+            if ((spectrum & EMITS_BY_PLACE) != 0u) {
+#if HOT_FACETS
+                append_heat(&list, spectrum, v, scale * weight, hot_numbers(path, SALT_MET));
+#else
+                append_heat(&list, spectrum, v, scale * weight, vec2<f32>(0.0));
+#endif
+                gather(&list, begin, 0u);
+            } else {
+#endif
             append(&list, OP_ONE | MODE_SINGLE, 0u, scale * weight, 0.0);
 #if HOT
             let cosine = abs(dot(surface.normal, ray.direction));
-            gather(&list, begin, emitted_spectrum(emitters[surface.emitter], from_front, cosine, hot_numbers(path).x));
+            gather(&list, begin, emitted_spectrum(emitters[surface.emitter], from_front, cosine, hot_numbers(path, SALT_ANGLE).x));
 #else
             gather(&list, begin, spectrum & SPECTRUM_MASK);
+#endif
+#if RADIATORS
+            }
 #endif
         }
     }
 #endif
-
-    let material = surface_materials[surface.material];
-    var v: Vertex;
-    // The geometric normal on the side of the ray.
-    let face = select(-surface.normal, surface.normal, from_front);
-    v.normal = face;
-    v.inside = !from_front;
-#if ATTRIBUTES
-    let carried = carried_at(hit, surface);
-#if SMOOTH
-    v.normal = shading_normal(select(-carried.normal, carried.normal, from_front), -ray.direction);
-#endif
-#if TEXTURES
-    v.uv = carried.uv;
-#endif
-#endif
-#if ANISOTROPIC
-#if ATTRIBUTES
-    v.s = surface_tangent(hit, surface, v.normal, carried.tangent);
-#else
-    v.s = surface_tangent(hit, surface, v.normal, vec3<f32>(0.0));
-#endif
-    v.t = cross(v.normal, v.s);
-#else
-    let around = tangents(v.normal);
-    v.s = around.s;
-    v.t = around.t;
-#endif
-    v.o = to_local(v, -ray.direction);
     if (step.bounce == frame.max_bounces || material.part_count == 0u || !(v.o.z > 0.0) || overflow) {
         end_path(list, 2u * step.bounce + 1u, overflow);
         return;
@@ -386,6 +348,16 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     var light_strength = 1.0;
     var is_met = true;
 #endif
+#if RADIATORS
+    // Radiators of the light, and the point on it.
+    var hot = 0u;
+    var hot_vertex: Vertex;
+#if HOT_FACETS
+    let hot_random = hot_numbers(path, SALT_AIMED);
+#else
+    let hot_random = vec2<f32>(0.0);
+#endif
+#endif
 #if MAP
     var map_place: MapPlace;
     var from_map = false;
@@ -439,7 +411,14 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
                 end = offset_origin(point.position, facing);
 #if HOT
                 let along = dot(point.normal, towards) / max(length(towards), 1.0e-30);
-                source = emitted_spectrum(emitter, along < 0.0, abs(along), hot_numbers(path).y);
+                source = emitted_spectrum(emitter, along < 0.0, abs(along), hot_numbers(path, SALT_ANGLE).y);
+#endif
+#if RADIATORS
+                if ((emitter.spectrum & EMITS_BY_PLACE) != 0u && light_pdf > 0.0) {
+                    hot = emitter.spectrum;
+                    hot_vertex = emitting_vertex(emitter, point, -normalize(towards));
+                    source = 0u;
+                }
 #endif
             }
 #endif
@@ -512,6 +491,17 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
                 continue;
             }
 #endif
+#if RADIATORS
+            if (to_light && hot != 0u) {
+                append(&list, OP_SPECTRUM | MODE_SINGLE, part.ab, weight * max(direction.z, 0.0) * INV_PI, 0.0);
+                append_heat_aimed_at(&list, hot, hot_vertex, hot_random);
+#if MEDIA
+                append_way(&list, &way, shadow, false, MODE_ON_F, 1.0);
+#endif
+                gather(&list, begin, 0u);
+                continue;
+            }
+#endif
 #if MEDIA
             if (to_light && way.count > 0u) {
                 append(&list, OP_SPECTRUM | MODE_SINGLE, part.ab, weight * max(direction.z, 0.0) * INV_PI, 0.0);
@@ -538,6 +528,11 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 #if MAP
             if (from_map && list.count > begin) {
                 append_map(&list, MODE_ON_F, map_place, 1.0);
+            }
+#endif
+#if RADIATORS
+            if (hot != 0u && list.count > begin) {
+                append_heat_aimed_at(&list, hot, hot_vertex, hot_random);
             }
 #endif
 #if MEDIA

@@ -43,11 +43,14 @@ modules! {
     GGX = "common/ggx.wgsl";
     BSDF = "common/bsdf.wgsl";
     TANGENT = "common/tangent.wgsl";
+    HEAT = "common/heat.wgsl";
+    RADIATOR = "common/radiator.wgsl";
     KNOTS = "common/knots.wgsl";
     CHANNEL = "common/channel.wgsl";
     PROGRAM = "common/program.wgsl";
     VOLUME = "common/volume.wgsl";
     MEDIUM = "common/medium.wgsl";
+    PLANCK = "common/planck.wgsl";
     EXTINCTION = "common/extinction.wgsl";
     GENERATE_CAMERA = "generate_camera.wgsl";
     GENERATE_BOUNCE = "generate_bounce.wgsl";

@@ -5,10 +5,10 @@ use glam::{DAffine3, DVec3};
 use crate::accel::Accel;
 use crate::gpu::layout::{NONE, Primitive};
 use crate::scene::{Bsdf, Field, Interior, MaterialId, Medium, Projection, Scene, SpectrumId};
-use crate::spectral::{Curve, Outside, planck};
+use crate::spectral::{Curve, planck};
 use crate::{Error, Result};
 
-use super::surfaces::Needed;
+use super::surfaces::{Needed, wavelength};
 
 /// Numbers of volumes have 8 bits in a path's state, of which 0 is none.
 const MOST_VOLUMES: usize = 254;
@@ -190,13 +190,8 @@ impl Media {
         self.most_absorbers = self.most_absorbers.max(medium.absorbers.len() as u32);
         self.cells += size.iter().sum::<u32>() + 3;
         if self.wavelength.is_none() {
-            // µm, linear in every channel.
-            let bounds = scene.channels.bounds.iter().flatten();
-            let [low, high] = bounds.fold([f64::INFINITY, 0.0f64], |[low, high], &nm| [low.min(nm), high.max(nm)]);
-            let curve =
-                Curve::Linear { nm: vec![low, high], value: vec![low * 1e-3, high * 1e-3], outside: Outside::Hold };
             self.wavelength = Some(self.spectra.len());
-            self.spectra.push(Needed::Derived("wavelength".into(), curve));
+            self.spectra.push(wavelength(scene));
         }
     }
 
