@@ -6,7 +6,6 @@
 @group(1) @binding(1) var<storage, read> units: array<vec4<u32>>;
 @group(1) @binding(2) var<storage, read_write> states: array<vec4<u32>>;
 @group(1) @binding(3) var<storage, read_write> heads: array<vec2<u32>>;
-@group(1) @binding(4) var<storage, read_write> records: array<vec4<u32>>;
 @group(1) @binding(5) var<storage, read_write> counters: array<atomic<u32>>;
 @group(1) @binding(6) var<uniform> step: Step;
 #if ROULETTE
@@ -18,43 +17,6 @@
 
 const DIMENSION_LOBE: u32 = 3u;
 const DIMENSIONS_PER_VERTEX: u32 = 4u;
-
-// `count` records so far; evaluation may stop after the last one that adds radiance, `used`. `last`: the last instruction.
-struct RecordList {
-    path: u32,
-    count: u32,
-    used: u32,
-    last: u32,
-}
-
-fn append_raw(list: ptr<function, RecordList>, words: vec4<f32>) {
-    records[(*list).path * frame.max_records + (*list).count] = bitcast<vec4<u32>>(words);
-    (*list).count += 1u;
-}
-
-fn append(list: ptr<function, RecordList>, operation: u32, ab: u32, weight: f32, parameter: f32) {
-    (*list).last = (*list).path * frame.max_records + (*list).count;
-    records[(*list).last] = vec4<u32>(operation, ab, bitcast<u32>(weight), bitcast<u32>(parameter));
-    (*list).count += 1u;
-}
-
-#if MAP
-// The instruction that looks the map up: X = its value there over the source spectrum.
-fn append_map(list: ptr<function, RecordList>, mode: u32, place: MapPlace, weight: f32) {
-    let fraction = vec2<u32>(place.fraction * 65535.0 + 0.5);
-    (*list).last = (*list).path * frame.max_records + (*list).count;
-    records[(*list).last] = vec4<u32>(OP_MAP | mode, place.column | (place.row << 16u), bitcast<u32>(weight), fraction.x | (fraction.y << 16u));
-    (*list).count += 1u;
-}
-#endif
-
-// Lets the instructions since record `begin` add to the radiance what they built, times a source.
-fn gather(list: ptr<function, RecordList>, begin: u32, source: u32) {
-    if ((*list).count > begin) {
-        records[(*list).last].x |= MODE_GATHER | (source << 16u);
-        (*list).used = (*list).count;
-    }
-}
 
 fn end_path(list: RecordList, rays: u32, overflow: bool) {
     if (overflow) {
@@ -90,9 +52,11 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     // Density of `direction`, for MIS; negative where it competes with nothing: the camera's own rays, mirrors, ideal
     // refraction.
     let density = state0.w;
-#if DISPERSION
     // The one channel that refraction left, or NONE.
+#if DISPERSION
     var live = states[STATE_WORDS * path + 2u].x;
+#else
+    let live = NONE;
 #endif
     var list = RecordList(path, packed & 0xffffu, packed >> 16u, 0u);
     var overflow = false;
@@ -205,132 +169,15 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     let u_choice = random_pair(key, dimension + DIMENSION_CHOICE, index, wave.epoch_mask);
     let u_lobe = random_pair(key, dimension + DIMENSION_LOBE, index, wave.epoch_mask);
 
-#if SHARES
-    v.pick_scale = 1.0;
-    var picks = 0.0;
-    for (var p = material.first_part; p < material.first_part + material.part_count; p += 1u) {
-        picks += part_pick(p, v);
-    }
-    v.pick_scale = select(1.0 / picks, 0.0, picks == 0.0);
-#endif
-    // The part that goes on.
-    var chosen = NONE;
-    var chosen_pick = 0.0;
-    var below = 0.0;
-    for (var p = material.first_part; p < material.first_part + material.part_count; p += 1u) {
-        let pick = part_pick(p, v);
-        if (pick > 0.0 && (chosen == NONE || u_lobe.x >= below)) {
-            chosen = p;
-            chosen_pick = pick;
-        }
-        below += pick;
-    }
-    if (chosen == NONE) {
+    let choice = choose_direction(material, &v, u_bsdf, u_lobe, heads[path].x, live);
+    if (choice.part == NONE) {
         end_path(list, 2u * step.bounce + 1u, overflow);
         return;
     }
-    let part = part_at(chosen, v);
-    // The next direction, and its density; negative where it is the only one.
-    var i = cosine_hemisphere(vec3<f32>(0.0, 0.0, 1.0), u_bsdf);
-    var next_density = 0.0;
-    // What the only direction of a part does to every channel, as an instruction.
-    var only = OP_ONE;
-    var only_weight = part.weight / chosen_pick;
-    var only_parameter = v.o.z;
-    let behind = part_behind(part, v);
-    let mode_behind = select(0u, MODE_BEHIND, behind);
-    var goes_on = true;
-#if DISPERSION
-    var only_channel = NONE;
-#endif
-    switch (part.kind & 0xffu) {
-#if CONDUCTOR
-        case KIND_CONDUCTOR: {
-            i = vec3<f32>(-v.o.xy, v.o.z);
-            next_density = -1.0;
-            only = OP_CONDUCTOR | MODE_SINGLE;
-        }
-#endif
-#if MIRROR
-        case KIND_MIRROR: {
-            i = vec3<f32>(-v.o.xy, v.o.z);
-            next_density = -1.0;
-            only = reflecting(part, v.o.z, relative_index(part.eta, behind)) | mode_behind;
-        }
-#endif
-#if REFRACTION
-        case KIND_REFRACTION: {
-            next_density = -1.0;
-            only = OP_TRANSMIT | MODE_SINGLE | MODE_SQUARE | mode_behind;
-            var eta = part.eta;
-#if DISPERSION
-            if ((part.kind & PART_DISPERSES) != 0u) {
-                let channel = select(live, min(u32(u_lobe.y * f32(CHANNELS)), CHANNELS - 1u), live == NONE);
-                only_channel = select(NONE, channel, live == NONE);
-                eta = channel_value(part.ab & 0xffffu, channel, heads[path].x);
-            }
-#endif
-            eta = relative_index(eta, behind);
-            if ((part.kind & PART_DISPERSES) == 0u) {
-                only = OP_TRANSMIT | MODE_SINGLE | mode_behind;
-                only_weight /= eta * eta;
-            }
-            goes_on = beyond_square(v.o.z, eta) > 0.0;
-            if (goes_on) {
-                i = refracted(v.o, vec3<f32>(0.0, 0.0, 1.0), eta);
-            }
-        }
-#endif
-#if MICROFACETS
-        case KIND_ROUGH_CONDUCTOR, KIND_ROUGH_COAT: {
-            let h = ggx_visible_normal(part.alpha, v.o, u_bsdf);
-            i = 2.0 * dot(v.o, h) * h - v.o;
-            goes_on = i.z > 0.0;
-        }
-#endif
-#if ROUGH_GLASS
-        case KIND_ROUGH_BOUNDARY: {
-            let h = ggx_visible_normal(part.alpha, v.o, u_bsdf);
-            let cosine = min(dot(v.o, h), 1.0);
-            let reflects = cosine_table(part.decision, v.inside, cosine);
-            if (u_lobe.y < reflects) {
-                i = 2.0 * cosine * h - v.o;
-                goes_on = i.z > 0.0;
-            } else {
-                var eta = part.eta;
-#if DISPERSION
-                let u_channel = (u_lobe.y - reflects) / (1.0 - reflects);
-                if ((part.kind & PART_NARROW) != 0u) {
-                    let channel = select(live, min(u32(u_channel * f32(CHANNELS)), CHANNELS - 1u), live == NONE);
-                    only_channel = select(NONE, channel, live == NONE);
-                    eta = channel_value(part.ab & 0xffffu, channel, heads[path].x);
-                } else if ((part.kind & PART_DISPERSES) != 0u) {
-                    eta = spread_index(part, min(u32(3.0 * u_channel), 2u));
-                }
-#endif
-                eta = relative_index(eta, behind);
-                goes_on = beyond_square(cosine, eta) > 0.0;
-                if (goes_on) {
-                    i = refracted(v.o, h, eta);
-                    goes_on = i.z < 0.0;
-                }
-#if DISPERSION
-                if ((part.kind & PART_NARROW) != 0u) {
-                    next_density = -1.0;
-                    only = OP_TRANSMIT | MODE_SINGLE | MODE_SQUARE | mode_behind;
-                    only_weight *= ggx_visible(part.alpha, i) / (1.0 - reflects);
-                    only_parameter = cosine;
-                }
-#endif
-            }
-        }
-        case KIND_BEYOND_AGAIN: {
-            i.z = -i.z;
-        }
-#endif
-        default: {
-        }
-    }
+    let part = parts[choice.part];
+    let i = choice.direction;
+    var next_density = choice.density;
+    var goes_on = choice.goes_on;
 
 #if SMOOTH
     // No light is reflected into a surface, or passes to where it came from.
@@ -548,10 +395,10 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
         }
     }
     if (goes_on && next_density < 0.0) {
-        append(&list, only | MODE_ADVANCE, part.ab, only_weight, only_parameter);
+        append(&list, choice.only | MODE_ADVANCE, part.ab, choice.only_weight, choice.only_parameter);
 #if DISPERSION
-        if (only_channel != NONE) {
-            live = only_channel;
+        if (choice.only_channel != NONE) {
+            live = choice.only_channel;
             append(&list, OP_ONLY | MODE_SINGLE | MODE_ADVANCE, live, f32(CHANNELS), 0.0);
         }
 #endif

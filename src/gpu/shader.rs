@@ -41,7 +41,9 @@ modules! {
     TABLES = "common/tables.wgsl";
     MATERIAL = "common/material.wgsl";
     GGX = "common/ggx.wgsl";
+    APPEND = "common/append.wgsl";
     BSDF = "common/bsdf.wgsl";
+    CHOICE = "common/choice.wgsl";
     TANGENT = "common/tangent.wgsl";
     HEAT = "common/heat.wgsl";
     RADIATOR = "common/radiator.wgsl";

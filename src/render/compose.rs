@@ -64,7 +64,8 @@ impl Prepared {
         if general.map.is_some() {
             modules.push(shader::MAP);
         }
-        modules.extend([shader::RECORD, shader::TABLES, shader::MATERIAL, shader::GGX, shader::BSDF]);
+        modules.extend([shader::RECORD, shader::APPEND, shader::TABLES, shader::MATERIAL]);
+        modules.extend([shader::GGX, shader::BSDF, shader::CHOICE]);
         if general.radiators.is_some() {
             modules.push(shader::RADIATOR);
         }
