@@ -10,6 +10,7 @@ pub mod skylight;
 pub mod table;
 pub mod temperature;
 pub mod upsample;
+pub mod warp;
 
 pub use channels::{Channels, Response};
 pub use curve::{Curve, Outside};
