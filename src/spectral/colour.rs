@@ -193,11 +193,21 @@ impl Projection {
         Projection { kind: ProjectionKind::FalseColour(rgb), weights }
     }
 
+    /// The channels that take part.
+    pub fn channels(&self) -> impl Iterator<Item = usize> {
+        self.weights.iter().map(|(k, _)| *k)
+    }
+
     /// Linear R, G, B of one pixel, from its K channels.
     pub fn rgb(&self, spectrum: &[f32]) -> [f32; 3] {
+        self.rgb_of(self.channels().map(|k| spectrum[k]))
+    }
+
+    /// Linear R, G, B of the values in [`Projection::channels`].
+    pub fn rgb_of(&self, values: impl Iterator<Item = f32>) -> [f32; 3] {
         let mut rgb = [0.0; 3];
-        for (k, weight) in &self.weights {
-            let radiance = f64::from(spectrum[*k]);
+        for ((_, weight), radiance) in self.weights.iter().zip(values) {
+            let radiance = f64::from(radiance);
             for i in 0..3 {
                 rgb[i] += weight[i] * radiance;
             }
