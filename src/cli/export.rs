@@ -12,6 +12,7 @@ use crate::export;
 use crate::format::envi::Interleave;
 use crate::format::png;
 use crate::spectral::colour::{Observer, Projection, map_srgb8, percentiles};
+use crate::spectral::temperature::shown_range;
 use crate::{Error, Result, files};
 
 /// Write a cube, or a picture of it, in another format
@@ -129,7 +130,7 @@ pub struct Args {
 
     /// Ends of the colour map: W m-2 sr-1 nm-1, or K with --temperature
     ///
-    /// Without it they are the 1st and the 99th percentile, and are printed.
+    /// Without it they are the 1st and the 99th percentile of what is above zero, and are printed.
     #[arg(long, value_name = "FROM..TO", value_parser = parse_range, allow_hyphen_values = true)]
     pub range: Option<[f64; 2]>,
 
@@ -362,7 +363,10 @@ fn write_map(args: &Args, view: &View, missing: [u32; 2], output: &Output) -> Re
         false => (export::Map::Radiance, "mean radiance", "W m-2 sr-1 nm-1"),
     };
     let values = export::map(view, map)?;
-    let range = args.range.unwrap_or_else(|| percentiles(&values));
+    let range = args.range.unwrap_or_else(|| match map {
+        export::Map::Temperature => shown_range(&values),
+        export::Map::Radiance => percentiles(&values),
+    });
     png::write_srgb8(&args.output, view.size(), &map_srgb8(&values, range))?;
     let channels = view.channels();
     let from = channels.bounds.iter().map(|b| b[0]).fold(f64::INFINITY, f64::min);

@@ -22,7 +22,8 @@ pub fn encode(picture: &Picture, ev: f64) -> std::result::Result<Vec<u8>, png::E
     encode_srgb8(picture.size, &picture.to_srgb8(ev))
 }
 
-fn encode_srgb8(size: [u32; 2], rgb: &[u8]) -> std::result::Result<Vec<u8>, png::EncodingError> {
+/// The same of 8-bit sRGB as it stands.
+pub fn encode_srgb8(size: [u32; 2], rgb: &[u8]) -> std::result::Result<Vec<u8>, png::EncodingError> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, size[0], size[1]);
     encoder.set_color(png::ColorType::Rgb);

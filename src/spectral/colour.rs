@@ -155,10 +155,7 @@ impl Projection {
         if let Some(xyz) = Self::as_seen(channels, Observer::default()) {
             return xyz;
         }
-        let mut order: Vec<usize> = (0..channels.len()).collect();
-        order.sort_by(|&a, &b| channels.centre(a).total_cmp(&channels.centre(b)));
-        let last = order.len() - 1;
-        Self::false_colour([order[0], order[last / 2], order[last]])
+        Self::false_colour(three_of(channels, false))
     }
 
     /// Linear sRGB of what `observer` would see; `None` where the channels do not cover the visible, or are responses: those
@@ -216,6 +213,21 @@ impl Projection {
     }
 }
 
+/// Three of `channels` to stand for red, green and blue where nobody has said which: those nearest to 640, 550 and 460 nm
+/// where they are `visible`, else those of lowest, middle and highest centre wavelength.
+pub fn three_of(channels: &Channels, visible: bool) -> [usize; 3] {
+    let mut order: Vec<usize> = (0..channels.len()).collect();
+    order.sort_by(|&a, &b| channels.centre(a).total_cmp(&channels.centre(b)));
+    let last = order.len() - 1;
+    if !visible {
+        return [order[0], order[last / 2], order[last]];
+    }
+    [640.0, 550.0, 460.0].map(|nm| {
+        let distance = |k: usize| (channels.centre(k) - nm).abs();
+        order.iter().copied().min_by(|&a, &b| distance(a).total_cmp(&distance(b))).unwrap_or(order[0])
+    })
+}
+
 /// Whether XYZ from channels of these weights shows what an eye would see (see [`Projection::new`]).
 fn covers_the_visible(xyz: &[[f64; 3]], observer: Observer) -> bool {
     let integrals = observer.integrals();
@@ -239,22 +251,38 @@ pub fn srgb_decode(encoded: f64) -> f64 {
     if encoded <= 0.040_45 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
 }
 
-/// 8-bit sRGB of one quantity: a colour map that is perceptually uniform (inferno, by N. Smith and S. van der Walt) from the
-/// first to the second number of `range`. What lies beyond its ends has their colours, what is not rendered yet is black.
+/// A linear value as 8-bit sRGB; what is beyond 0 and 1 is cut, NaN is 0.
+pub fn srgb8(linear: f64) -> u8 {
+    // `as u8` saturates, and sends NaN to 0.
+    (255.0 * srgb_encode(linear) + 0.5).floor() as u8
+}
+
+/// Colours of [`map_srgb8`], from its low end to its high one.
+pub const MAP_LEVELS: usize = 256;
+
+/// The colour at one of [`MAP_LEVELS`]: a map that is perceptually uniform (inferno, by N. Smith and S. van der Walt).
+pub fn map_level(level: usize) -> [u8; 3] {
+    colorous::INFERNO.eval_rational(level.min(MAP_LEVELS - 1), MAP_LEVELS).as_array()
+}
+
+/// 8-bit sRGB of one quantity in the colours of [`map_level`], from the first to the second number of `range`. What lies
+/// beyond its ends has their colours, what is not rendered yet is black.
 pub fn map_srgb8(values: &[f32], range: [f64; 2]) -> Vec<u8> {
     let [low, high] = range;
+    let last = (MAP_LEVELS - 1) as f64;
     let colour = |value: f64| match (value - low) / (high - low) {
         _ if value.is_nan() => [0, 0, 0],
         // A range of no width: all is at its upper end, or below.
-        t if t.is_nan() => colorous::INFERNO.eval_continuous(1.0).as_array(),
-        t => colorous::INFERNO.eval_continuous(t.clamp(0.0, 1.0)).as_array(),
+        t if t.is_nan() => map_level(MAP_LEVELS - 1),
+        t => map_level((last * t.clamp(0.0, 1.0) + 0.5) as usize),
     };
     values.iter().flat_map(|&value| colour(f64::from(value))).collect()
 }
 
-/// The 1st and the 99th percentile of what is finite; 0 and 1 where nothing is.
+/// The 1st and the 99th percentile of what is finite and above zero, as what has no light has no place on a scale; 0 and 1
+/// where nothing is.
 pub fn percentiles(values: &[f32]) -> [f64; 2] {
-    let mut finite: Vec<f32> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    let mut finite: Vec<f32> = values.iter().copied().filter(|v| v.is_finite() && *v > 0.0).collect();
     if finite.is_empty() {
         return [0.0, 1.0];
     }
@@ -288,8 +316,7 @@ impl Picture {
     /// rendered yet is black.
     pub fn to_srgb8(&self, ev: f64) -> Vec<u8> {
         let scale = ev.exp2();
-        // `as u8` saturates, and sends NaN to 0.
-        self.rgb.iter().map(|&v| (255.0 * srgb_encode(f64::from(v) * scale) + 0.5).floor() as u8).collect()
+        self.rgb.iter().map(|&v| srgb8(f64::from(v) * scale)).collect()
     }
 }
 
@@ -341,6 +368,15 @@ mod tests {
             assert!((channels.integral(k) / Observer::Cie1964.integrals()[k] - 1.0).abs() < 1e-12);
         }
         assert_eq!(Projection::as_seen(&channels, Observer::Cie1964), None);
+    }
+
+    #[test]
+    fn three_stand_for_red_green_and_blue() {
+        let visible = Channels::equal(400.0, 800.0, 4);
+        assert_eq!(three_of(&visible, true), [2, 1, 0]);
+        assert_eq!(three_of(&visible, false), [0, 1, 3]);
+        assert_eq!(three_of(&channels(&[[9e3, 1e4], [8e3, 9e3]]), false), [1, 1, 0]);
+        assert_eq!(three_of(&channels(&[[9e3, 1e4]]), true), [0; 3]);
     }
 
     #[test]
