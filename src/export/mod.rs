@@ -16,7 +16,7 @@ use crate::spectral::colour::{ProjectionKind, three_of};
 use crate::{Error, Result, files};
 
 pub use exr::WIDELY_READ;
-pub use picture::{Map, colours, map};
+pub use picture::{Map, Shown, write_png};
 
 /// Values, in bytes, that a writer holds at a time, about.
 const PIECE_BYTES: usize = 32 << 20;

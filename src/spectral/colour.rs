@@ -3,6 +3,7 @@
 //! What a cube's preview shows is a fixed linear function of a pixel's channels, a [`Projection`]. Exposure and the
 //! sRGB transfer function come later, when a picture is shown or written.
 
+use std::convert::Infallible;
 use std::sync::OnceLock;
 
 use super::data::{self, columns};
@@ -143,6 +144,14 @@ pub enum ProjectionKind {
 }
 
 impl Projection {
+    /// The same with the value of each channel k times `factor(k)`.
+    pub fn times(mut self, factor: impl Fn(usize) -> f64) -> Self {
+        for (k, weights) in &mut self.weights {
+            weights.iter_mut().for_each(|weight| *weight *= factor(*k));
+        }
+        self
+    }
+
     /// The projection for these channels: `channels.false_colour` where given, else XYZ where the visible is covered,
     /// else the channels of lowest, middle and highest centre wavelength as R, G, B.
     ///
@@ -279,15 +288,77 @@ pub fn map_srgb8(values: &[f32], range: [f64; 2]) -> Vec<u8> {
     values.iter().flat_map(|&value| colour(f64::from(value))).collect()
 }
 
-/// The 1st and the 99th percentile of what is finite and above zero, as what has no light has no place on a scale; 0 and 1
-/// where nothing is.
-pub fn percentiles(values: &[f32]) -> [f64; 2] {
-    let mut finite: Vec<f32> = values.iter().copied().filter(|v| v.is_finite() && *v > 0.0).collect();
-    if finite.is_empty() {
-        return [0.0, 1.0];
+/// How numbers become brightness.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Tone {
+    /// Of linear R, G, B: EV, a factor of 2^EV.
+    Exposure(f64),
+    /// Of one quantity: the ends of the colour map.
+    Range([f64; 2]),
+}
+
+impl Tone {
+    /// 8-bit sRGB, of three values a pixel or of one.
+    pub fn srgb8(self, values: &[f32]) -> Vec<u8> {
+        match self {
+            Tone::Exposure(ev) => values.iter().map(|&v| srgb8(f64::from(v) * ev.exp2())).collect(),
+            Tone::Range(range) => map_srgb8(values, range),
+        }
     }
-    let last = finite.len() - 1;
-    [last / 100, last * 99 / 100].map(|rank| f64::from(*finite.select_nth_unstable_by(rank, f32::total_cmp).1))
+}
+
+/// Percentiles of what is finite and above zero, as what has no light has no place on a scale, to the last bit and without
+/// holding the values: `each` goes through all of them and is called twice. `None` where there are none.
+pub fn percentiles_of<const N: usize, E>(
+    percents: [u64; N],
+    mut each: impl FnMut(&mut dyn FnMut(f32)) -> Result<(), E>,
+) -> Result<Option<[f32; N]>, E> {
+    // Positive numbers are ordered as their bits are. First the upper half of these is found, then the lower one.
+    let lit = |v: f32| (v.is_finite() && v > 0.0).then(|| [(v.to_bits() >> 16) as usize, v.to_bits() as u16 as usize]);
+    let mut upper = vec![0u64; 1 << 16];
+    each(&mut |v| lit(v).into_iter().for_each(|[high, _]| upper[high] += 1))?;
+    let Some(last) = upper.iter().sum::<u64>().checked_sub(1) else { return Ok(None) };
+    // Where in `counts` the number of that rank is, and its rank among those there.
+    let find = |counts: &[u64], mut rank: u64| {
+        let at = counts.iter().position(|&count| {
+            let found = rank < count;
+            rank -= if found { 0 } else { count };
+            found
+        });
+        (at.unwrap_or(0), rank)
+    };
+    let found = percents.map(|percent| find(&upper, (u128::from(last) * u128::from(percent) / 100) as u64));
+    let mut lower = vec![[0u64; N]; 1 << 16];
+    each(&mut |v| {
+        if let Some([high, low]) = lit(v) {
+            (0..N).filter(|&i| found[i].0 == high).for_each(|i| lower[low][i] += 1);
+        }
+    })?;
+    Ok(Some(std::array::from_fn(|i| {
+        let counts: Vec<u64> = lower.iter().map(|counts| counts[i]).collect();
+        let (low, _) = find(&counts, found[i].1);
+        f32::from_bits((found[i].0 as u32) << 16 | low as u32)
+    })))
+}
+
+/// The 1st and the 99th percentile, in the sense of [`percentiles_of`]; 0 and 1 where there are none.
+pub fn percentiles(values: &[f32]) -> [f64; 2] {
+    let each = |take: &mut dyn FnMut(f32)| -> Result<(), Infallible> {
+        values.iter().for_each(|&v| take(v));
+        Ok(())
+    };
+    let Ok(found) = percentiles_of([1, 99], each);
+    found.map_or([0.0, 1.0], |found| found.map(f64::from))
+}
+
+/// The exposure in EV that brings the 99th percentile of the largest components to 1; 0 where there is none.
+pub fn exposure_of(percentile: Option<f32>) -> f64 {
+    percentile.map_or(0.0, |v| -f64::from(v).log2())
+}
+
+/// The component of a pixel that exposure goes by.
+pub fn largest(rgb: &[f32]) -> f32 {
+    rgb.iter().copied().fold(f32::NAN, f32::max)
 }
 
 /// A linear picture: rows from the top, R, G, B interleaved; NaN where nothing is rendered yet.
@@ -302,21 +373,18 @@ impl Picture {
     /// The exposure in EV (a factor of 2^EV) that brings the 99th percentile of the largest component, over the
     /// pixels with any light, to 1. A picture without light has exposure 0.
     pub fn auto_exposure(&self) -> f64 {
-        let mut light: Vec<f32> =
-            self.rgb.chunks_exact(3).map(|p| p[0].max(p[1]).max(p[2])).filter(|v| v.is_finite() && *v > 0.0).collect();
-        if light.is_empty() {
-            return 0.0;
-        }
-        let rank = (light.len() - 1) * 99 / 100;
-        let (_, percentile, _) = light.select_nth_unstable_by(rank, f32::total_cmp);
-        -f64::from(*percentile).log2()
+        let each = |take: &mut dyn FnMut(f32)| -> Result<(), Infallible> {
+            self.rgb.chunks_exact(3).for_each(|pixel| take(largest(pixel)));
+            Ok(())
+        };
+        let Ok(found) = percentiles_of([99], each);
+        exposure_of(found.map(|[percentile]| percentile))
     }
 
     /// 8-bit sRGB at an exposure of `ev`. What is brighter than 1 or outside the gamut is cut to 0…255, what is not
     /// rendered yet is black.
     pub fn to_srgb8(&self, ev: f64) -> Vec<u8> {
-        let scale = ev.exp2();
-        self.rgb.iter().map(|&v| srgb8(f64::from(v) * scale)).collect()
+        Tone::Exposure(ev).srgb8(&self.rgb)
     }
 }
 
@@ -377,6 +445,35 @@ mod tests {
         assert_eq!(three_of(&visible, false), [0, 1, 3]);
         assert_eq!(three_of(&channels(&[[9e3, 1e4], [8e3, 9e3]]), false), [1, 1, 0]);
         assert_eq!(three_of(&channels(&[[9e3, 1e4]]), true), [0; 3]);
+    }
+
+    /// Against sorting, with numbers of all sizes and what is not counted among them.
+    #[test]
+    fn percentiles_are_exact_without_holding_anything() {
+        let mut bits = 1u32;
+        let values: Vec<f32> = (0..5000)
+            .map(|_| {
+                bits = bits.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                f32::from_bits(bits)
+            })
+            .collect();
+        let mut sorted: Vec<f32> = values.iter().copied().filter(|v| v.is_finite() && *v > 0.0).collect();
+        sorted.sort_by(f32::total_cmp);
+        let at = |percent: usize| sorted[(sorted.len() - 1) * percent / 100];
+        let each = |take: &mut dyn FnMut(f32)| -> Result<(), ()> {
+            values.iter().for_each(|&v| take(v));
+            Ok(())
+        };
+        assert_eq!(percentiles_of([0, 1, 50, 99, 100], each), Ok(Some([0, 1, 50, 99, 100].map(at))));
+        assert_eq!(percentiles(&values), [1, 99].map(|percent| f64::from(at(percent))));
+        assert_eq!(
+            percentiles_of([50], |take| {
+                [0.0, -1.0, f32::NAN].into_iter().for_each(take);
+                Ok::<_, ()>(())
+            }),
+            Ok(None)
+        );
+        assert_eq!(percentiles_of([50], |_| Err(7)), Err(7));
     }
 
     #[test]

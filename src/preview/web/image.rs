@@ -16,7 +16,7 @@ use super::api::Refused;
 use crate::cube::{BLOCK, Look, Rect, Window};
 use crate::format::png;
 use crate::spectral::Channels;
-use crate::spectral::colour::map_srgb8;
+use crate::spectral::colour::{Tone, percentiles};
 use crate::spectral::temperature::{BandTemperature, THERMAL_NM, is_thermal, shown_range};
 use crate::{Error, Result};
 
@@ -101,7 +101,7 @@ pub async fn image(
         Some(bytes) => ("image/png", bytes),
         None => ("application/octet-stream", bytemuck::cast_slice::<f32, u8>(&window.values).to_vec()),
     };
-    Ok(([(CONTENT_TYPE, kind.into()), size, planes, tone.header()], Body::from(bytes)).into_response())
+    Ok(([(CONTENT_TYPE, kind.into()), size, planes, tone_header(tone)], Body::from(bytes)).into_response())
 }
 
 impl Asked {
@@ -159,7 +159,7 @@ impl Asked {
     fn tone(&self, window: &Window) -> Tone {
         match self.show {
             Show::Temperature => {
-                let [low, high] = shown_range(&window.values);
+                let [low, high] = shown_range(percentiles(&window.values));
                 Tone::Range([self.low.unwrap_or(low), self.high.unwrap_or(high)])
             }
             _ => Tone::Exposure(self.ev.unwrap_or_else(|| window.clone().into_picture().auto_exposure())),
@@ -167,28 +167,20 @@ impl Asked {
     }
 
     fn png(&self, window: Window, tone: Tone) -> Result<Vec<u8>> {
-        let made = match tone {
-            Tone::Exposure(ev) => png::encode(&window.into_picture(), ev),
-            Tone::Range(range) => png::encode_srgb8(window.size, &map_srgb8(&window.values, range)),
+        let size = window.size;
+        let values = match tone {
+            Tone::Exposure(_) => window.into_picture().rgb,
+            Tone::Range(_) => window.values,
         };
+        let made = png::encode(size, &tone.srgb8(&values));
         made.map_err(|error| Error::Internal(format!("PNG: {error}")))
     }
 }
 
-/// How numbers become brightness.
-#[derive(Clone, Copy)]
-enum Tone {
-    /// EV.
-    Exposure(f64),
-    /// Kelvins at the ends of the colour map.
-    Range([f64; 2]),
-}
-
-impl Tone {
-    fn header(self) -> (HeaderName, String) {
-        match self {
-            Tone::Exposure(ev) => (HeaderName::from_static("x-exposure-ev"), ev.to_string()),
-            Tone::Range([low, high]) => (HeaderName::from_static("x-range-k"), format!("{low},{high}")),
-        }
+/// What the answer says of how it is shown.
+fn tone_header(tone: Tone) -> (HeaderName, String) {
+    match tone {
+        Tone::Exposure(ev) => (HeaderName::from_static("x-exposure-ev"), ev.to_string()),
+        Tone::Range([low, high]) => (HeaderName::from_static("x-range-k"), format!("{low},{high}")),
     }
 }
