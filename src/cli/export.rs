@@ -10,7 +10,8 @@ use super::bands::Bands;
 use crate::cube::{Cube, Quantity, Rect, View};
 use crate::export::{self, Shown};
 use crate::format::envi::Interleave;
-use crate::spectral::colour::{Observer, Projection, Tone};
+use crate::spectral::colour::{Observer, Projection};
+use crate::spectral::tone::Tone;
 use crate::{Error, Result, files};
 
 /// Write a cube, or a picture of it, in another format

@@ -13,7 +13,7 @@ use super::map::Chunk;
 use super::store::{Cube, Part};
 use super::writer::Writer;
 use super::{BLOCK, Grid};
-use crate::spectral::colour::Picture;
+use crate::spectral::tone::Picture;
 use crate::{Error, Result};
 
 /// Bytes of radiance that one call may go through; more is refused.

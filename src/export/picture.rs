@@ -6,8 +6,9 @@ use super::{PIECE_BYTES, Progress};
 use crate::Result;
 use crate::cube::{Reader, Rect, View};
 use crate::format::png;
-use crate::spectral::colour::{Projection, Tone, exposure_of, largest, percentiles_of};
+use crate::spectral::colour::Projection;
 use crate::spectral::temperature::{BandTemperature, shown_range};
+use crate::spectral::tone::{Tone, exposure_of, largest, percentiles_of};
 
 /// What a picture shows of the pixels of a view.
 #[derive(Debug, Clone, PartialEq)]

@@ -4,7 +4,7 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use crate::files::{Replacement, write_atomically};
-use crate::spectral::colour::Picture;
+use crate::spectral::tone::Picture;
 use crate::{Error, Result};
 
 /// Writes a picture at an exposure of `ev` as 8-bit sRGB, marked as such, replacing `path` in one step.

@@ -175,7 +175,8 @@ const SUBMIT: &[&str] = &["scene.toml", "-o", "cube.zarr", "--tile", "8", "--gpu
 
 /// The arrays that one process makes, without a cluster; each is made once.
 fn straight(options: &[&'static str]) -> &'static Files {
-    static MADE: OnceLock<Mutex<Vec<(Vec<&'static str>, &'static Files)>>> = OnceLock::new();
+    type Made = Vec<(Vec<&'static str>, &'static Files)>;
+    static MADE: OnceLock<Mutex<Made>> = OnceLock::new();
     let mut made = MADE.get_or_init(Mutex::default).lock().unwrap_or_else(|e| e.into_inner());
     if let Some((_, files)) = made.iter().find(|(of, _)| *of == options) {
         return files;

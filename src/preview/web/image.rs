@@ -16,8 +16,8 @@ use super::api::Refused;
 use crate::cube::{BLOCK, Look, Rect, Window};
 use crate::format::png;
 use crate::spectral::Channels;
-use crate::spectral::colour::{Tone, percentiles};
 use crate::spectral::temperature::{BandTemperature, THERMAL_NM, is_thermal, shown_range};
+use crate::spectral::tone::{Tone, percentiles};
 use crate::{Error, Result};
 
 /// Pixels of an answer.

@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use serde_json::json;
 
-use crate::spectral::colour::{MAP_LEVELS, map_level, srgb8};
+use crate::spectral::tone::{MAP_LEVELS, map_level, srgb8};
 
 const DOCUMENT: &str = include_str!("page/page.html");
 const PARTS: [(&str, &str); 7] = [
