@@ -14,6 +14,7 @@ pub mod gpu;
 pub mod preview;
 pub mod reference;
 pub mod render;
+pub mod report;
 pub mod scattering;
 pub mod scene;
 pub mod slurm;

@@ -156,7 +156,7 @@ fn render(cube: &Path, job: &Job, number: u32, interrupt: &std::sync::Arc<Interr
         seed: job.seed,
         tile: job.tile,
         uncertainty: job.uncertainty,
-        stop: StopRule { samples: Some(job.samples), time: None },
+        stop: StopRule { samples: Some(job.samples), ..StopRule::default() },
         preview: None,
         profile: false,
         devices: Default::default(),

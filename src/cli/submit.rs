@@ -151,7 +151,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     plan::check(&scene)?;
     // What no device renders yet is refused here, not by a thousand tasks.
     Prepared::new(&scene, args.seed)?;
-    let stop = StopRule { samples: Some(args.spp), time: None };
+    let stop = StopRule { samples: Some(args.spp), ..StopRule::default() };
     let samples = stop.samples_limit(scene.integrator.epoch, args.uncertainty)?.unwrap_or(args.spp);
     let header = plan::header(&scene, plan::tile_size(&scene, args.scene.tile), args.seed);
     let header = if args.uncertainty { header.with_uncertainty() } else { header };

@@ -11,6 +11,7 @@ pub mod table;
 pub mod temperature;
 pub mod tone;
 pub mod upsample;
+pub mod warp;
 
 pub use channels::{Channels, Response};
 pub use curve::{Curve, Outside};
