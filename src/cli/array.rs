@@ -155,7 +155,7 @@ fn render(cube: &Path, job: &Job, number: u32, interrupt: &std::sync::Arc<Interr
         tiles: Some(tiles),
         seed: job.seed,
         tile: job.tile,
-        uncertainty: false,
+        uncertainty: job.uncertainty,
         stop: StopRule { samples: Some(job.samples), ..StopRule::default() },
         preview: None,
         profile: false,

@@ -99,6 +99,7 @@ impl<'a> Reporter<'a> {
     }
 
     /// Where the page is; always said, since nobody else knows.
+    #[cfg(feature = "web")]
     pub fn listening(&self, text: &str, fields: Value) -> Result<()> {
         self.say_always(text);
         self.emit("listening", fields)

@@ -9,6 +9,7 @@ pub mod planck;
 pub mod skylight;
 pub mod table;
 pub mod temperature;
+pub mod tone;
 pub mod upsample;
 pub mod warp;
 
