@@ -113,7 +113,7 @@ fn render(scene: &Scene, samples: u32, seed: u64, output: &Path) -> Result<(Cube
         seed,
         tile: None,
         uncertainty: false,
-        stop: StopRule { samples: Some(samples), time: None },
+        stop: StopRule { samples: Some(samples), ..StopRule::default() },
         preview: None,
         profile: false,
         devices: Selection::Count(1),

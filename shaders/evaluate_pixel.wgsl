@@ -180,9 +180,14 @@ fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
 #endif
 
 #repeat VECTORS v
-#if RESPONSES
-        // What the channel's response makes of this wavelength, before anything else.
-        var throughput_$v = spectrum_value(RESPONSE, quad_$v, s);
+#if WEIGHTED
+        // What the channel's response and the density of wavelengths make of this one, before anything else.
+#if REGISTERS
+        let weight_at_$v = table_index(s.stratum, PATH_WEIGHT, quad_$v);
+        var throughput_$v = spectra[weight_at_$v] + s.place * spectra[weight_at_$v + 1u];
+#else
+        var throughput_$v = spectrum_value(PATH_WEIGHT, quad_$v, s);
+#endif
 #else
         var throughput_$v = vec4<f32>(1.0);
 #endif

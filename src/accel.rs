@@ -104,14 +104,15 @@ impl Accel {
     }
 }
 
-fn device_space(scene: &Scene) -> DeviceSpace {
+/// The corners of a box around `shapes`; `None` without any.
+pub fn bounds<'a>(shapes: impl Iterator<Item = &'a Shape>) -> Option<[DVec3; 2]> {
     let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     let mut include = |p: DVec3, extent: DVec3| {
         min = min.min(p - extent);
         max = max.max(p + extent);
     };
-    for object in &scene.objects {
-        match &object.shape {
+    for shape in shapes {
+        match shape {
             Shape::Mesh(mesh) => {
                 mesh.triangles.iter().flatten().for_each(|&i| include(mesh.positions[i as usize], DVec3::ZERO))
             }
@@ -123,9 +124,13 @@ fn device_space(scene: &Scene) -> DeviceSpace {
             }
         }
     }
-    if min.x > max.x {
+    (min.x <= max.x).then_some([min, max])
+}
+
+fn device_space(scene: &Scene) -> DeviceSpace {
+    let Some([min, max]) = bounds(scene.objects.iter().map(|object| &object.shape)) else {
         return DeviceSpace { center: scene.camera.position, scale: 1.0, radius: 1.0 };
-    }
+    };
     let half = (0.5 * (max - min)).max_element();
     let scale = if half > 0.0 { (-half.log2().ceil()).exp2() } else { 1.0 };
     let radius = (0.5 * (max - min)).length() * scale;

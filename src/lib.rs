@@ -14,10 +14,12 @@ pub mod gpu;
 pub mod preview;
 pub mod reference;
 pub mod render;
+pub mod report;
 pub mod scattering;
 pub mod scene;
 pub mod slurm;
 pub mod spectral;
+pub mod stress;
 
 // The unit tests that need a scene build it as the integration tests do, and compare cubes as they do.
 #[cfg(test)]

@@ -220,7 +220,7 @@ fn many_spectra_with_lines() {
     scene.integrator.sampler = Sampler::Sobol;
     let f = features(&scene);
     assert!(!f.registers && f.strata && f.knots && f.thin_lens && f.gaussian && !f.shapes);
-    compare("many spectra", &scene, &Effort { epochs: 64, reference: 8192, pixel: 0.4, image: 0.015 });
+    compare("many spectra", &scene, &Effort { epochs: 64, reference: 32_768, pixel: 0.4, image: 0.015 });
 }
 
 /// More than eight spectra without lines: tables without knots.

@@ -289,3 +289,19 @@ fn a_broken_pipe_ends_quietly() {
     child.stderr.take().expect("piped").read_to_string(&mut stderr).expect("read");
     assert!(child.wait().expect("ends").success() && stderr.is_empty(), "{stderr}");
 }
+
+/// A build without the page: `cargo test --no-default-features --test cli`.
+#[cfg(not(feature = "web"))]
+#[test]
+fn a_build_without_the_page_says_so() {
+    let folder = tempdir().expect("folder");
+    create(folder.path(), "cube.zarr", header([8, 8], [8, 8], 2));
+    let scene = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell/cornell.toml");
+    let render = ["render", scene.to_str().expect("UTF-8"), "-o", "new.zarr", "--listen", "127.0.0.1:0"];
+    for arguments in [&["view", "cube.zarr"][..], &render] {
+        let (code, stderr) = failure(folder.path(), arguments);
+        let what = "error: this program was built without its web page; build it with the cargo feature `web`";
+        assert!(code == 2 && stderr.starts_with(what) && stderr.lines().count() == 1, "{stderr}");
+    }
+    assert!(!folder.path().join("new.zarr").exists());
+}

@@ -4,14 +4,19 @@
 //! checked without, except where CI=true.
 
 mod common;
+#[path = "cube_files/mod.rs"]
+mod cube_files;
 
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
 use common::{Written, create, header, pattern, unit};
+use cube_files::files;
 use serde_json::{Value, json};
-use spectile::cube::{Cube, Header};
+use spectile::cube::{Cube, Existing, Header, View, integrate};
+use spectile::export::{self, Format, Map, Shown};
+use spectile::format::envi::Interleave;
 use spectile::spectral::Channels;
 use tempfile::tempdir;
 
@@ -272,6 +277,78 @@ fn what_cannot_be_exported_is_refused() {
     assert_eq!(fs::read_dir(folder.path()).expect("list").count(), 1);
 }
 
+/// Whatever ends an export, at its beginning or just before its end, leaves what was there as it was.
+#[test]
+fn what_is_interrupted_leaves_nothing() {
+    let folder = tempdir().expect("folder");
+    let cube = cube(folder.path(), Channels::equal(400.0, 800.0, 20), &[]);
+    let out = folder.path().join("out");
+    fs::create_dir(&out).expect("made");
+    let view = View::whole(&cube);
+    let colours = Shown::Map(Map::Radiance);
+    type Write<'a> = &'a dyn Fn(&Path, &mut dyn FnMut(u64, u64) -> spectile::Result<()>) -> spectile::Result<()>;
+    let to = |format: Format| {
+        let view = view.clone();
+        move |path: &Path, progress: &mut dyn FnMut(u64, u64) -> spectile::Result<()>| {
+            export::write(&view, path, format, progress).map(drop)
+        }
+    };
+    let responses = {
+        let response = spectile::spectral::Response::new(vec![450.0, 600.0, 750.0], vec![0.0, 1.0, 0.0]);
+        vec![("band".to_owned(), response.expect("a response"))]
+    };
+    let exports: [(&str, &[&str], Write); 10] = [
+        ("a.img", &["a.img", "a.hdr"], &to(Format::Envi { interleave: Interleave::Bil })),
+        ("b.img", &["b.img"], &to(Format::Envi { interleave: Interleave::Bsq })),
+        ("c.img", &[], &to(Format::Envi { interleave: Interleave::Bip })),
+        ("a.exr", &["a.exr"], &to(Format::Exr { strict_units: false, split: None })),
+        ("b.exr", &["b.410.000-550.000nm.exr"], &to(Format::Exr { strict_units: false, split: Some(8) })),
+        ("a.zarr", &[], &to(Format::Zarr { shards: true })),
+        ("a.csv", &["a.csv"], &to(Format::Csv)),
+        ("blocks", &[], &|path, progress| export::write_blocks(&view, path, Format::Csv, 16, progress).map(drop)),
+        ("a.png", &["a.png"], &|path, progress| export::write_png(&view, path, &colours, None, progress).map(drop)),
+        ("sensor.zarr", &[], &|path, progress| {
+            integrate(&cube, &responses, "s.csv", path, Existing::Replace, progress).map(drop)
+        }),
+    ];
+    for (name, there, write) in exports {
+        for when in ["at once", "at the end"] {
+            for file in there {
+                fs::write(out.join(file), b"old").expect("written");
+            }
+            let stop = &mut |done: u64, all: u64| match when {
+                "at the end" if done < all => Ok(()),
+                _ => Err(spectile::Error::Interrupted { signal: 15 }),
+            };
+            let result = write(&out.join(name), stop);
+            assert!(matches!(result, Err(spectile::Error::Interrupted { signal: 15 })), "{name} {when}: {result:?}");
+            let left = files(&out, |_| true);
+            assert!(left.len() == there.len() && left.values().all(|bytes| bytes == b"old"), "{name} {when}: {left:?}");
+            there.iter().for_each(|file| fs::remove_file(out.join(file)).expect("removed"));
+        }
+        // And what is not interrupted is there, and nothing beside it.
+        write(&out.join(name), &mut |_, _| Ok(())).expect("written");
+        assert!(
+            fs::read_dir(&out)
+                .expect("list")
+                .all(|entry| { !entry.expect("an entry").file_name().to_str().expect("UTF-8").starts_with('.') })
+        );
+        if name == "sensor.zarr" {
+            // A cube that is to be replaced stays, too.
+            let before = files(&out.join(name), |_| true);
+            let stop = &mut |done: u64, all: u64| match done < all {
+                true => Ok(()),
+                false => Err(spectile::Error::Interrupted { signal: 15 }),
+            };
+            assert!(write(&out.join(name), stop).is_err());
+            assert!(files(&out.join(name), |_| true) == before && before.len() > 20);
+            write(&out.join(name), &mut |_, _| Ok(())).expect("replaced");
+        }
+        fs::remove_dir_all(&out).expect("removed");
+        fs::create_dir(&out).expect("made");
+    }
+}
+
 /// Anonymous memory of exports of a sparse cube, whose holes read as zeros.
 #[cfg(target_os = "linux")]
 mod memory {
@@ -349,9 +426,80 @@ mod memory {
                 &["-o", "bands.exr", "--bands", last],
                 &["-o", "all.bil"],
                 &["-o", "all.zarr"],
+                &["-o", "colours.png", "--bands", "1,2,3"],
+                &["-o", "map.png", "--colour-map"],
                 &["-o", "all.exr", "--crop", "0,0,256,256"],
             ],
         );
+    }
+
+    /// A picture is larger than what is held of it.
+    #[test]
+    fn of_a_large_picture_is_bounded() {
+        let folder = tempdir().expect("folder");
+        let (cube, _) = sparse(folder.path(), 4096, 3);
+        for tile in 0..cube.grid().count() {
+            let [column, row] = cube.grid().position(tile);
+            let path = folder.path().join(format!("cube.zarr/preview/c/{row}/{column}/0"));
+            fs::create_dir_all(path.parent().expect("a folder")).expect("made");
+            fs::File::create(path).expect("made").set_len(64 * 64 * 12).expect("a hole");
+        }
+        let (most, picture) = (96u64 << 20, 4096u64 * 4096 * 12);
+        for arguments in [&["-o", "all.png"][..], &["-o", "some.png", "--bands", "2"]] {
+            let peak = peak(folder.path(), arguments);
+            println!("{arguments:?}: {} MiB of a picture of {} MiB", peak >> 20, picture >> 20);
+            assert!(peak <= most && picture >= 2 * most, "{arguments:?}: {} MiB", peak >> 20);
+        }
+        // One pixel has light: it is what exposure goes by.
+        let file = std::io::BufReader::new(fs::File::open(folder.path().join("some.png")).expect("opens"));
+        let mut reader = png::Decoder::new(file).read_info().expect("a PNG");
+        let mut pixels = vec![0; reader.output_buffer_size().expect("size")];
+        reader.next_frame(&mut pixels).expect("pixels");
+        let lit: Vec<usize> = (0..pixels.len()).filter(|&i| pixels[i] != 0).collect();
+        let at = 3 * (64 * 4096 + 64);
+        assert_eq!((lit, pixels[at]), (vec![at, at + 1, at + 2], 255));
+    }
+
+    /// The real binary, told to end in the middle of its work.
+    #[test]
+    fn what_is_told_to_end_leaves_nothing() {
+        let folder = tempdir().expect("folder");
+        let (cube, _) = sparse(folder.path(), 512, 640);
+        for tile in 0..cube.grid().count() {
+            let [column, row] = cube.grid().position(tile);
+            let path = folder.path().join(format!("cube.zarr/samples/c/{row}/{column}"));
+            fs::create_dir_all(path.parent().expect("a folder")).expect("made");
+            fs::write(path, 64u32.to_le_bytes()).expect("written");
+        }
+        fs::write(folder.path().join("s.csv"), "nm,a,b\n400,0,1\n500,1,1\n700,1,0\n").expect("written");
+        let names = || {
+            let mut names: Vec<String> = fs::read_dir(folder.path())
+                .expect("list")
+                .map(|entry| entry.expect("an entry").file_name().into_string().expect("UTF-8"))
+                .collect();
+            names.sort();
+            names
+        };
+        for arguments in [
+            &["export", "cube.zarr", "-o", "all.csv"][..],
+            &["export", "cube.zarr", "-o", "all.zarr"],
+            &["export", "cube.zarr", "-o", "all.exr"],
+            &["export", "cube.zarr", "-o", "blocks", "--format", "csv", "--blocks", "100"],
+            &["sensor", "cube.zarr", "--responses", "s.csv", "-o", "new.zarr"],
+        ] {
+            let mut command = Command::new(env!("CARGO_BIN_EXE_spectile"));
+            let command = command.current_dir(folder.path()).args(arguments).stderr(std::process::Stdio::null());
+            let mut child = command.spawn().expect("started");
+            // It has begun as soon as something lies aside.
+            while !names().iter().any(|name| name.starts_with('.')) {
+                assert!(child.try_wait().expect("a child").is_none(), "{arguments:?} ended by itself");
+                std::thread::sleep(std::time::Duration::from_millis(2));
+            }
+            let told = Command::new("kill").arg(child.id().to_string()).status().expect("runs");
+            assert!(told.success());
+            assert_eq!(child.wait().expect("ends").code(), Some(143), "{arguments:?}");
+            assert_eq!(names(), ["cube.zarr", "s.csv"], "{arguments:?}");
+        }
     }
 
     #[test]

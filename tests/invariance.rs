@@ -270,3 +270,30 @@ fn memory_changes_no_bit_and_is_kept() {
     }
     assert!(sizes.is_sorted() && 3 * sizes[0] < sizes[3] && sizes[3] == unbounded.paths, "{sizes:?}");
 }
+
+/// The largest film: a lamp ends in the middle of a pixel near each corner, and the pixel sees half of it.
+#[test]
+fn the_largest_film_is_sharp_at_its_corners() {
+    let side = 131_072u32;
+    let pixel = 2.0 / f64::from(side);
+    for [right, top] in [[false, false], [true, true]] {
+        // In pixels: the last but two of the row.
+        let [x, y] = [right, !top].map(|far| if far { side - 3 } else { 2 });
+        let place = |column: u32| (f64::from(column) + 0.5) * pixel - 1.0;
+        let edge = DVec3::new(place(x), -place(y), 0.0);
+        let mut scene = Builder::new()
+            .camera(look(DVec3::Z, DVec3::ZERO, DVec3::Y, Projection::Orthographic { half_size: DVec2::ONE }))
+            .film(side, side, Filter::Box)
+            .channels(Channels::equal(400.0, 700.0, 1))
+            .bounces(0)
+            .lamp(quad(edge - 0.125 * DVec3::Y, 0.25 * DVec3::X, 0.25 * DVec3::Y), 1.0, Sides::Front)
+            .build();
+        scene.film.crop = [x - 1, y - 1, x + 2, y + 2];
+        let rendered = render(&scene, 1, 4096, Settings { seed: 3, ..Settings::default() });
+        rendered.assert_clean();
+        // Eight roundings of 1/256 of a pixel at most, from the place on the film to the edge of the lamp.
+        for row in rendered.means[0].chunks(3) {
+            assert!(row[0] == 0.0 && (row[1] - 0.5).abs() < 1.0 / 32.0 && row[2] == 1.0, "{row:?}");
+        }
+    }
+}

@@ -242,8 +242,22 @@ fn chosen_bands_are_shown_in_false_colours() {
         &["export", "cube.zarr", "-o", "g.png", "--bands", "1", "--exposure", "0", "--crop", "1,0,3,1"],
     );
     assert_eq!(pixels("g.png"), [99, 99, 99, 137, 137, 137]);
+    // Channels of 100 nm, integrated: 12.5 and 25 W m-2 sr-1.
+    let integrated = ["--integrated", "--bands", "1", "--crop", "1,0,3,1"];
+    success(
+        folder.path(),
+        &[&["export", "cube.zarr", "-o", "i.png", "--exposure", "-4.643856"], &integrated[..]].concat(),
+    );
+    // 25 / 25 is white, and half of it 188.
+    assert_eq!(pixels("i.png"), [188, 188, 188, 255, 255, 255]);
+    let map = ["export", "cube.zarr", "-o", "m.png", "--colour-map", "--json"];
+    let (said, _) = success(folder.path(), &[&map, &integrated[..]].concat());
+    let done: serde_json::Value = serde_json::from_str(&said).expect("JSON");
+    // Both percentiles of two pixels are the smaller one.
+    assert_eq!((&done["range"], &done["range_units"]), (&serde_json::json!([12.5, 12.5]), &"W m-2 sr-1".into()));
     for (arguments, words) in [
         (vec!["--bands", "1,2"], "one band or three"),
+        (vec!["--integrated"], "--integrated goes with --bands or --colour-map"),
         (vec!["--bands", "1", "--range", "0..1"], "--range goes with"),
         (vec!["--colour-map", "--exposure", "1"], "--exposure means nothing"),
     ] {

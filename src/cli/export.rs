@@ -8,10 +8,10 @@ use serde_json::json;
 use super::Output;
 use super::bands::Bands;
 use crate::cube::{Cube, Quantity, Rect, View};
-use crate::export;
+use crate::export::{self, Shown};
 use crate::format::envi::Interleave;
-use crate::format::png;
-use crate::spectral::colour::{Observer, Projection, map_srgb8, percentiles};
+use crate::spectral::colour::{Observer, Projection};
+use crate::spectral::tone::Tone;
 use crate::{Error, Result, files};
 
 /// Write a cube, or a picture of it, in another format
@@ -81,6 +81,8 @@ pub struct Args {
     pub standard_error: bool,
 
     /// Radiance of the channels in W m-2 sr-1: their means times their widths (or the integrals of their responses)
+    ///
+    /// For a PNG: of the bands chosen, or of all in a colour map.
     #[arg(long)]
     pub integrated: bool,
 
@@ -127,9 +129,9 @@ pub struct Args {
     #[arg(long)]
     pub colour_map: bool,
 
-    /// Ends of the colour map: W m-2 sr-1 nm-1, or K with --temperature
+    /// Ends of the colour map: W m-2 sr-1 nm-1 (W m-2 sr-1 with --integrated), or K with --temperature
     ///
-    /// Without it they are the 1st and the 99th percentile, and are printed.
+    /// Without it they are the 1st and the 99th percentile of what is above zero, and are printed.
     #[arg(long, value_name = "FROM..TO", value_parser = parse_range, allow_hyphen_values = true)]
     pub range: Option<[f64; 2]>,
 
@@ -198,7 +200,7 @@ fn check_options(args: &Args, format: Format) -> Result<()> {
         ("--xyz", args.xyz.is_some(), vec![Format::Envi, Format::Zarr, Format::Csv]),
         ("--temperature", args.temperature, vec![Format::Png, Format::Envi, Format::Zarr, Format::Csv]),
         ("--standard-error", args.standard_error, vec![Format::Envi, Format::Exr, Format::Zarr, Format::Csv]),
-        ("--integrated", args.integrated, vec![Format::Envi, Format::Exr, Format::Zarr, Format::Csv]),
+        ("--integrated", args.integrated, vec![Format::Png, Format::Envi, Format::Exr, Format::Zarr, Format::Csv]),
         ("--blocks", args.blocks.is_some(), vec![Format::Envi, Format::Exr, Format::Zarr, Format::Csv]),
     ];
     let name = |format: Format| format.to_possible_value().map(|v| v.get_name().to_owned()).unwrap_or_default();
@@ -292,10 +294,6 @@ fn write_png(args: &Args, cube: &Cube, output: &Output) -> Result<()> {
         view = view.with_rect(crop)?;
     }
     let bands = args.bands.as_ref().map(|bands| bands.resolve(cube.channels()).map_err(Error::Usage)).transpose()?;
-    let missing = {
-        let progress = cube.progress()?;
-        [progress.tiles - progress.tiles_started, progress.tiles]
-    };
     if args.temperature || args.colour_map {
         if let Some(option) = args.observer.map(|_| "--observer").or(args.exposure.map(|_| "--exposure")) {
             return Err(usage(format!("{option} means nothing in a colour map; --range gives its ends")));
@@ -303,18 +301,21 @@ fn write_png(args: &Args, cube: &Cube, output: &Output) -> Result<()> {
         if let Some(bands) = bands {
             view = view.with_bands(bands)?;
         }
-        return write_map(args, &view, missing, output);
+        return write_map(args, &view, output);
     }
     if args.range.is_some() {
         return Err(usage("--range goes with --temperature or --colour-map".into()));
     }
-    let (picture, shows) = match (bands.as_deref(), args.observer) {
-        (None, None) if args.crop.is_none() => (cube.preview()?, super::info::shows(cube)),
-        (None, None) => (export::colours(&view, cube.projection())?, super::info::shows(cube)),
+    if args.integrated && bands.is_none() {
+        let what = "--integrated goes with --bands or --colour-map in a picture; the colours of all channels are integrals already";
+        return Err(usage(what.into()));
+    }
+    let (shown, shows) = match (bands.as_deref(), args.observer) {
+        (None, None) => (Shown::Preview, super::info::shows(cube)),
         (None, Some(observer)) => {
             let seen = Projection::as_seen(cube.channels(), observer);
             let seen = seen.ok_or_else(|| usage("its channels do not cover the visible; choose --bands".into()))?;
-            (export::colours(&view, &seen)?, format!("colours as seen ({}, sRGB)", observer.name()))
+            (Shown::Colours(seen), format!("colours as seen ({}, sRGB)", observer.name()))
         }
         (Some(bands), _) => {
             let (rgb, how) = match *bands {
@@ -333,41 +334,52 @@ fn write_png(args: &Args, cube: &Cube, output: &Output) -> Result<()> {
                     return Err(usage(what));
                 }
             };
-            (export::colours(&view, &Projection::false_colour(rgb))?, how)
+            let colours = Projection::false_colour(rgb);
+            match args.integrated {
+                true => (Shown::Colours(colours.times(|k| cube.channels().integral(k))), format!("{how}, integrated")),
+                false => (Shown::Colours(colours), how),
+            }
         }
     };
-    let ev = args.exposure.unwrap_or_else(|| picture.auto_exposure());
-    png::write(&args.output, &picture, ev)?;
+    let tone = picture(args, &view, &shown, args.exposure.map(Tone::Exposure))?;
+    let Tone::Exposure(ev) = tone else { return Err(Error::Internal("colours have an exposure".into())) };
+    let missing = missing(cube)?;
     output.event(
         "done",
         json!({
             "file": args.output,
             "format": "png",
-            "size": picture.size,
+            "size": view.size(),
             "exposure_ev": ev,
             "shows": shows,
             "tiles_missing": missing[0],
         }),
     )?;
     let how = if args.exposure.is_some() { "as asked" } else { "99th percentile white" };
-    let (file, [width, height]) = (args.output.display(), picture.size);
+    let (file, [width, height]) = (args.output.display(), view.size());
     output.text(&format!("{file}: {width} x {height} pixels, {shows}, exposure {ev:+.3} EV ({how})\n"))?;
     say_missing(missing, output)
 }
 
+/// Writes a picture, with a bar on a terminal; an interrupt leaves nothing behind.
+fn picture(args: &Args, view: &View, shown: &Shown, tone: Option<Tone>) -> Result<Tone> {
+    super::progress::watched(args.json, |progress| export::write_png(view, &args.output, shown, tone, progress))
+}
+
 /// A colour map of the bands of `view` together.
-fn write_map(args: &Args, view: &View, missing: [u32; 2], output: &Output) -> Result<()> {
-    let (map, of, unit) = match args.temperature {
-        true => (export::Map::Temperature, "brightness temperature", "K"),
-        false => (export::Map::Radiance, "mean radiance", "W m-2 sr-1 nm-1"),
+fn write_map(args: &Args, view: &View, output: &Output) -> Result<()> {
+    let (map, of, unit) = match (args.temperature, args.integrated) {
+        (true, _) => (export::Map::Temperature, "brightness temperature", "K"),
+        (_, true) => (export::Map::Integrated, "radiance", "W m-2 sr-1"),
+        _ => (export::Map::Radiance, "mean radiance", "W m-2 sr-1 nm-1"),
     };
-    let values = export::map(view, map)?;
-    let range = args.range.unwrap_or_else(|| percentiles(&values));
-    png::write_srgb8(&args.output, view.size(), &map_srgb8(&values, range))?;
+    let tone = picture(args, view, &Shown::Map(map), args.range.map(Tone::Range))?;
+    let Tone::Range(range) = tone else { return Err(Error::Internal("a colour map has ends".into())) };
     let channels = view.channels();
     let from = channels.bounds.iter().map(|b| b[0]).fold(f64::INFINITY, f64::min);
     let to = channels.bounds.iter().map(|b| b[1]).fold(f64::NEG_INFINITY, f64::max);
     let shows = format!("{of} of {} bands, {from} to {to} nm", channels.len());
+    let missing = missing(view.cube())?;
     output.event(
         "done",
         json!({
@@ -384,6 +396,12 @@ fn write_map(args: &Args, view: &View, missing: [u32; 2], output: &Output) -> Re
     let (file, [width, height], [low, high]) = (args.output.display(), view.size(), range);
     output.text(&format!("{file}: {width} x {height} pixels, {shows}, {low:.6} to {high:.6} {unit} ({how})\n"))?;
     say_missing(missing, output)
+}
+
+/// How many tiles have no samples, of how many.
+fn missing(cube: &Cube) -> Result<[u32; 2]> {
+    let progress = cube.progress()?;
+    Ok([progress.tiles - progress.tiles_started, progress.tiles])
 }
 
 fn say_missing([missing, tiles]: [u32; 2], output: &Output) -> Result<()> {

@@ -3,6 +3,7 @@
 mod array;
 mod bands;
 mod compare;
+mod converge;
 mod devices;
 mod export;
 mod info;
@@ -16,6 +17,7 @@ mod sensor;
 mod sinks;
 mod spectrum;
 mod standing;
+mod stress;
 mod submit;
 mod view;
 
@@ -46,6 +48,8 @@ Examples:
   spectile sensor cube.zarr --responses s.csv -o s.zarr what a sensor would see of it
   spectile view cube.zarr                               a page to look at it
   spectile compare cube.zarr reference.zarr             how it differs from another cube
+  spectile converge scene.toml -o report                error against run time, as a report
+  spectile stress                                       stiff and extreme cases against their answers
 
 Radiance is in W m-2 sr-1 nm-1, wavelengths are in nm (vacuum), pixels are counted from 0 at the top left.
 
@@ -71,6 +75,8 @@ enum Command {
     Export(export::Args),
     Sensor(sensor::Args),
     View(view::Args),
+    Converge(converge::Args),
+    Stress(stress::Args),
     /// A task of an array job (written into the batch script by `submit`)
     #[command(hide = true)]
     ArrayTask(array::Args),
@@ -94,6 +100,8 @@ impl Cli {
             Command::Export(args) => args.json,
             Command::Sensor(args) => args.json,
             Command::View(args) => args.json,
+            Command::Converge(args) => args.json,
+            Command::Stress(args) => args.json,
             Command::Submit(args) => args.json,
             Command::Spectrum(_) | Command::ArrayTask(_) | Command::ArrayEnd(_) | Command::ArrayProbe(_) => false,
         }
@@ -111,6 +119,8 @@ impl Cli {
             Command::Export(args) => export::run(args, output),
             Command::Sensor(args) => sensor::run(args, output),
             Command::View(args) => view::run(args, output),
+            Command::Converge(args) => converge::run(args, output),
+            Command::Stress(args) => stress::run(args, output),
             Command::Submit(args) => submit::run(args, output),
             Command::ArrayTask(args) => array::task(args, output),
             Command::ArrayEnd(args) => array::end(args),

@@ -58,7 +58,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     plan::check(&scene)?;
     scene.warnings.iter().try_for_each(|warning| warn(output, warning))?;
     let prepared = Arc::new(Prepared::new(&scene, 0)?);
-    let stop = StopRule { samples: Some(args.spp), time: None };
+    let stop = StopRule { samples: Some(args.spp), ..StopRule::default() };
     let samples = stop.samples_limit(scene.integrator.epoch, false)?.unwrap_or(args.spp);
     let tile = plan::tile_size(&scene, args.scene.tile);
     let header = plan::header(&scene, tile, 0);

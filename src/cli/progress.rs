@@ -99,6 +99,7 @@ impl<'a> Reporter<'a> {
     }
 
     /// Where the page is; always said, since nobody else knows.
+    #[cfg(feature = "web")]
     pub fn listening(&self, text: &str, fields: Value) -> Result<()> {
         self.say_always(text);
         self.emit("listening", fields)
@@ -133,7 +134,7 @@ impl<'a> Reporter<'a> {
                 "scene": job.scene.file, "scene_digest": job.scene.digest, "output": job.output, "seed": job.seed,
                 "size": [width, height], "channels": channels, "tile": tile, "disk_bytes": disk,
                 "tiles": job.tiles.as_ref().map(|tiles| [tiles.start, tiles.end]), "samples_asked": job.stop.samples, "samples_limit": samples_limit,
-                "time_limit_s": job.stop.time.map(|t| t.as_secs_f64()),
+                "time_limit_s": job.stop.time.map(|t| t.as_secs_f64()), "error_limit": job.stop.error,
             }),
         )
     }

@@ -21,7 +21,7 @@ use crate::{Error, Result};
 /// cube is complete. (Under --tiles, and where the cube is larger than half of the memory and only --spp ends the render, a
 /// tile gets its first 64 samples in one go: the same bytes.)
 ///
-/// Rendering stops at the first limit reached, --spp or --time, always at the end of an epoch of the whole picture;
+/// Rendering stops at the first limit reached, --spp, --time or --error, always at the end of an epoch of the whole picture;
 /// without a limit, after 64 samples per pixel (512 with --uncertainty). Noise falls with the square root of the samples: four times the samples
 /// halve the error.
 ///
@@ -33,6 +33,7 @@ use crate::{Error, Result};
 Examples:
   spectile render scene.toml -o cube.zarr --spp 256
   spectile render scene.toml -o cube.zarr --time 10m --preview now.png
+  spectile render scene.toml -o cube.zarr --error 0.01                    until noise is 1 % in every channel
   spectile render scene.toml -o cube.zarr --time 1h --listen 127.0.0.1:8090       watch it in a browser
   spectile render scene.toml -o cube.zarr --spp 1024 --resume             go on, after an end or to more samples
   spectile render scene.toml -o cube.zarr --spp 256 --tiles 0..500        one of several processes on one cube
@@ -53,6 +54,14 @@ pub struct Args {
     /// Seconds where there is no unit. An epoch that would not finish in time is not started.
     #[arg(long, value_name = "TIME", value_parser = parse_time)]
     pub time: Option<Duration>,
+
+    /// Stop when the estimated error of every channel is at most E, such as 0.01
+    ///
+    /// The error of a channel is the root of the sum of all pixels' variances over the sum of their squares, so 0.01 is noise of 1 %
+    /// where the picture is bright. It is estimated from the spread of epochs of 64 samples (or of integrator.epoch) and is asked
+    /// after eight of them, at 512 samples per pixel, for the first time. Channels that are zero everywhere count as done.
+    #[arg(long, value_name = "E", value_parser = parse_error)]
+    pub error: Option<f64>,
 
     /// Store the standard error of every pixel and channel too
     ///
@@ -89,8 +98,8 @@ pub struct Args {
     /// Several processes, also on several machines with a shared file system, may render disjoint tiles of one cube: the
     /// first makes it, the others join, and nothing has to be put together at the end. A tile that another process works
     /// on is refused, one that is finished is left as it is. `spectile info` lists the tiles that are missing. The limit
-    /// is --spp, since --time would end the tiles at different samples.
-    #[arg(long, value_name = "A..B", value_parser = parse_tiles, conflicts_with_all = ["time", "overwrite"])]
+    /// is --spp, since --time and --error would end the tiles at different samples.
+    #[arg(long, value_name = "A..B", value_parser = parse_tiles, conflicts_with_all = ["time", "error", "overwrite"])]
     pub tiles: Option<std::ops::Range<u32>>,
 
     #[command(flatten)]
@@ -173,7 +182,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         tiles: args.tiles.clone(),
         seed: args.seed,
         tile: args.scene.tile,
-        stop: StopRule { samples: args.spp, time: args.time },
+        stop: StopRule { samples: args.spp, time: args.time, error: args.error },
         uncertainty: args.uncertainty,
         preview: args.preview.clone().map(|file| Preview { file, exposure: args.exposure }),
         profile: args.profile,
@@ -199,6 +208,12 @@ pub(super) fn parse_time(text: &str) -> std::result::Result<Duration, String> {
     };
     let seconds = number.trim_end().parse::<f64>().map_err(|_| explain())? * unit;
     if seconds > 0.0 { Duration::try_from_secs_f64(seconds).map_err(|_| explain()) } else { Err(explain()) }
+}
+
+/// An error estimate to reach.
+fn parse_error(text: &str) -> std::result::Result<f64, String> {
+    let error = text.parse::<f64>().ok().filter(|error| *error > 0.0 && error.is_finite());
+    error.ok_or_else(|| "an error is a positive number, such as 0.01 for 1 %".into())
 }
 
 /// A host and a port, which may be there later.

@@ -38,7 +38,13 @@ pub struct SceneArgs {
 impl SceneArgs {
     /// Reads the scene, with what the arguments change.
     pub fn load(&self) -> Result<Scene> {
+        self.with(Vec::new())
+    }
+
+    /// [`SceneArgs::load`] with more keys overridden.
+    pub fn with(&self, more: Vec<(String, String)>) -> Result<Scene> {
         let mut overrides = self.overrides.clone();
+        overrides.extend(more);
         if let Some([width, height]) = self.size {
             overrides.push(("film.width".into(), width.to_string()));
             overrides.push(("film.height".into(), height.to_string()));

@@ -4,8 +4,6 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use serde_json::json;
-
 use super::progress::Reporter;
 use super::render::Args;
 use super::view;
@@ -47,6 +45,8 @@ impl Sinks {
         let server = args
             .listen
             .map(|address| -> Result<_> {
+                use serde_json::json;
+
                 use crate::preview::web::{About, Server};
                 let about = About { name: name.clone(), exposure: args.exposure, controls: true };
                 let server = Server::start(address, Arc::clone(&feed), about)?;

@@ -52,6 +52,10 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
 
+    /// Store the standard error of every pixel and channel too, as `render` does
+    #[arg(long)]
+    pub uncertainty: bool,
+
     #[command(flatten)]
     pub scene: SceneArgs,
 
@@ -147,9 +151,10 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     plan::check(&scene)?;
     // What no device renders yet is refused here, not by a thousand tasks.
     Prepared::new(&scene, args.seed)?;
-    let stop = StopRule { samples: Some(args.spp), time: None };
-    let samples = stop.samples_limit(scene.integrator.epoch, false)?.unwrap_or(args.spp);
+    let stop = StopRule { samples: Some(args.spp), ..StopRule::default() };
+    let samples = stop.samples_limit(scene.integrator.epoch, args.uncertainty)?.unwrap_or(args.spp);
     let header = plan::header(&scene, plan::tile_size(&scene, args.scene.tile), args.seed);
+    let header = if args.uncertainty { header.with_uncertainty() } else { header };
     header.validate().map_err(Error::Usage)?;
     let existing = if args.resume { Existing::Resume } else { Existing::Refuse };
     let tiles = header.grid().count();
@@ -167,6 +172,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         size: args.scene.size,
         tile: args.scene.tile,
         seed: args.seed,
+        uncertainty: args.uncertainty,
         memory: args.memory,
         samples,
         tiles,

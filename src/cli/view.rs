@@ -76,7 +76,10 @@ pub fn run(_: &Args, _: &Output) -> Result<()> {
 /// What a build without the feature `web` says.
 #[cfg(not(feature = "web"))]
 pub fn without_web() -> crate::Error {
-    crate::Error::Usage("this program was built without its web page (cargo feature `web`)".into())
+    crate::Error::Usage(
+        "this program was built without its web page; build it with the cargo feature `web`, which is on by default"
+            .into(),
+    )
 }
 
 /// An address to listen on.

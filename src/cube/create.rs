@@ -62,47 +62,126 @@ fn refuse_in_use(held: Option<Range<u32>>, path: &Path) -> Result<()> {
 /// The cube to write to, made or found. A new one is built under a temporary name beside it and renamed: whoever of
 /// several processes comes second finds the first one's.
 pub(super) fn open_or_create(path: &Path, header: &Header, existing: Existing, tiles: &Range<u32>) -> Result<Cube> {
-    let (target, old) = match find_way(path, header, existing, tiles)? {
-        Way::GoOn(cube) => return Ok(*cube),
-        Way::Create(target) => (target, None),
-        Way::Replace(target) => {
-            let lock = TileLock::take(&target, &target.join(PRIVATE), ALL_TILES)?;
-            (target, Some(lock))
-        }
+    let aside = match Aside::begin(find_way(path, header, existing, tiles)?)? {
+        Begun::Aside(aside) => aside,
+        Begun::Found(cube) => return Ok(*cube),
     };
-    let mut building = Building(Some(files::sibling(&target, "creating")));
-    let temporary = building.0.as_deref().unwrap_or(&target);
-    write_empty(temporary, header).map_err(|error| match error {
-        // Nobody knows the temporary name: name the cube.
-        Error::Storage { what, .. } => Error::storage(&target, what),
-        error => error,
-    })?;
-    let failed = |error: std::io::Error| Error::storage(&target, format!("cannot be created: {error}"));
-    if old.is_some() {
-        let replaced = files::sibling(&target, "replaced");
-        fs::rename(&target, &replaced).map_err(failed)?;
-        if let Err(error) = fs::rename(temporary, &target) {
-            fs::rename(&replaced, &target).map_err(failed)?;
-            return Err(failed(error));
+    write_empty(aside.path(), header).map_err(|error| aside.error(error))?;
+    let target = aside.target.clone();
+    match aside.finish()? {
+        Finished::InPlace => Ok(Cube::new(&target, header.clone())),
+        // Another process was quicker. Joining is what was asked for, or it is an error.
+        Finished::Taken(error) => match find_way(path, header, existing, tiles)? {
+            Way::GoOn(cube) => Ok(*cube),
+            _ => Err(Error::storage(&target, format!("cannot be created: {error}"))),
+        },
+    }
+}
+
+/// A cube that is built under a hidden name beside its own, and takes its place in one step. One that never does is removed,
+/// and what it was to replace stays.
+pub(super) struct Aside {
+    target: PathBuf,
+    temporary: PathBuf,
+    /// Held on the cube that is replaced.
+    old: Option<TileLock>,
+    finished: bool,
+}
+
+enum Begun {
+    Aside(Aside),
+    Found(Box<Cube>),
+}
+
+enum Finished {
+    InPlace,
+    /// There is something now where nothing was.
+    Taken(std::io::Error),
+}
+
+impl Aside {
+    /// For a whole cube at `path`, which `existing` allows to be new or to replace one.
+    pub(super) fn new(path: &Path, header: &Header, existing: Existing) -> Result<Aside> {
+        let tiles = 0..header.validate().map_or(0, |()| header.grid().count());
+        let way = find_way(path, header, existing, &tiles)?;
+        if let Way::Replace(target) = &way {
+            // Both lie there until the new one is whole.
+            check_space(path, files::parent(target), header, tiles.end.into(), 0)?;
         }
-        building.0 = None;
-        let removed = fs::remove_dir_all(&replaced);
-        removed.map_err(|error| Error::storage(&replaced, format!("cannot be removed: {error}")))?;
-    } else {
-        match fs::rename(temporary, &target) {
-            Ok(()) => building.0 = None,
-            Err(error) if matches!(error.kind(), ErrorKind::DirectoryNotEmpty | ErrorKind::AlreadyExists) => {
-                // Another process was quicker. Joining is what was asked for, or it is an error.
-                return match find_way(path, header, existing, tiles)? {
-                    Way::GoOn(cube) => Ok(*cube),
-                    _ => Err(failed(error)),
-                };
-            }
-            Err(error) => return Err(failed(error)),
+        match Aside::begin(way)? {
+            Begun::Aside(aside) => Ok(aside),
+            Begun::Found(_) => Err(Error::Internal(format!("{}: a cube made whole is gone on with", path.display()))),
         }
     }
-    files::sync_folder(files::parent(&target)).map_err(failed)?;
-    Ok(Cube::new(&target, header.clone()))
+
+    fn begin(way: Way) -> Result<Begun> {
+        let (target, old) = match way {
+            Way::GoOn(cube) => return Ok(Begun::Found(cube)),
+            Way::Create(target) => (target, None),
+            Way::Replace(target) => {
+                let lock = TileLock::take(&target, &target.join(PRIVATE), ALL_TILES)?;
+                (target, Some(lock))
+            }
+        };
+        let temporary = files::sibling(&target, "creating");
+        Ok(Begun::Aside(Aside { target, temporary, old, finished: false }))
+    }
+
+    /// Where it is built.
+    pub(super) fn path(&self) -> &Path {
+        &self.temporary
+    }
+
+    /// Nobody knows the temporary name: errors name the cube.
+    pub(super) fn error(&self, error: Error) -> Error {
+        match error {
+            Error::Storage { what, .. } => Error::storage(&self.target, what),
+            error => error,
+        }
+    }
+
+    /// Gives a whole cube its place.
+    pub(super) fn put(self) -> Result<()> {
+        let target = self.target.clone();
+        match self.finish()? {
+            Finished::InPlace => Ok(()),
+            Finished::Taken(error) => Err(Error::storage(&target, format!("cannot be created: {error}"))),
+        }
+    }
+
+    fn finish(mut self) -> Result<Finished> {
+        let failed = |error: std::io::Error| Error::storage(&self.target, format!("cannot be created: {error}"));
+        if self.old.is_some() {
+            let replaced = files::sibling(&self.target, "replaced");
+            fs::rename(&self.target, &replaced).map_err(failed)?;
+            if let Err(error) = fs::rename(&self.temporary, &self.target) {
+                fs::rename(&replaced, &self.target).map_err(failed)?;
+                return Err(failed(error));
+            }
+            self.finished = true;
+            let removed = fs::remove_dir_all(&replaced);
+            removed.map_err(|error| Error::storage(&replaced, format!("cannot be removed: {error}")))?;
+        } else {
+            match fs::rename(&self.temporary, &self.target) {
+                Ok(()) => self.finished = true,
+                Err(error) if matches!(error.kind(), ErrorKind::DirectoryNotEmpty | ErrorKind::AlreadyExists) => {
+                    return Ok(Finished::Taken(error));
+                }
+                Err(error) => return Err(failed(error)),
+            }
+        }
+        files::sync_folder(files::parent(&self.target)).map_err(failed)?;
+        Ok(Finished::InPlace)
+    }
+}
+
+impl Drop for Aside {
+    fn drop(&mut self) {
+        if !self.finished {
+            // It has failed already; that error is the one to report.
+            let _ = fs::remove_dir_all(&self.temporary);
+        }
+    }
 }
 
 /// What there is at `path`, and whether it is what may be there.
@@ -169,18 +248,6 @@ pub(super) fn open_same(path: &Path, header: &Header) -> Result<Cube> {
             "{}: cannot be gone on with, since something else would be rendered: {what}",
             path.display()
         ))),
-    }
-}
-
-/// The temporary folder of a cube that is being built, removed again unless it has taken its place.
-struct Building(Option<PathBuf>);
-
-impl Drop for Building {
-    fn drop(&mut self) {
-        if let Some(folder) = &self.0 {
-            // Creation has failed already; that error is the one to report.
-            let _ = fs::remove_dir_all(folder);
-        }
     }
 }
 

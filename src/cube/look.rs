@@ -1,7 +1,8 @@
 //! Looking at a cube while it grows: pictures of a part of it at the resolution of a screen, spectra, means of regions.
 //!
-//! True colour is read from `preview`, 12 bytes a pixel whatever K. Channels by themselves are read from `overview` when
-//! eight or more pixels are one, and only closer up from `radiance`, where one of them costs the reading of all.
+//! Where eight or more pixels are one, everything is read from `overview`: of it the channels that are looked at, and for
+//! true colour those that an eye sees. Closer up true colour is read from `preview`, 12 bytes a pixel whatever K, and
+//! channels by themselves from `radiance`, where one of them costs the reading of all.
 
 use std::fs::{self, File};
 use std::io::{ErrorKind, Read, Seek, SeekFrom};
@@ -12,7 +13,7 @@ use super::map::Chunk;
 use super::store::{Cube, Part};
 use super::writer::Writer;
 use super::{BLOCK, Grid};
-use crate::spectral::colour::Picture;
+use crate::spectral::tone::Picture;
 use crate::{Error, Result};
 
 /// Bytes of radiance that one call may go through; more is refused.
@@ -80,9 +81,19 @@ impl<'a> Look<'a> {
     /// Reads `values` from the file of a tile, `offset` bytes from its start; false before its first unit.
     fn read<T: bytemuck::Pod>(&self, part: Part, tile: u32, offset: u64, values: &mut [T]) -> Result<bool> {
         let Some(mut file) = self.open(part, tile)? else { return Ok(false) };
+        self.read_from(&mut file, part, tile, offset, values).map(|()| true)
+    }
+
+    fn read_from<T: bytemuck::Pod>(
+        &self,
+        file: &mut File,
+        part: Part,
+        tile: u32,
+        offset: u64,
+        values: &mut [T],
+    ) -> Result<()> {
         let read = file.seek(SeekFrom::Start(offset)).and_then(|_| file.read_exact(bytemuck::cast_slice_mut(values)));
-        let damaged = |error| Error::storage(&self.cube.part_path(part, tile), format!("is damaged: {error}"));
-        read.map(|()| true).map_err(damaged)
+        read.map_err(|error| Error::storage(&self.cube.part_path(part, tile), format!("is damaged: {error}")))
     }
 
     /// Samples per pixel of a tile.
@@ -109,11 +120,20 @@ impl<'a> Look<'a> {
         Ok(there.then_some(spectrum))
     }
 
-    /// Linear R, G, B of `preview`, in means of `factor` x `factor` pixels counted from the picture's top left; those that
-    /// share pixels with `rect`.
+    /// Linear R, G, B as the preview shows them, in means of `factor` x `factor` pixels counted from the picture's top left;
+    /// those that share pixels with `rect`. From 8 on, a multiple of 8, only `overview` is read.
     pub fn colour(&self, rect: Rect, factor: u32) -> Result<Window> {
         let grid = self.cube.grid();
         let mut sums = Sums::new(rect, factor, 3);
+        if factor.is_multiple_of(BLOCK) {
+            let projection = self.cube.projection();
+            let channels: Vec<usize> = projection.channels().collect();
+            // Colours are linear in the channels, so those of a mean are the mean of the colours.
+            self.blocks(&channels, sums.pixels(grid), |x, y, pixels, values| {
+                sums.add(x, y, pixels, &projection.rgb_of(values.iter().copied()));
+            })?;
+            return Ok(sums.means());
+        }
         let mut values = vec![0.0f32; grid.tile_pixels() * 3];
         for tile in grid.tiles_in(sums.pixels(grid)) {
             let part = grid.rect(tile);
@@ -141,7 +161,7 @@ impl<'a> Look<'a> {
         let mut sums = Sums::new(rect, factor, channels.len());
         let pixels = sums.pixels(self.cube.grid());
         match factor.is_multiple_of(BLOCK) {
-            true => self.blocks(channels, pixels, &mut sums)?,
+            true => self.blocks(channels, pixels, |x, y, pixels, values| sums.add(x, y, pixels, values))?,
             false => self.single_pixels(channels, pixels, &mut sums)?,
         }
         Ok(sums.means())
@@ -164,19 +184,22 @@ impl<'a> Look<'a> {
         Ok(())
     }
 
-    fn blocks(&self, channels: &[usize], pixels: Rect, sums: &mut Sums) -> Result<()> {
+    /// Calls `each` with the means of the blocks of `overview` that share pixels with `pixels`: column and row of a block's
+    /// first pixel, how many pixels it has, and its values in `channels`.
+    fn blocks(&self, channels: &[usize], pixels: Rect, mut each: impl FnMut(u32, u32, u32, &[f32])) -> Result<()> {
         let grid = self.cube.grid();
         let [columns, rows] = grid.tile_blocks();
         let plane = columns as usize * rows as usize;
         let mut planes = vec![0.0f32; plane * channels.len()];
         let mut values = vec![0.0; channels.len()];
         for tile in grid.tiles_in(pixels) {
-            let mut there = true;
-            for (&k, values) in channels.iter().zip(planes.chunks_exact_mut(plane)) {
-                there &= self.read(Part::Overview, tile, (k * plane * 4) as u64, values)?;
-            }
-            if !there {
-                continue;
+            let Some(mut file) = self.open(Part::Overview, tile)? else { continue };
+            let mut rest = &mut planes[..];
+            // Channels that follow each other lie together in the file.
+            for run in channels.chunk_by(|a, b| a + 1 == *b) {
+                let (these, others) = rest.split_at_mut(run.len() * plane);
+                self.read_from(&mut file, Part::Overview, tile, (run[0] * plane * 4) as u64, these)?;
+                rest = others;
             }
             let part = grid.rect(tile);
             for (i, (y, x)) in (0..rows).flat_map(|y| (0..columns).map(move |x| (y, x))).enumerate() {
@@ -187,7 +210,7 @@ impl<'a> Look<'a> {
                     continue;
                 };
                 values.iter_mut().zip(planes.chunks_exact(plane)).for_each(|(value, plane)| *value = plane[i]);
-                sums.add(x0, y0, block.pixels() as u32, &values);
+                each(x0, y0, block.pixels() as u32, &values);
             }
         }
         Ok(())

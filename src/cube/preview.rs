@@ -3,7 +3,7 @@
 use super::look::Window;
 use super::store::Cube;
 use crate::Result;
-use crate::spectral::colour::Picture;
+use crate::spectral::tone::Picture;
 
 /// How many columns and rows of a picture of `size` go into one, so that no more than `max_pixels` are left.
 pub fn reduction(size: [u32; 2], max_pixels: u64) -> u32 {

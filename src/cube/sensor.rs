@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::json;
 
-use super::create::Existing;
+use super::create::{Aside, Existing};
 use super::metadata::Header;
 use super::store::Cube;
 use super::writer::Writer;
@@ -127,7 +127,7 @@ impl Neighbours {
 }
 
 /// Makes at `path` a cube whose channels are the `named` responses, from the channels of `cube`. A tile at a time is in memory.
-/// `progress` is called with the tiles done, of all.
+/// `progress` is called with the tiles done, of all; an error of it ends the work, and nothing is left or replaced.
 pub fn integrate(
     cube: &Cube,
     named: &[(String, Response)],
@@ -160,7 +160,9 @@ pub fn integrate(
     let header = Header { channels: Channels::from_responses(of_bands, None), attributes, ..cube.header().clone() };
     let grid = cube.grid();
     let count = grid.count();
-    let writer = Writer::open(path, &header, existing, 0..count, &mut |_| {})?;
+    let aside = Aside::new(path, &header, existing)?;
+    let writer = Writer::open(aside.path(), &header, Existing::Refuse, 0..count, &mut |_| {});
+    let writer = writer.map_err(|error| aside.error(error))?;
     // Σ over pixels of error² and of value².
     let mut squares = vec![[0.0f64; 2]; bands.len()];
     let mut unit = vec![0.0f32; grid.tile_pixels() * bands.len()];
@@ -181,14 +183,16 @@ pub fn integrate(
                     squares[b][1] += value * value;
                 }
             }
-            writer.store(tile, samples, &unit)?;
+            writer.store(tile, samples, &unit).map_err(|error| aside.error(error))?;
         }
         if tile % TOGETHER == TOGETHER - 1 {
-            writer.flush()?;
+            writer.flush().map_err(|error| aside.error(error))?;
         }
         progress(u64::from(tile) + 1, count.into())?;
     }
-    writer.flush()?;
+    writer.flush().map_err(|error| aside.error(error))?;
+    drop(writer);
+    aside.put()?;
     for (band, [error, value]) in bands.iter().zip(squares) {
         let relative = if value > 0.0 { (error / value).sqrt() } else { 0.0 };
         if band.is_blind {

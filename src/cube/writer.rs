@@ -21,7 +21,7 @@ use super::merge::{Fold, check_portion, write_standard_errors};
 use super::metadata::Header;
 use super::recover;
 use super::store::{Cube, Part};
-use crate::spectral::colour::Picture;
+use crate::spectral::tone::Picture;
 use crate::{Error, Result, files};
 
 /// At most one batch is committed in this time, but for the last.

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::{PIECE_BYTES, Progress, check_space, default_bands, long_name};
 use crate::cube::{Quantity, Reader, Rect, Strides, View};
-use crate::files::{Replacement, write_atomically};
+use crate::files::Replacement;
 use crate::format::envi::{Image, Interleave};
 use crate::{Error, Result};
 
@@ -48,8 +48,12 @@ pub fn write(view: &View, path: &Path, interleave: Interleave, progress: &mut Pr
         fwhm_nm: each(&|k| channels.fwhm(k)),
         names: channels.names.clone(),
     };
+    // Both are whole before either takes its place.
+    let mut about = Replacement::create(&header)?;
+    let written = about.file().write_all(image.header().as_bytes());
+    written.map_err(|error| about.failed(error))?;
     file.finish()?;
-    write_atomically(&header, image.header().as_bytes())?;
+    about.finish()?;
     Ok(vec![data, header])
 }
 

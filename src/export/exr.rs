@@ -49,15 +49,18 @@ pub fn write(
     check_space(path, view.bytes())?;
     let parts: Vec<&[usize]> = order.chunks(split.unwrap_or(usize::MAX).max(1)).collect();
     let pixels = view.rect().pixels();
+    let mut files = Vec::new();
     let mut written = Vec::new();
     for (i, part) in parts.iter().enumerate() {
         let target = if parts.len() == 1 { path.to_owned() } else { part_path(path, view, part) };
         let bands = part.iter().map(|&b| view.bands()[b]).collect();
         let of_part = view.clone().with_bands(bands)?;
         let mut tell = |done: u64, _: u64| progress(i as u64 * pixels + done, parts.len() as u64 * pixels);
-        write_file(&of_part, &target, strict_units, &mut tell)?;
+        files.push(write_file(&of_part, &target, strict_units, &mut tell)?);
         written.push(target);
     }
+    // All are whole before the first takes its place.
+    files.into_iter().try_for_each(Replacement::finish)?;
     Ok(written)
 }
 
@@ -99,7 +102,8 @@ enum Source {
     Band(usize),
 }
 
-fn write_file(view: &View, path: &Path, strict_units: bool, progress: &mut Progress) -> Result<()> {
+/// The file, which has not taken its place yet.
+fn write_file(view: &View, path: &Path, strict_units: bool, progress: &mut Progress) -> Result<Replacement> {
     let mut named: Vec<(String, Source)> =
         (0..view.channels().len()).map(|b| (band_name(view.channels().centre(b)), Source::Band(b))).collect();
     named.extend(["R", "G", "B"].into_iter().enumerate().map(|(i, name)| (name.to_owned(), Source::Colour(i))));
@@ -127,7 +131,7 @@ fn write_file(view: &View, path: &Path, strict_units: bool, progress: &mut Progr
     }
     result.map_err(|error| replacement.failed(error))?;
     flushed.map_err(|error| replacement.failed(error))?;
-    replacement.finish()
+    Ok(replacement)
 }
 
 fn header(view: &View, named: &[(String, Source)], strict_units: bool) -> Result<Header> {

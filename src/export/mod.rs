@@ -12,11 +12,11 @@ use std::path::{Path, PathBuf};
 
 use crate::cube::{Quantity, View};
 use crate::format::envi::Interleave;
-use crate::spectral::colour::ProjectionKind;
+use crate::spectral::colour::{ProjectionKind, three_of};
 use crate::{Error, Result, files};
 
 pub use exr::WIDELY_READ;
-pub use picture::{Map, colours, map};
+pub use picture::{Map, Shown, write_png};
 
 /// Values, in bytes, that a writer holds at a time, about.
 const PIECE_BYTES: usize = 32 << 20;
@@ -106,22 +106,15 @@ fn long_name(view: &View) -> &'static str {
 }
 
 /// The bands (of the view) shown as red, green and blue where a format names three: those of the preview if they are
-/// there, else those next to 640, 550 and 460 nm if the cube's preview shows XYZ, else the longest, middle and shortest.
+/// there, else what [`three_of`] chooses.
 fn default_bands(view: &View) -> [usize; 3] {
     let channels = view.channels();
     let position = |k: usize| view.bands().iter().position(|&band| band == k);
     match view.cube().projection().kind {
-        ProjectionKind::Xyz => [640.0, 550.0, 460.0].map(|nm| {
-            let distance = |b: usize| (channels.centre(b) - nm).abs();
-            (0..channels.len()).min_by(|&a, &b| distance(a).total_cmp(&distance(b))).unwrap_or(0)
-        }),
+        ProjectionKind::Xyz => three_of(channels, true),
         ProjectionKind::FalseColour([r, g, b]) => match (position(r), position(g), position(b)) {
             (Some(r), Some(g), Some(b)) => [r, g, b],
-            _ => {
-                let mut order: Vec<usize> = (0..channels.len()).collect();
-                order.sort_by(|&a, &b| channels.centre(a).total_cmp(&channels.centre(b)));
-                [order[order.len() - 1], order[order.len() / 2], order[0]]
-            }
+            _ => three_of(channels, false),
         },
     }
 }

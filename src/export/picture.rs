@@ -1,15 +1,24 @@
-//! Pictures of a cube other than its preview.
+//! Pictures of a cube: PNG, row by row.
 
+use std::path::Path;
+
+use super::{PIECE_BYTES, Progress};
 use crate::Result;
-use crate::cube::{Rect, View};
-use crate::spectral::colour::{Picture, Projection};
-use crate::spectral::temperature::BandTemperature;
+use crate::cube::{Reader, Rect, View};
+use crate::format::png;
+use crate::spectral::colour::Projection;
+use crate::spectral::temperature::{BandTemperature, shown_range};
+use crate::spectral::tone::{Tone, exposure_of, largest, percentiles_of};
 
-/// The pixels of `view` in the linear colours of a projection, whatever its bands; NaN where nothing is rendered yet.
-pub fn colours(view: &View, projection: &Projection) -> Result<Picture> {
-    let mut rgb = vec![f32::NAN; view.rect().pixels() as usize * 3];
-    each_pixel(view, |pixel, spectrum| rgb[3 * pixel..3 * pixel + 3].copy_from_slice(&projection.rgb(spectrum)))?;
-    Ok(Picture { size: view.size(), rgb })
+/// What a picture shows of the pixels of a view.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Shown {
+    /// The colours of the cube's preview.
+    Preview,
+    /// Those of a projection, whatever the bands of the view.
+    Colours(Projection),
+    /// The bands of the view together, in a colour map.
+    Map(Map),
 }
 
 /// What a map shows of the bands of a view together.
@@ -17,37 +26,116 @@ pub fn colours(view: &View, projection: &Projection) -> Result<Picture> {
 pub enum Map {
     /// Their mean radiance, weighted by their widths, W m⁻² sr⁻¹ nm⁻¹.
     Radiance,
-    /// The brightness temperature of that, K.
+    /// Their radiance, W m⁻² sr⁻¹.
+    Integrated,
+    /// The brightness temperature of the mean, K.
     Temperature,
 }
 
-/// One number a pixel; NaN where nothing is rendered yet.
-pub fn map(view: &View, map: Map) -> Result<Vec<f32>> {
-    let channels = view.cube().channels();
-    let total: f64 = view.bands().iter().map(|&k| channels.integral(k)).sum();
-    let weights: Vec<(usize, f64)> = view.bands().iter().map(|&k| (k, channels.integral(k) / total)).collect();
-    let temperature = (map == Map::Temperature).then(|| BandTemperature::of_all(channels, view.bands()));
-    let mut values = vec![f32::NAN; view.rect().pixels() as usize];
-    each_pixel(view, |pixel, spectrum| {
-        // One band is itself, to the last bit.
-        let mean = weights.iter().map(|&(k, weight)| weight * f64::from(spectrum[k])).sum::<f64>();
-        values[pixel] = temperature.as_ref().map_or(mean, |temperature| temperature.kelvin(mean)) as f32;
-    })?;
-    Ok(values)
+/// Writes a picture as PNG, and returns how its values became brightness: as asked, else so that the 99th percentile is white,
+/// or the 1st and the 99th are the ends of the colour map. For that the cube is read three times rather than held.
+pub fn write_png(
+    view: &View,
+    path: &Path,
+    shown: &Shown,
+    asked: Option<Tone>,
+    progress: &mut Progress,
+) -> Result<Tone> {
+    let mut rows = Rows::new(view, shown, if asked.is_some() { 1 } else { 3 });
+    let tone = match asked {
+        Some(tone) => tone,
+        None => rows.tone(progress)?,
+    };
+    png::stream(path, view.size(), |put| rows.each(progress, |values| put(&tone.srgb8(values))))?;
+    Ok(tone)
 }
 
-/// Calls `each` with the number of every pixel, row by row, and all channels of the cube there.
-fn each_pixel(view: &View, mut each: impl FnMut(usize, &[f32])) -> Result<()> {
-    let (rect, mut reader) = (view.rect(), view.reader());
-    let tile = view.cube().grid().tile[1];
-    let mut y0 = rect.y0;
-    while y0 < rect.y1 {
-        // A row of tiles at a time, so that no more of them are mapped.
-        let y1 = ((y0 / tile + 1) * tile).min(rect.y1);
-        reader.spectra(Rect { y0, y1, ..rect }, |x, y, spectrum| {
-            each((y - rect.y0) as usize * rect.width() as usize + (x - rect.x0) as usize, spectrum);
-        })?;
-        y0 = y1;
+/// The rows of a picture, a piece at a time.
+struct Rows<'a> {
+    view: &'a View<'a>,
+    shown: &'a Shown,
+    reader: Reader<'a>,
+    /// Of a map: bands and their weights, and the temperatures of what they add up to.
+    weights: Vec<(usize, f64)>,
+    temperature: Option<BandTemperature>,
+    values: Vec<f32>,
+    /// How often all rows are gone through, and how often they have been.
+    passes: u64,
+    passed: u64,
+}
+
+impl<'a> Rows<'a> {
+    fn new(view: &'a View<'a>, shown: &'a Shown, passes: u64) -> Rows<'a> {
+        let channels = view.cube().channels();
+        let total: f64 = match shown {
+            Shown::Map(Map::Integrated) => 1.0,
+            _ => view.bands().iter().map(|&k| channels.integral(k)).sum(),
+        };
+        let weights = view.bands().iter().map(|&k| (k, channels.integral(k) / total)).collect();
+        let is_heat = *shown == Shown::Map(Map::Temperature);
+        let temperature = is_heat.then(|| BandTemperature::of_all(channels, view.bands()));
+        Rows { view, shown, reader: view.reader(), weights, temperature, values: Vec::new(), passes, passed: 0 }
     }
-    Ok(())
+
+    /// Values of a pixel.
+    fn planes(&self) -> usize {
+        if let Shown::Map(_) = self.shown { 1 } else { 3 }
+    }
+
+    /// The values of the pixels in `rect`, rows from the top; NaN where nothing is rendered yet.
+    fn read(&mut self, rect: Rect) -> Result<()> {
+        let Rows { view, shown, reader, weights, temperature, values, .. } = self;
+        if **shown == Shown::Preview {
+            *values = view.cube().look().colour(rect, 1)?.values;
+            return Ok(());
+        }
+        let planes = if let Shown::Map(_) = shown { 1 } else { 3 };
+        values.clear();
+        values.resize(rect.pixels() as usize * planes, f32::NAN);
+        reader.spectra(rect, |x, y, spectrum| {
+            let pixel = (y - rect.y0) as usize * rect.width() as usize + (x - rect.x0) as usize;
+            let pixel = &mut values[pixel * planes..][..planes];
+            if let Shown::Colours(projection) = shown {
+                return pixel.copy_from_slice(&projection.rgb(spectrum));
+            }
+            // One band is itself, to the last bit.
+            let sum = weights.iter().map(|&(k, weight)| weight * f64::from(spectrum[k])).sum::<f64>();
+            pixel[0] = temperature.as_ref().map_or(sum, |temperature| temperature.kelvin(sum)) as f32;
+        })
+    }
+
+    /// Calls `each` with all values, in pieces of whole rows.
+    fn each(&mut self, progress: &mut Progress, mut each: impl FnMut(&[f32]) -> Result<()>) -> Result<()> {
+        let (rect, tile) = (self.view.rect(), self.view.cube().grid().tile[1]);
+        let most = (PIECE_BYTES / (rect.width() as usize * self.planes() * 4)).max(1) as u32;
+        let pixels = rect.pixels();
+        let mut y0 = rect.y0;
+        while y0 < rect.y1 {
+            // Of a row of tiles at most, so that no more of them are mapped.
+            let y1 = ((y0 / tile + 1) * tile).min(y0.saturating_add(most)).min(rect.y1);
+            self.read(Rect { y0, y1, ..rect })?;
+            each(&self.values)?;
+            let done = u64::from(y1 - rect.y0) * u64::from(rect.width());
+            progress(self.passed * pixels + done, self.passes * pixels)?;
+            y0 = y1;
+        }
+        self.passed += 1;
+        Ok(())
+    }
+
+    fn tone(&mut self, progress: &mut Progress) -> Result<Tone> {
+        let planes = self.planes();
+        let found = percentiles_of([1, 99], |take| {
+            self.each(progress, |values| {
+                values.chunks_exact(planes).for_each(|pixel| take(largest(pixel)));
+                Ok(())
+            })
+        })?;
+        let range = found.map_or([0.0, 1.0], |found| found.map(f64::from));
+        Ok(match self.shown {
+            Shown::Map(Map::Temperature) => Tone::Range(shown_range(range)),
+            Shown::Map(_) => Tone::Range(range),
+            _ => Tone::Exposure(exposure_of(found.map(|[_, high]| high))),
+        })
+    }
 }

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
+use super::text::nanometres;
 use crate::error::Problem;
 
 /// How the values of an image follow each other.
@@ -86,9 +87,11 @@ impl DataType {
     }
 }
 
-/// What a header says of the layout, and of the bands. Everything else is in `other`, by lower-case key.
+/// What a header says of the layout, and of the bands. Everything else is to be had by its lower-case key.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Header {
+    /// Its own file.
+    path: PathBuf,
     pub samples: usize,
     pub lines: usize,
     pub bands: usize,
@@ -98,18 +101,37 @@ pub struct Header {
     pub big_endian: bool,
     /// Of each band (of each sample, in a library), nm; where the header gives them.
     pub wavelength_nm: Option<Vec<f64>>,
-    pub other: BTreeMap<String, String>,
+    /// Line and text by key.
+    entries: BTreeMap<String, (usize, String)>,
 }
 
 impl Header {
-    /// A list `{ a, b }` among [`Header::other`].
+    pub fn get(&self, key: &str) -> Option<&str> {
+        self.entries.get(key).map(|(_, text)| text.as_str())
+    }
+
+    /// A list `{ a, b }`.
     pub fn list(&self, key: &str) -> Option<Vec<&str>> {
-        self.other.get(key).map(|text| split_list(text))
+        self.get(key).map(split_list)
+    }
+
+    /// A number, where the key is there.
+    pub fn number(&self, key: &str) -> Result<Option<f64>, Box<Problem>> {
+        let Some(text) = self.get(key) else { return Ok(None) };
+        text.parse()
+            .map(Some)
+            .map_err(|_| self.problem(key, &format!("must be a number, but is `{}`", text.escape_debug())))
+    }
+
+    /// What is wrong about a key, on its line if it has one.
+    pub fn problem(&self, key: &str, message: &str) -> Box<Problem> {
+        let line = self.entries.get(key).map(|(line, _)| *line);
+        wrong(&self.path, line, format!("`{key}` {message}"), "")
     }
 
     /// Whether this describes a spectral library: `lines` spectra of `samples` values.
     pub fn is_library(&self) -> bool {
-        self.other.get("file type").is_some_and(|kind| kind.eq_ignore_ascii_case("ENVI Spectral Library"))
+        self.get("file type").is_some_and(|kind| kind.eq_ignore_ascii_case("ENVI Spectral Library"))
     }
 
     /// Bytes that the data file must have at least.
@@ -117,6 +139,45 @@ impl Header {
         let values = (self.samples as u64).checked_mul(self.lines as u64)?.checked_mul(self.bands as u64)?;
         values.checked_mul(self.data_type.bytes() as u64)?.checked_add(self.header_offset)
     }
+
+    /// The numbers in `bytes`, the content of the data file at `path`.
+    pub fn data<'a>(&'a self, bytes: &'a [u8], path: &Path) -> Result<Data<'a>, Box<Problem>> {
+        // That they can be counted was seen to when the header was read.
+        let expected = self.data_bytes().unwrap_or(u64::MAX);
+        if (bytes.len() as u64) < expected {
+            let message = format!("has {} bytes, but its header promises {expected}", bytes.len());
+            return Err(wrong(path, None, message, ""));
+        }
+        let missing = self.number("data ignore value")?;
+        Ok(Data { header: self, bytes: &bytes[self.header_offset as usize..], missing })
+    }
+}
+
+/// The numbers that a header describes.
+pub struct Data<'a> {
+    header: &'a Header,
+    bytes: &'a [u8],
+    missing: Option<f64>,
+}
+
+impl Data<'_> {
+    /// The value there; `None` where the header says that there is none.
+    pub fn value(&self, sample: usize, line: usize, band: usize) -> Option<f64> {
+        let Header { samples, lines, bands, data_type, .. } = *self.header;
+        let place = match self.header.interleave {
+            Interleave::Bsq => (band * lines + line) * samples + sample,
+            Interleave::Bil => (line * bands + band) * samples + sample,
+            Interleave::Bip => (line * samples + sample) * bands + band,
+        };
+        let value = data_type.decode(&self.bytes[place * data_type.bytes()..], self.header.big_endian);
+        let is_missing = self.missing.is_some_and(|missing| value == missing || (value.is_nan() && missing.is_nan()));
+        (!is_missing).then_some(value)
+    }
+}
+
+fn wrong(path: &Path, line: Option<usize>, message: String, help: &str) -> Box<Problem> {
+    let help = (!help.is_empty()).then(|| help.to_owned());
+    Box::new(Problem { file: path.to_owned(), line, message, help, ..Problem::default() })
 }
 
 fn split_list(text: &str) -> Vec<&str> {
@@ -124,23 +185,21 @@ fn split_list(text: &str) -> Vec<&str> {
     inner.split(',').map(str::trim).filter(|item| !item.is_empty()).collect()
 }
 
-/// The header that goes with a data file, or the other way round: `name.hdr` or `name.img.hdr` with `name.img`.
+/// The header beside a data file: `name.img.hdr` or `name.hdr` with `name.img`.
 pub fn header_path(data: &Path) -> Option<PathBuf> {
     let appended = {
         let mut name = data.as_os_str().to_owned();
         name.push(".hdr");
         PathBuf::from(name)
     };
-    [appended, data.with_extension("hdr"), data.with_extension("HDR")].into_iter().find(|path| path.is_file())
+    let names = [appended, data.with_extension("hdr"), data.with_extension("HDR")];
+    names.into_iter().find(|path| path != data && path.is_file())
 }
 
 /// Reads a header; `path` stands in messages.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Header, Box<Problem>> {
     let text = String::from_utf8_lossy(bytes);
-    let wrong = |line: Option<usize>, message: String, help: &str| {
-        let help = (!help.is_empty()).then(|| help.to_owned());
-        Box::new(Problem { file: path.to_owned(), line, message, help, ..Problem::default() })
-    };
+    let wrong = |line: Option<usize>, message: String, help: &str| wrong(path, line, message, help);
     let mut lines = (1..).zip(text.lines());
     if lines.next().is_none_or(|(_, line)| line.trim_start_matches('\u{feff}').trim() != "ENVI") {
         return Err(wrong(None, "is no ENVI header: its first line is not `ENVI`".into(), ""));
@@ -175,7 +234,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Header, Box<Problem>> {
         Some((line, text)) => text.parse::<u64>().map(|n| (Some(line), n)).map_err(|_| {
             wrong(Some(line), format!("`{key}` must be a whole number, but is `{}`", text.escape_debug()), "")
         }),
-        None => default.map(|n| (None, n)).ok_or_else(|| wrong(None, format!("says nothing about `{key}`"), "")),
+        None => default.map(|n| (None, n)).ok_or_else(|| wrong(None, format!("lacks `{key}`"), "")),
     };
     let count = |(line, n): (Option<usize>, u64), key: &str| {
         let fits = usize::try_from(n).ok().filter(|n| *n > 0 && *n <= isize::MAX as usize);
@@ -187,14 +246,16 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Header, Box<Problem>> {
     let (_, header_offset) = number("header offset", Some(0))?;
     let (line, code) = number("data type", None)?;
     let data_type = DataType::from_number(code).ok_or_else(|| {
-        wrong(line, format!("`data type` {code} is none that can be read"), "1, 2, 3, 4, 5, 12, 13, 14 and 15 can")
+        let known = "1, 2, 3, 4, 5, 12, 13, 14 or 15: numbers that are real";
+        wrong(line, format!("`data type` must be {known}, but is {code}"), "")
     })?;
     let (line, order) = number("byte order", Some(0))?;
     if order > 1 {
         return Err(wrong(line, format!("`byte order` must be 0 or 1, but is {order}"), ""));
     }
     let interleave = match take("interleave") {
-        None => Interleave::Bsq,
+        None if bands == 1 => Interleave::Bsq,
+        None => return Err(wrong(None, "lacks `interleave`".into(), "it is bil, bip or bsq")),
         Some((line, text)) => match text.to_lowercase().as_str() {
             "bil" => Interleave::Bil,
             "bip" => Interleave::Bip,
@@ -206,6 +267,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Header, Box<Problem>> {
         },
     };
     let mut header = Header {
+        path: path.to_owned(),
         samples,
         lines,
         bands,
@@ -214,38 +276,40 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Header, Box<Problem>> {
         interleave,
         big_endian: order == 1,
         wavelength_nm: None,
-        other: BTreeMap::new(),
+        entries: BTreeMap::new(),
     };
     if header.data_bytes().is_none() {
         return Err(wrong(None, "describes an image of more bytes than can be counted".into(), ""));
     }
     let wavelengths = take("wavelength");
-    header.other = entries.into_iter().map(|(key, (_, value))| (key, value)).collect();
+    header.entries = entries;
     let expected = if header.is_library() { samples } else { bands };
     if let Some((line, text)) = wavelengths {
-        let factor = match header.other.get("wavelength units").map(|unit| unit.to_lowercase()).as_deref() {
-            // Wavelengths of reflected light below 100 are micrometres, as every instrument's are.
+        let unit = header.get("wavelength units").map(str::to_lowercase);
+        let is_wavenumber = matches!(unit.as_deref(), Some("wavenumber" | "wavenumbers" | "cm-1"));
+        let factor = match unit.as_deref() {
             None | Some("unknown") => None,
-            Some("nanometers" | "nanometres" | "nm") => Some(Some(1.0)),
-            Some("micrometers" | "micrometres" | "microns" | "micron" | "um" | "µm") => Some(Some(1e3)),
-            Some("millimeters" | "mm") => Some(Some(1e6)),
-            Some("wavenumber" | "wavenumbers" | "cm-1") => Some(None),
-            Some(unit) => {
-                let message = format!("gives wavelengths in `{}`", unit.escape_debug());
-                return Err(wrong(Some(line), message, "give them in Nanometers, Micrometers or Wavenumber"));
-            }
+            Some(_) if is_wavenumber => None,
+            Some(unit) => Some(nanometres(unit).ok_or_else(|| {
+                let message =
+                    format!("must be Nanometers, Micrometers or Wavenumber, but is `{}`", unit.escape_debug());
+                header.problem("wavelength units", &message)
+            })?),
         };
         let items = split_list(&text);
         let parsed: Option<Vec<f64>> =
             items.iter().map(|item| item.parse().ok().filter(|v: &f64| v.is_finite() && *v > 0.0)).collect();
         let Some(values) = parsed.filter(|values| values.len() == expected) else {
-            let message = format!("`wavelength` must be a list of {expected} numbers above 0, but has {}", items.len());
+            let (of, has) = (if header.is_library() { "samples" } else { "bands" }, items.len());
+            let message =
+                format!("`wavelength` must have a number for each of {expected} {of}, above 0, but lists {has}");
             return Err(wrong(Some(line), message, ""));
         };
+        // Wavelengths of reflected light below 100 are micrometres, as every instrument's are.
         let in_micrometres = values.iter().all(|v| *v < 100.0);
         let to_nm = |v: f64| match factor {
-            Some(Some(factor)) => v * factor,
-            Some(None) => 1e7 / v,
+            Some(factor) => v * factor,
+            None if is_wavenumber => 1e7 / v,
             None if in_micrometres => v * 1e3,
             None => v,
         };
@@ -340,7 +404,7 @@ mod tests {
         )
         .unwrap();
         assert!(library.is_library() && library.wavelength_nm.is_some_and(|nm| nm == [400.0, 500.0, 600.0]));
-        let unsaid = read(&format!("{SMALL}wavelength = {{ 0.4, 2.5 }}")).unwrap();
+        let unsaid = read(&format!("{SMALL}interleave = bsq\nwavelength = {{ 0.4, 2.5 }}")).unwrap();
         assert_eq!(unsaid.wavelength_nm, Some(vec![400.0, 2500.0]));
     }
 
@@ -363,7 +427,7 @@ mod tests {
         assert_eq!(header.wavelength_nm, Some(image.wavelength_nm.clone()));
         assert_eq!(header.list("band names"), Some(vec!["a  b", "c"]));
         assert_eq!(header.list("default bands"), Some(vec!["2", "1", "1"]));
-        assert_eq!((header.other["x start"].as_str(), header.other["y start"].as_str()), ("11", "21"));
+        assert_eq!((header.get("x start"), header.get("y start")), (Some("11"), Some("21")));
     }
 
     #[test]
@@ -390,20 +454,25 @@ mod tests {
         for (text, line, words) in [
             ("", None, "first line"),
             ("ENVI\nsamples\n", Some(2), "no `key = value`"),
-            ("ENVI\nsamples = 2\n", None, "nothing about `lines`"),
+            ("ENVI\nsamples = 2\n", None, "lacks `lines`"),
             ("ENVI\nsamples = -2\nlines = 1\n", Some(2), "whole number"),
             ("ENVI\nsamples = 0\nlines = 1\ndata type = 4\n", Some(2), "at least 1"),
-            ("ENVI\nsamples = 1\nlines = 1\ndata type = 6\n", Some(4), "none that can be read"),
+            ("ENVI\nsamples = 1\nlines = 1\ndata type = 6\n", Some(4), "numbers that are real, but is 6"),
             ("ENVI\nsamples = 1\nlines = 1\ndata type = 4\nbyte order = 2\n", Some(5), "0 or 1"),
             ("ENVI\nsamples = 1\nlines = 1\ndata type = 4\ninterleave = x\n", Some(5), "bil, bip or bsq"),
-            ("ENVI\nsamples = 1\nlines = 1\ndata type = 4\nwavelength = { 1, 2 }\n", Some(5), "list of 1"),
+            (
+                "ENVI\nsamples = 1\nlines = 1\ndata type = 4\nwavelength = { 1, 2 }\n",
+                Some(5),
+                "each of 1 bands, above 0, but lists 2",
+            ),
             ("ENVI\nsamples = 1\nlines = 1\ndata type = 4\nwavelength = { -1 }\n", Some(5), "above 0"),
             ("ENVI\nsamples = 1\nlines = 1\ndata type = 4\nwavelength = { 1\n", Some(5), "never ends"),
             (
                 "ENVI\nsamples = 1\nlines = 1\ndata type = 4\nwavelength units = Index\nwavelength = { 1 }\n",
-                Some(6),
-                "`index`",
+                Some(5),
+                "Wavenumber, but is `index`",
             ),
+            ("ENVI\nsamples = 1\nlines = 1\nbands = 2\ndata type = 4\n", None, "lacks `interleave`"),
             ("ENVI\nsamples = 9999999999999\nlines = 9999999999999\ndata type = 4\n", None, "counted"),
         ] {
             let problem = read(text).unwrap_err();

@@ -74,24 +74,17 @@ pub fn parse_envi(
             }
         },
     };
-    if header.data_bytes().is_none_or(|expected| (data.len() as u64) < expected) {
-        let expected = header.data_bytes().unwrap_or(u64::MAX);
-        return wrong(data_path, None, format!("has {} bytes where its header asks for {expected}", data.len()), "");
-    }
-    let scale = match header.other.get("reflectance scale factor").map(|text| text.parse::<f64>()) {
+    let data = header.data(data, data_path)?;
+    let scale = match header.number("reflectance scale factor")? {
         None => 1.0,
-        Some(Ok(scale)) if scale.is_finite() && scale > 0.0 => scale,
-        Some(_) => return wrong(header_path, None, "has a `reflectance scale factor` that is no number above 0", ""),
+        Some(scale) if scale.is_finite() && scale > 0.0 => scale,
+        Some(scale) => {
+            return Err(header.problem("reflectance scale factor", &format!("must be above 0, but is {scale}")));
+        }
     };
-    let ignored = header.other.get("data ignore value").and_then(|text| text.parse::<f64>().ok());
-    let size = header.data_type.bytes();
-    let first = header.header_offset as usize + index * header.samples * size;
     let mut table = SpectrumTable { nm: Vec::new(), value: Vec::new(), line: Vec::new() };
     for (i, nm) in nm.into_iter().enumerate() {
-        let value = header.data_type.decode(&data[first + i * size..][..size], header.big_endian);
-        if ignored.is_some_and(|ignored| value == ignored || (value.is_nan() && ignored.is_nan())) {
-            continue;
-        }
+        let Some(value) = data.value(i, index, 0) else { continue };
         if !value.is_finite() {
             return wrong(data_path, None, format!("holds {value} at {nm} nm"), "");
         }
@@ -386,7 +379,7 @@ mod tests {
         for (data, name, words) in [
             (&data[..], None, "has 2 spectra"),
             (&data[..], Some("dust"), "no spectrum \"dust\""),
-            (&data[..20], Some("wet"), "20 bytes where its header asks for 24"),
+            (&data[..20], Some("wet"), "20 bytes, but its header promises 24"),
         ] {
             let problem = read(&header, data, name).unwrap_err();
             assert!(problem.message.contains(words), "{problem}");

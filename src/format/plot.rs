@@ -95,7 +95,8 @@ fn levels(channels: &Channels, radiance: &[f32]) -> Vec<Vec<(f64, f64)>> {
     lines
 }
 
-fn superscript(number: i32) -> String {
+/// 10 to this power, as it is written.
+pub fn superscript(number: i32) -> String {
     let sign = if number < 0 { "⁻" } else { "" };
     let digits = number.unsigned_abs().to_string();
     let digit = |c: char| ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'][c as usize - '0' as usize];

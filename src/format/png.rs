@@ -1,37 +1,53 @@
 //! 8-bit PNG pictures.
 
+use std::io::{BufWriter, Write};
 use std::path::Path;
 
-use crate::files::write_atomically;
-use crate::spectral::colour::Picture;
+use crate::files::{Replacement, write_atomically};
+use crate::spectral::tone::Picture;
 use crate::{Error, Result};
 
 /// Writes a picture at an exposure of `ev` as 8-bit sRGB, marked as such, replacing `path` in one step.
 pub fn write(path: &Path, picture: &Picture, ev: f64) -> Result<()> {
-    write_srgb8(path, picture.size, &picture.to_srgb8(ev))
+    let bytes = encode(picture.size, &picture.to_srgb8(ev));
+    write_atomically(path, &bytes.map_err(|error| Error::storage(path, format!("cannot be made: {error}")))?)
 }
 
-/// Writes 8-bit sRGB, three bytes a pixel, as it stands.
-pub fn write_srgb8(path: &Path, size: [u32; 2], rgb: &[u8]) -> Result<()> {
-    let bytes = encode_srgb8(size, rgb).map_err(|error| Error::storage(path, format!("cannot be made: {error}")))?;
-    write_atomically(path, &bytes)
-}
-
-/// A picture as the bytes of a PNG file.
-pub fn encode(picture: &Picture, ev: f64) -> std::result::Result<Vec<u8>, png::EncodingError> {
-    encode_srgb8(picture.size, &picture.to_srgb8(ev))
-}
-
-fn encode_srgb8(size: [u32; 2], rgb: &[u8]) -> std::result::Result<Vec<u8>, png::EncodingError> {
+/// The bytes of a PNG file of 8-bit sRGB, three bytes a pixel.
+pub fn encode(size: [u32; 2], rgb: &[u8]) -> std::result::Result<Vec<u8>, png::EncodingError> {
     let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, size[0], size[1]);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
-    let mut writer = encoder.write_header()?;
+    let mut writer = encoder(&mut bytes, size).write_header()?;
     writer.write_image_data(rgb)?;
     writer.finish()?;
     Ok(bytes)
+}
+
+/// Writes a picture piece by piece: `each` passes on its 8-bit sRGB, row by row from the top. What fails leaves nothing, and
+/// what was at `path` before.
+pub fn stream(
+    path: &Path,
+    size: [u32; 2],
+    each: impl FnOnce(&mut dyn FnMut(&[u8]) -> Result<()>) -> Result<()>,
+) -> Result<()> {
+    let mut replacement = Replacement::create(path)?;
+    let failed = |error: &dyn std::fmt::Display| Error::storage(path, format!("cannot be written: {error}"));
+    let mut file = BufWriter::with_capacity(1 << 20, replacement.file());
+    let mut writer = encoder(&mut file, size).write_header().map_err(|error| failed(&error))?;
+    let mut rows = writer.stream_writer_with_size(1 << 16).map_err(|error| failed(&error))?;
+    each(&mut |bytes| rows.write_all(bytes).map_err(|error| failed(&error)))?;
+    rows.finish().map_err(|error| failed(&error))?;
+    writer.finish().map_err(|error| failed(&error))?;
+    file.flush().map_err(|error| failed(&error))?;
+    drop(file);
+    replacement.finish()
+}
+
+fn encoder<'a, W: Write + 'a>(to: W, [width, height]: [u32; 2]) -> png::Encoder<'a, W> {
+    let mut encoder = png::Encoder::new(to, width, height);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
+    encoder
 }
 
 #[cfg(test)]
@@ -43,15 +59,25 @@ mod tests {
         let picture = Picture { size: [2, 1], rgb: vec![0.0, 0.25, 0.5, f32::NAN, 1.0, 0.1] };
         let folder = tempfile::tempdir().expect("folder");
         let path = folder.path().join("p.png");
-        write(&path, &picture, 1.0).expect("written");
-        let file = std::io::BufReader::new(std::fs::File::open(&path).expect("opens"));
-        let mut reader = png::Decoder::new(file).read_info().expect("a PNG");
-        let mut pixels = vec![0; reader.output_buffer_size().expect("size")];
-        reader.next_frame(&mut pixels).expect("pixels");
-        assert_eq!(pixels, picture.to_srgb8(1.0));
-        assert_eq!(pixels[..3], [0, 188, 255]);
-        let info = reader.info();
-        assert_eq!(info.srgb, Some(png::SrgbRenderingIntent::RelativeColorimetric));
-        assert_eq!((info.width, info.height), (2, 1));
+        for in_pieces in [false, true] {
+            match in_pieces {
+                false => write(&path, &picture, 1.0).expect("written"),
+                true => {
+                    stream(&path, [2, 1], |put| picture.to_srgb8(1.0).chunks(3).try_for_each(put)).expect("written")
+                }
+            }
+            let file = std::io::BufReader::new(std::fs::File::open(&path).expect("opens"));
+            let mut reader = png::Decoder::new(file).read_info().expect("a PNG");
+            let mut pixels = vec![0; reader.output_buffer_size().expect("size")];
+            reader.next_frame(&mut pixels).expect("pixels");
+            assert_eq!(pixels, picture.to_srgb8(1.0));
+            assert_eq!(pixels[..3], [0, 188, 255]);
+            let info = reader.info();
+            assert_eq!(info.srgb, Some(png::SrgbRenderingIntent::RelativeColorimetric));
+            assert_eq!((info.width, info.height), (2, 1));
+        }
+        let short = stream(&path, [2, 1], |put| put(&[1, 2, 3])).unwrap_err();
+        assert!(short.to_string().contains("p.png: cannot be written"), "{short}");
+        assert_eq!(std::fs::read_dir(folder.path()).expect("list").count(), 1);
     }
 }

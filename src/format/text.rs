@@ -188,15 +188,28 @@ impl Unit {
         }
         for word in name.split(|c: char| !c.is_alphanumeric()) {
             match word {
-                "um" | "µm" | "μm" | "micron" | "microns" | "micrometer" | "micrometers" | "micrometre"
-                | "micrometres" => {
-                    return Ok(Unit::Micrometre);
-                }
-                "m" | "mm" | "angstrom" | "angstroms" | "å" | "ev" | "hz" | "thz" => return Err(word.to_owned()),
-                _ => {}
+                "angstrom" | "angstroms" | "å" | "ev" | "hz" | "thz" => return Err(word.to_owned()),
+                _ => match nanometres(word) {
+                    Some(1e3) => return Ok(Unit::Micrometre),
+                    Some(1e6..) => return Err(word.to_owned()),
+                    _ => {}
+                },
             }
         }
         Ok(Unit::Nanometre)
+    }
+}
+
+/// Nanometres in a unit of wavelength, under the names that files give it.
+pub(super) fn nanometres(unit: &str) -> Option<f64> {
+    match unit.trim().to_ascii_lowercase().as_str() {
+        "nm" | "nanometer" | "nanometers" | "nanometre" | "nanometres" => Some(1.0),
+        "um" | "µm" | "μm" | "micron" | "microns" | "micrometer" | "micrometers" | "micrometre" | "micrometres" => {
+            Some(1e3)
+        }
+        "mm" | "millimeter" | "millimeters" | "millimetre" | "millimetres" => Some(1e6),
+        "m" | "meter" | "meters" | "metre" | "metres" => Some(1e9),
+        _ => None,
     }
 }
 

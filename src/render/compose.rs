@@ -220,8 +220,8 @@ impl Prepared {
         d.set("FACTORS", self.factors as u32).set("SOURCES", self.sources as u32);
         d.set("WORKGROUP", shape.lanes * shape.pixels);
         d.constant("FIRST_SOURCE", 1 + self.factors as u32);
-        if let Some((_, weights)) = &self.integration {
-            d.set("RESPONSES", true).constant("RESPONSE", *weights);
+        if let Some(weight) = self.path_weight {
+            d.set("WEIGHTED", true).constant("PATH_WEIGHT", weight);
         }
         self.spectra_defines(&mut d);
         d.constant("LANES", shape.lanes);

@@ -87,7 +87,7 @@ fn render_into(
         seed: 3,
         tile: Some(TILE),
         uncertainty: false,
-        stop: StopRule { samples: Some(samples), time: None },
+        stop: StopRule { samples: Some(samples), ..StopRule::default() },
         preview: None,
         profile: false,
         devices: Selection::Count(devices),

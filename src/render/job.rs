@@ -17,11 +17,16 @@ pub const DEFAULT_SAMPLES: u32 = 64;
 /// The same where standard errors are wanted, which the spread of few epochs tells badly.
 pub const DEFAULT_SAMPLES_WITH_UNCERTAINTY: u32 = 512;
 
+/// Full epochs below which the error estimate is too rough to stop a render.
+pub const SURE_EPOCHS: u32 = 8;
+
 /// When to stop; the first that is reached does, at the end of an epoch of the whole image.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct StopRule {
     pub samples: Option<u32>,
     pub time: Option<Duration>,
+    /// The error estimate (DESIGN section 8) that no channel is to exceed; asked once there are [`SURE_EPOCHS`].
+    pub error: Option<f64>,
 }
 
 /// A picture of the cube that is kept up to date.
@@ -56,17 +61,22 @@ pub struct Job {
 }
 
 impl StopRule {
-    /// The samples per pixel at which a render with full epochs of `full` samples stops; `None`: only time does.
+    /// The samples per pixel at which a render with full epochs of `full` samples stops; `None`: only time or error do.
     pub fn samples_limit(&self, full: u32, uncertainty: bool) -> Result<Option<u32>> {
         let wanted = match self {
-            StopRule { samples: None, time: None } if uncertainty => DEFAULT_SAMPLES_WITH_UNCERTAINTY,
-            StopRule { samples: None, time: None } => DEFAULT_SAMPLES,
+            StopRule { samples: None, time: None, error: None } if uncertainty => DEFAULT_SAMPLES_WITH_UNCERTAINTY,
+            StopRule { samples: None, time: None, error: None } => DEFAULT_SAMPLES,
             StopRule { samples: None, .. } => return Ok(None),
             StopRule { samples: Some(wanted), .. } => *wanted,
         };
         let too_many =
             || Error::Usage(format!("--spp {wanted}: the most that whole epochs make is {}", u32::MAX / full * full));
         whole_epochs(wanted, full).ok_or_else(too_many).map(Some)
+    }
+
+    /// Whether the number of samples alone decides where a render ends.
+    pub(super) fn is_of_samples(&self) -> bool {
+        self.time.is_none() && self.error.is_none()
     }
 }
 
@@ -95,7 +105,7 @@ impl Job {
     /// look at the picture before, since it is too large or only a part of it is rendered here.
     pub(super) fn together(&self, header: &Header, samples_limit: Option<u32>) -> u32 {
         let full = header.epoch;
-        let only_samples = self.stop.time.is_none() && samples_limit.is_some_and(|limit| limit >= full);
+        let only_samples = self.stop.is_of_samples() && samples_limit.is_some_and(|limit| limit >= full);
         let larger_than_half = || files::memory_bytes().is_some_and(|memory| header.store_bytes() > memory / 2);
         if only_samples && (self.tiles.is_some() || larger_than_half()) { epochs_in(full, full) } else { 1 }
     }
@@ -107,7 +117,7 @@ mod tests {
 
     #[test]
     fn limits_that_cannot_be_counted_are_refused() {
-        let limit = |samples| StopRule { samples: Some(samples), time: None }.samples_limit(64, false);
+        let limit = |samples| StopRule { samples: Some(samples), ..StopRule::default() }.samples_limit(64, false);
         assert_eq!(limit(u32::MAX - 63).ok(), Some(Some(u32::MAX - 63)));
         assert!(limit(u32::MAX).unwrap_err().to_string().contains("4294967232"));
     }

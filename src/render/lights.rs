@@ -1,7 +1,8 @@
 //! Decision probabilities of next-event estimation (DESIGN section 6), common to all channels.
 
+use super::emission::{Emitted, area, radiance};
 use crate::accel::Accel;
-use crate::scene::{Light, Scene, Sides};
+use crate::scene::{Light, Scene};
 use crate::spectral::Curve;
 
 /// With which probability next-event estimation asks which light.
@@ -25,29 +26,13 @@ pub fn light_picks(scene: &Scene, accel: &Accel, environment: Option<&Curve>) ->
     let mut lamps: Vec<usize> = (0..scene.lights.len()).collect();
     lamps.sort_by_key(|&i| matches!(scene.lights[i], Light::Sun { .. }));
 
-    // Emitters of one spectrum differ by area only, so shares are worked out per spectrum. All powers lack a factor π.
-    let mut areas = vec![0.0; scene.spectra.len()];
-    let emitted = |object: usize| scene.objects[object].emission.as_ref().expect("emitters come from emitting objects");
-    let area_of =
-        |&(_, object, area): &(u32, usize, f64)| area * if emitted(object).sides == Sides::Both { 2.0 } else { 1.0 };
-    for emitter in &accel.emitters {
-        areas[emitted(emitter.1).radiance] += area_of(emitter);
-    }
-    let mut groups: Vec<(usize, f64)> = areas.iter().copied().enumerate().filter(|(_, area)| *area > 0.0).collect();
-    let by_spectrum = groups.len();
-    // What comes from afar lights the cross-section of a sphere around everything.
-    let cross_section = accel.space.radius.powi(2);
-    groups.extend(lamps.iter().map(|&i| {
-        let light = &scene.lights[i];
-        let per_value = match light {
-            Light::Point { .. } => 4.0 * accel.space.scale.powi(2),
-            Light::Directional { .. } | Light::Sun { .. } => cross_section,
-        };
-        (light.spectrum(), per_value)
-    }));
+    // Emitters of one spectrum differ by area only, so shares are worked out per spectrum.
+    let emitted = Emitted::of(scene, accel, &lamps, environment);
+    let by_spectrum = emitted.surfaces.len();
+    let groups: Vec<(usize, f64)> = emitted.surfaces.iter().chain(&emitted.lamps).copied().collect();
     let spectra = groups.iter().map(|&(spectrum, factor)| (&scene.spectra[spectrum].curve, factor));
     let powers: Vec<Vec<f64>> = spectra
-        .chain(environment.map(|flux| (flux, cross_section)))
+        .chain(emitted.environment.iter().map(|(flux, factor)| (&**flux, *factor)))
         .map(|(curve, factor)| scene.channels.bounds.iter().map(|b| factor * curve.mean(b[0], b[1])).collect())
         .collect();
     let shares = probabilities(&powers);
@@ -61,7 +46,7 @@ pub fn light_picks(scene: &Scene, accel: &Accel, environment: Option<&Curve>) ->
     let share_of = |spectrum: usize| {
         groups[..by_spectrum].iter().position(|g| g.0 == spectrum).map_or(0.0, |g| shares[g] / groups[g].1)
     };
-    let weights = accel.emitters.iter().map(|e| share_of(emitted(e.1).radiance) * area_of(e));
+    let weights = accel.emitters.iter().map(|e| share_of(radiance(scene, e)) * area(scene, e));
     let weights: Vec<f64> = weights.chain(shares[by_spectrum..groups.len()].iter().copied()).collect();
     let (cdf, emitters) = intervals(environment, &weights);
     LightPicks { environment, cdf, emitters, lamps }

@@ -322,7 +322,7 @@ fn source(scene: &Scene, kelvin: f64, index: Option<&Curve>) -> Curve {
 }
 
 /// Spectra and factors whose sum is the absorption of a homogeneous medium, m⁻¹.
-fn terms(medium: &Medium, kelvin: Option<f64>, density: f64) -> (Vec<SpectrumId>, Vec<f64>) {
+pub(super) fn terms(medium: &Medium, kelvin: Option<f64>, density: f64) -> (Vec<SpectrumId>, Vec<f64>) {
     let mut all = Vec::new();
     for absorber in &medium.absorbers {
         let (columns, strength) = (&absorber.columns, absorber.strength * density);

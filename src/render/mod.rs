@@ -1,6 +1,7 @@
 //! The render: plan → units → waves on a device → host merge.
 
 pub mod compose;
+mod emission;
 #[cfg(test)]
 mod fault_tests;
 mod heat;

@@ -85,10 +85,15 @@ pub fn feature_lines(prepared: &Prepared, waves: &WavePlan) -> Vec<FeatureLine> 
         line("Owen-scrambled Sobol", !f.independent, "nets in every epoch instead of independent numbers".into()),
         line("wavelength strata", f.strata, format!("tables x {}", 1u64 << prepared.tables.stratum_bits)),
         line(
+            "wavelengths by emission",
+            prepared.warp.bits() > 0,
+            format!("drawn from {} strata a channel, a weight a path and channel", 1u64 << prepared.warp.bits()),
+        ),
+        line(
             "responses",
             prepared.integration.is_some(),
             match &prepared.integration {
-                Some((integration, _)) => format!("{} strata of wavelength", integration.inner.len()),
+                Some(integration) => format!("{} strata of wavelength", integration.inner.len()),
                 None => "weights of wavelengths, and sums of channels".into(),
             },
         ),

@@ -285,7 +285,7 @@ impl Pool {
         oldest.note(counters, epoch, || self.bad_sample(collected));
         let (n_before, samples) = (samples_before(epoch, self.full_epoch), epoch_samples(epoch, self.full_epoch));
         // With responses the device has rendered parts of the channels.
-        let sums = self.prepared.integration.as_ref().map(|(integration, _)| integration.sums(collected.means));
+        let sums = self.prepared.integration.as_ref().map(|integration| integration.sums(collected.means));
         let means: &[f32] = sums.as_deref().unwrap_or(collected.means);
         let units = means.chunks(means.len() / collected.units.len());
         if oldest.group.epochs > 1 {

@@ -6,6 +6,7 @@ use crate::gpu::layout::{
     LAMP_SUN, Lamp, Material, NONE,
 };
 use crate::gpu::self_test::LOOP_LIMIT;
+use crate::render::emission::{Emitted, Share};
 use crate::render::heat;
 use crate::render::integration::Integration;
 use crate::render::lights::{LightPicks, STEPS, light_picks};
@@ -14,10 +15,11 @@ use crate::render::radiators::{self, Radiators};
 use crate::render::sky::SkyMap;
 use crate::render::surfaces::{Kind, Needed, Surfaces};
 use crate::scene::{
-    Attributes, Bsdf, Environment, Filter, Light, Projection, Reflectance, Sampler, Scene, Sides, Texels,
+    Attributes, Bsdf, Environment, Filter, Light, Projection, Reflectance, Sampler, Scene, Sides, Texels, Wavelengths,
 };
 use crate::spectral::Curve;
-use crate::spectral::table::{Exactness, SpectralTables, Tabulated};
+use crate::spectral::table::{Exactness, SpectralTables, Tabulated, Wanted};
+use crate::spectral::warp::Warp;
 use crate::{Error, Result};
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -159,8 +161,13 @@ pub struct Prepared {
     pub sources: usize,
     /// That the device renders: with responses these are not the scene's.
     pub channels: usize,
-    /// How the scene's channels are made of those, and the device id of the weights; `None` where they are the same.
-    pub integration: Option<(Integration, u32)>,
+    /// How the scene's channels are made of those; `None` where they are the same.
+    pub integration: Option<Integration>,
+    /// Where in the channels wavelengths are drawn.
+    pub warp: Warp,
+    /// The device id of the spectrum with which a path's throughput begins, where it is not 1: weights of responses and of
+    /// wavelengths.
+    pub path_weight: Option<u32>,
 }
 
 impl Prepared {
@@ -205,15 +212,19 @@ impl Prepared {
             surfaces.spectra.len() - 1
         });
         // General scenes meet a uniform environment by sampling the BSDF, and do not aim at it.
-        let uniform = scene.environment.as_ref().and_then(|e| e.uniform()).filter(|_| !general);
+        let uniform = scene.environment.as_ref().and_then(|e| e.uniform());
         let uniform = uniform.map(|radiance| scene.spectra[radiance].curve.scaled(4.0 * PI));
-        let picks = light_picks(scene, &accel, uniform.as_ref().or(sky.as_ref().map(|sky| &sky.flux)));
+        let aimed_at = uniform.as_ref().filter(|_| !general).or(sky.as_ref().map(|sky| &sky.flux));
+        let picks = light_picks(scene, &accel, aimed_at);
         let media_spectra = surfaces.as_ref().map_or(0, |s| s.spectra.len());
         if let (Some(surfaces), Some(media)) = (&mut surfaces, &mut media) {
             surfaces.spectra.append(&mut media.spectra);
         }
         let weights = integration.as_ref().map(|integration| integration.weights.as_slice());
-        let (tables, ids) = spectral_tables(scene, &heat, surfaces.as_ref().map_or(&[], |s| &s.spectra), weights)?;
+        let environment = uniform.as_ref().or(sky.as_ref().map(|sky| &sky.flux));
+        let emitted = || Emitted::of(scene, &accel, &picks.lamps, environment).shares(scene, &accel);
+        let needed = surfaces.as_ref().map_or(&[][..], |s| &s.spectra);
+        let (tables, ids, warp) = spectral_tables(scene, &heat, needed, weights, emitted)?;
         if let Some(surfaces) = &mut surfaces {
             surfaces.name_spectra(|position| tables.ids[ids.needed[position]]);
         }
@@ -305,7 +316,9 @@ impl Prepared {
             factors: ids.factors.len(),
             sources: ids.sources.len(),
             channels: scene.channels.len(),
-            integration: integration.map(|integration| (integration, tables.ids[ids.response])),
+            path_weight: ids.path_weight.map(|position| tables.ids[position]),
+            integration,
+            warp,
             accel,
             tables,
         };
@@ -350,8 +363,8 @@ struct SpectrumIds {
     sources: std::collections::BTreeMap<usize, usize>,
     /// Of each that materials of general scenes need.
     needed: Vec<usize>,
-    /// That of the weights of responses, where there are any.
-    response: usize,
+    /// That of what a path's throughput begins with, where it is not 1.
+    path_weight: Option<usize>,
     names: Vec<String>,
 }
 
@@ -390,13 +403,15 @@ fn daylight(environment: &Environment) -> Option<usize> {
     }
 }
 
-/// Tables of the constant 1, of what multiplies throughput, then of what emits; the weights of responses, per channel, last.
-fn spectral_tables(
+/// Tables of the constant 1, of what multiplies throughput, then of what emits; the weights of responses and wavelengths last.
+/// With them, where in the channels wavelengths are drawn, by what is `emitted`.
+fn spectral_tables<'a>(
     scene: &Scene,
     heat: &heat::Heat,
     needed: &[Needed],
-    weights: Option<&[Curve]>,
-) -> Result<(SpectralTables, SpectrumIds)> {
+    responses: Option<&[Curve]>,
+    emitted: impl FnOnce() -> Vec<Share<'a>>,
+) -> Result<(SpectralTables, SpectrumIds, Warp)> {
     // General scenes have all of theirs among those needed.
     let plain = if needed.is_empty() { &scene.materials[..] } else { &[] };
     let factors = plain.iter().filter_map(|m| match m.bsdf {
@@ -422,40 +437,41 @@ fn spectral_tables(
     };
     let (factors, sources) = (number(factors.collect()), number(sources.collect()));
     let first = curves.len();
-    let mut exactness = Vec::new();
+    let mut wanted: Vec<Wanted> = curves.into_iter().map(|curve| Tabulated::Same(curve).into()).collect();
     for spectrum in needed {
-        let (name, curve) = match spectrum {
-            Needed::Scene(id) => (&scene.spectra[*id].name, &scene.spectra[*id].curve),
-            Needed::Derived(name, curve) => (name, curve),
-            Needed::Pointwise(name, curve) => {
-                exactness.push((curves.len(), Exactness::Pointwise));
-                (name, curve)
-            }
-            Needed::Exact(name, curve) => {
-                exactness.push((curves.len(), Exactness::Exact));
-                (name, curve)
-            }
+        let (name, curve, exactness) = match spectrum {
+            Needed::Scene(id) => (&scene.spectra[*id].name, &scene.spectra[*id].curve, Exactness::Peak),
+            Needed::Derived(name, curve) => (name, curve, Exactness::Peak),
+            Needed::Pointwise(name, curve) => (name, curve, Exactness::Pointwise),
+            Needed::Exact(name, curve) => (name, curve, Exactness::Exact),
         };
-        curves.push(curve);
+        wanted.push(Wanted { exactness, ..Tabulated::Same(curve).into() });
         names.push(name.clone());
     }
-    let needed = (first..curves.len()).collect();
-    let mut curves: Vec<Tabulated> = curves.into_iter().map(Tabulated::Same).collect();
-    let response = curves.len();
-    if let Some(weights) = weights {
-        curves.push(Tabulated::PerChannel(weights));
-        names.push("responses".to_owned());
+    let needed = (first..wanted.len()).collect();
+    let warp = match scene.integrator.wavelengths {
+        Wavelengths::Uniform => Warp::uniform(&scene.channels),
+        Wavelengths::Emission => {
+            let emitted = emitted();
+            let emitted: Vec<(&Curve, f64)> = emitted.iter().map(|(curve, factor)| (&**curve, *factor)).collect();
+            let most_bits = SpectralTables::most_bits(wanted.len() + 1, &scene.channels);
+            Warp::of_emission(&scene.channels, &emitted, responses, most_bits)
+        }
+    };
+    let path_weight = (responses.is_some() || warp.bits() > 0).then_some(wanted.len());
+    if path_weight.is_some() {
+        let spectrum = responses.map_or(Tabulated::Same(&Curve::Constant(1.0)), Tabulated::PerChannel);
+        wanted.push(Wanted { weighted: true, ..spectrum.into() });
+        names.push("weights of wavelengths".to_owned());
     }
-    if curves.len() > MAX_SPECTRA {
+    if wanted.len() > MAX_SPECTRA {
         return Err(Error::input(
             &scene.file,
-            format!("{} spectra in use, at most {MAX_SPECTRA} are supported", curves.len()),
+            format!("{} spectra in use, at most {MAX_SPECTRA} are supported", wanted.len()),
         ));
     }
-    Ok((
-        SpectralTables::with_exactness(&curves, &exactness, &scene.channels),
-        SpectrumIds { factors, sources, needed, response, names },
-    ))
+    let tables = SpectralTables::warped(&wanted, &scene.channels, &warp);
+    Ok((tables, SpectrumIds { factors, sources, needed, path_weight, names }, warp))
 }
 
 fn material(scene: &Scene, m: &crate::scene::Material, factor: impl Fn(usize) -> u32) -> Material {

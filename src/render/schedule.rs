@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use crate::cube::{Run, RunFile, Writer, check_target, epoch_samples, epochs_in, reduction, samples_before};
 use crate::gpu::adapter::Gpu;
-use crate::render::job::Job;
+use crate::render::job::{Job, SURE_EPOCHS};
 use crate::render::plan;
 use crate::render::pool::{Merged, Pool, Report, Tally};
 use crate::render::prepare::Prepared;
@@ -356,7 +356,8 @@ impl<'a> Render<'a> {
         self.update_estimate(cube);
         for epoch in first.. {
             let n = epoch_samples(epoch, full);
-            if self.samples_limit.is_some_and(|limit| self.status.samples >= limit) || self.too_late(n) {
+            let enough = self.samples_limit.is_some_and(|limit| self.status.samples >= limit);
+            if enough || self.too_late(n) || self.is_accurate(cube) {
                 return Ok(());
             }
             let (began, rested, there) = (Instant::now(), self.rested(), self.merged.front().copied().unwrap_or(0));
@@ -395,8 +396,18 @@ impl<'a> Render<'a> {
     /// How many epochs may be rendered while `epoch` is the current one. Where only the number of samples decides, all
     /// are: then no device waits for another at an epoch's end.
     fn decided(&self, epoch: u32) -> u32 {
-        let (None, Some(limit)) = (self.job.stop.time, self.samples_limit) else { return epoch + 1 };
-        epochs_in(limit, self.job.scene.integrator.epoch)
+        match self.samples_limit {
+            Some(limit) if self.job.stop.is_of_samples() => epochs_in(limit, self.job.scene.integrator.epoch),
+            _ => epoch + 1,
+        }
+    }
+
+    /// Whether the error estimate of every channel is as small as was asked for.
+    fn is_accurate(&self, cube: &Writer) -> bool {
+        let Some(wanted) = self.job.stop.error else { return false };
+        // A NaN is never small enough.
+        self.status.samples / self.job.scene.integrator.epoch >= SURE_EPOCHS
+            && cube.error_estimate().into_iter().all(|estimate| estimate <= wanted)
     }
 
     fn rendering_s(&self) -> f64 {

@@ -50,7 +50,7 @@ pub enum Needed {
     Derived(String, Curve),
     /// Within the tables' bound of every value, not of each channel's peak.
     Pointwise(String, Curve),
-    /// As `Derived`, and not to be approximated: it is a place in a table.
+    /// As `Derived`, and not to be approximated: other quantities depend on it steeply.
     Exact(String, Curve),
 }
 
@@ -514,7 +514,7 @@ pub(super) fn wavelength(scene: &Scene) -> Needed {
     let bounds = scene.channels.bounds.iter().flatten();
     let [low, high] = bounds.fold([f64::INFINITY, 0.0f64], |[low, high], &nm| [low.min(nm), high.max(nm)]);
     let curve = Curve::Linear { nm: vec![low, high], value: vec![low * 1e-3, high * 1e-3], outside: Outside::Hold };
-    Needed::Derived("wavelength".into(), curve)
+    Needed::Exact("wavelength".into(), curve)
 }
 
 /// The index of a boundary.

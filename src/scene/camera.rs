@@ -6,8 +6,8 @@ use super::decode::{Fields, Item, Keys};
 use super::overrides::CAMERAS;
 use super::{Camera, Film, Filter, Projection};
 
-/// Pixels along one side: pixel numbers of the full film fit u32.
-const MAX_SIDE: u32 = 65_535;
+/// Pixels along one side: places on wider films, in f32, would be off by more than 1/32 of a pixel.
+const MAX_SIDE: u32 = 131_072;
 const FILM: Keys = Keys::new(&["width", "height", "filter", "crop"]);
 const PERSPECTIVE: Keys = Keys::new(&["position", "look_at", "up", "flip_x", "medium", "fov", "fov_axis"]);
 const THIN_LENS: Keys = Keys::new(&[

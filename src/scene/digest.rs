@@ -237,6 +237,7 @@ impl Hash {
         });
         self.tag(match integrator.wavelengths {
             Wavelengths::Uniform => 0,
+            Wavelengths::Emission => 1,
         });
         self.text(&integrator.evaluator);
         self.count(integrator.epoch as usize);

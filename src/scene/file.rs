@@ -157,7 +157,7 @@ impl Default for Integrator {
             max_bounces: 5,
             russian_roulette_start: 0,
             sampler: Sampler::Sobol,
-            wavelengths: Wavelengths::Uniform,
+            wavelengths: Wavelengths::Emission,
             evaluator: "auto".to_owned(),
             epoch: 64,
         }
@@ -178,7 +178,7 @@ fn decode_integrator(item: &Item) -> Option<Integrator> {
         None => Some(default.sampler),
     };
     let wavelengths = match fields.get("wavelengths") {
-        Some(item) => choice_or_later(&item, &[("uniform", Wavelengths::Uniform)], &["emission"]),
+        Some(item) => item.choice(&[("emission", Wavelengths::Emission), ("uniform", Wavelengths::Uniform)]),
         None => Some(default.wavelengths),
     };
     let evaluator = match fields.get("evaluator") {

@@ -156,6 +156,8 @@ pub enum Sampler {
 pub enum Wavelengths {
     /// Eq. 4 of the method.
     Uniform,
+    /// From the emitters' own spectral density in each channel, see [`crate::spectral::warp`].
+    Emission,
 }
 
 #[derive(Debug, Clone, PartialEq)]

@@ -42,6 +42,9 @@ pub struct Job {
     /// Side of the tiles, if asked for.
     pub tile: Option<u32>,
     pub seed: u64,
+    /// Whether the cube has standard errors.
+    #[serde(default)]
+    pub uncertainty: bool,
     pub memory: Option<u64>,
     /// Samples per pixel at which every tile is done, the end of an epoch.
     pub samples: u32,
@@ -177,6 +180,7 @@ impl Job {
         words.extend(self.size.map(|[width, height]| format!("--size {width}x{height}")));
         words.extend(self.tile.map(|tile| format!("--tile {tile}")));
         words.extend((self.seed != 0).then(|| format!("--seed {}", self.seed)));
+        words.extend(self.uncertainty.then(|| "--uncertainty".into()));
         words.extend(self.memory.map(|memory| format!("--memory {memory}")));
         words.join(" ")
     }
@@ -235,6 +239,7 @@ pub(crate) mod tests {
             size: None,
             tile: Some(32),
             seed: 7,
+            uncertainty: false,
             memory: None,
             samples: 256,
             tiles,

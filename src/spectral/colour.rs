@@ -1,7 +1,7 @@
-//! Colour: from a spectrum over channels to CIE XYZ and linear sRGB, and from a linear picture to 8-bit sRGB.
+//! Colour: from a spectrum over channels to CIE XYZ and linear sRGB.
 //!
 //! What a cube's preview shows is a fixed linear function of a pixel's channels, a [`Projection`]. Exposure and the
-//! sRGB transfer function come later, when a picture is shown or written.
+//! sRGB transfer function come later, when a picture is shown or written: see [`super::tone`].
 
 use std::sync::OnceLock;
 
@@ -143,6 +143,14 @@ pub enum ProjectionKind {
 }
 
 impl Projection {
+    /// The same with the value of each channel k times `factor(k)`.
+    pub fn times(mut self, factor: impl Fn(usize) -> f64) -> Self {
+        for (k, weights) in &mut self.weights {
+            weights.iter_mut().for_each(|weight| *weight *= factor(*k));
+        }
+        self
+    }
+
     /// The projection for these channels: `channels.false_colour` where given, else XYZ where the visible is covered,
     /// else the channels of lowest, middle and highest centre wavelength as R, G, B.
     ///
@@ -155,10 +163,7 @@ impl Projection {
         if let Some(xyz) = Self::as_seen(channels, Observer::default()) {
             return xyz;
         }
-        let mut order: Vec<usize> = (0..channels.len()).collect();
-        order.sort_by(|&a, &b| channels.centre(a).total_cmp(&channels.centre(b)));
-        let last = order.len() - 1;
-        Self::false_colour([order[0], order[last / 2], order[last]])
+        Self::false_colour(three_of(channels, false))
     }
 
     /// Linear sRGB of what `observer` would see; `None` where the channels do not cover the visible, or are responses: those
@@ -193,17 +198,42 @@ impl Projection {
         Projection { kind: ProjectionKind::FalseColour(rgb), weights }
     }
 
+    /// The channels that take part.
+    pub fn channels(&self) -> impl Iterator<Item = usize> {
+        self.weights.iter().map(|(k, _)| *k)
+    }
+
     /// Linear R, G, B of one pixel, from its K channels.
     pub fn rgb(&self, spectrum: &[f32]) -> [f32; 3] {
+        self.rgb_of(self.channels().map(|k| spectrum[k]))
+    }
+
+    /// Linear R, G, B of the values in [`Projection::channels`].
+    pub fn rgb_of(&self, values: impl Iterator<Item = f32>) -> [f32; 3] {
         let mut rgb = [0.0; 3];
-        for (k, weight) in &self.weights {
-            let radiance = f64::from(spectrum[*k]);
+        for ((_, weight), radiance) in self.weights.iter().zip(values) {
+            let radiance = f64::from(radiance);
             for i in 0..3 {
                 rgb[i] += weight[i] * radiance;
             }
         }
         rgb.map(|v| v as f32)
     }
+}
+
+/// Three of `channels` to stand for red, green and blue where nobody has said which: those nearest to 640, 550 and 460 nm
+/// where they are `visible`, else those of lowest, middle and highest centre wavelength.
+pub fn three_of(channels: &Channels, visible: bool) -> [usize; 3] {
+    let mut order: Vec<usize> = (0..channels.len()).collect();
+    order.sort_by(|&a, &b| channels.centre(a).total_cmp(&channels.centre(b)));
+    let last = order.len() - 1;
+    if !visible {
+        return [order[0], order[last / 2], order[last]];
+    }
+    [640.0, 550.0, 460.0].map(|nm| {
+        let distance = |k: usize| (channels.centre(k) - nm).abs();
+        order.iter().copied().min_by(|&a, &b| distance(a).total_cmp(&distance(b))).unwrap_or(order[0])
+    })
 }
 
 /// Whether XYZ from channels of these weights shows what an eye would see (see [`Projection::new`]).
@@ -227,60 +257,6 @@ pub fn srgb_encode(linear: f64) -> f64 {
 /// The inverse of [`srgb_encode`].
 pub fn srgb_decode(encoded: f64) -> f64 {
     if encoded <= 0.040_45 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
-}
-
-/// 8-bit sRGB of one quantity: a colour map that is perceptually uniform (inferno, by N. Smith and S. van der Walt) from the
-/// first to the second number of `range`. What lies beyond its ends has their colours, what is not rendered yet is black.
-pub fn map_srgb8(values: &[f32], range: [f64; 2]) -> Vec<u8> {
-    let [low, high] = range;
-    let colour = |value: f64| match (value - low) / (high - low) {
-        _ if value.is_nan() => [0, 0, 0],
-        // A range of no width: all is at its upper end, or below.
-        t if t.is_nan() => colorous::INFERNO.eval_continuous(1.0).as_array(),
-        t => colorous::INFERNO.eval_continuous(t.clamp(0.0, 1.0)).as_array(),
-    };
-    values.iter().flat_map(|&value| colour(f64::from(value))).collect()
-}
-
-/// The 1st and the 99th percentile of what is finite; 0 and 1 where nothing is.
-pub fn percentiles(values: &[f32]) -> [f64; 2] {
-    let mut finite: Vec<f32> = values.iter().copied().filter(|v| v.is_finite()).collect();
-    if finite.is_empty() {
-        return [0.0, 1.0];
-    }
-    let last = finite.len() - 1;
-    [last / 100, last * 99 / 100].map(|rank| f64::from(*finite.select_nth_unstable_by(rank, f32::total_cmp).1))
-}
-
-/// A linear picture: rows from the top, R, G, B interleaved; NaN where nothing is rendered yet.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Picture {
-    /// Width and height in pixels.
-    pub size: [u32; 2],
-    pub rgb: Vec<f32>,
-}
-
-impl Picture {
-    /// The exposure in EV (a factor of 2^EV) that brings the 99th percentile of the largest component, over the
-    /// pixels with any light, to 1. A picture without light has exposure 0.
-    pub fn auto_exposure(&self) -> f64 {
-        let mut light: Vec<f32> =
-            self.rgb.chunks_exact(3).map(|p| p[0].max(p[1]).max(p[2])).filter(|v| v.is_finite() && *v > 0.0).collect();
-        if light.is_empty() {
-            return 0.0;
-        }
-        let rank = (light.len() - 1) * 99 / 100;
-        let (_, percentile, _) = light.select_nth_unstable_by(rank, f32::total_cmp);
-        -f64::from(*percentile).log2()
-    }
-
-    /// 8-bit sRGB at an exposure of `ev`. What is brighter than 1 or outside the gamut is cut to 0…255, what is not
-    /// rendered yet is black.
-    pub fn to_srgb8(&self, ev: f64) -> Vec<u8> {
-        let scale = ev.exp2();
-        // `as u8` saturates, and sends NaN to 0.
-        self.rgb.iter().map(|&v| (255.0 * srgb_encode(f64::from(v) * scale) + 0.5).floor() as u8).collect()
-    }
 }
 
 #[cfg(test)]
@@ -334,15 +310,12 @@ mod tests {
     }
 
     #[test]
-    fn maps_run_from_dark_to_bright_between_their_ends() {
-        assert_eq!(percentiles(&[f32::NAN, f32::INFINITY]), [0.0, 1.0]);
-        let ramp: Vec<f32> = (0..=200).map(|i| i as f32).chain([f32::NAN]).collect();
-        assert_eq!(percentiles(&ramp), [2.0, 198.0]);
-        let bytes = map_srgb8(&[f32::NAN, 1.0, 2.0, 3.0, 4.0, 5.0], [2.0, 4.0]);
-        let light = |i: usize| bytes[3 * i..3 * i + 3].iter().map(|&b| u32::from(b)).sum::<u32>();
-        assert_eq!((light(0), light(1), light(4)), (0, light(2), light(5)));
-        assert!(light(2) < light(3) && light(3) < light(4));
-        assert_eq!(map_srgb8(&[7.0], [7.0, 7.0]), map_srgb8(&[9.0], [1.0, 7.0]));
+    fn three_stand_for_red_green_and_blue() {
+        let visible = Channels::equal(400.0, 800.0, 4);
+        assert_eq!(three_of(&visible, true), [2, 1, 0]);
+        assert_eq!(three_of(&visible, false), [0, 1, 3]);
+        assert_eq!(three_of(&channels(&[[9e3, 1e4], [8e3, 9e3]]), false), [1, 1, 0]);
+        assert_eq!(three_of(&channels(&[[9e3, 1e4]]), true), [0; 3]);
     }
 
     /// The matrix from the primaries' chromaticities and white (0.3127, 0.3290), independently of its digits above.
@@ -427,23 +400,10 @@ mod tests {
     }
 
     #[test]
-    fn transfer_function_and_exposure() {
+    fn transfer_function() {
         assert_eq!(srgb_encode(0.0), 0.0);
         assert!((srgb_encode(1.0) - 1.0).abs() < 1e-12);
         assert!((srgb_encode(0.18) - 0.461_356).abs() < 1e-6);
         assert!((srgb_encode(0.003_130_8) - srgb_encode(0.003_130_800_1)).abs() < 1e-6);
-        let pixel = |v: f32| [0.0, v, v / 2.0];
-        let picture = |values: &[f32]| Picture {
-            size: [values.len() as u32, 1],
-            rgb: values.iter().flat_map(|&v| pixel(v)).collect(),
-        };
-        let ramp: Vec<f32> = (0..=100).map(|i| i as f32 / 25.0 + 0.04).collect();
-        assert_eq!(picture(&ramp).auto_exposure(), -f64::from(ramp[99]).log2());
-        // Unlit and missing pixels do not count.
-        assert_eq!(picture(&[0.0, 0.0, f32::NAN, 0.25]).auto_exposure(), 2.0);
-        assert_eq!(picture(&[0.0, f32::NAN]).auto_exposure(), 0.0);
-        let bytes = picture(&[1.0, f32::NAN, 7.0, -1.0]).to_srgb8(0.0);
-        assert_eq!(bytes, [0, 255, 188, 0, 0, 0, 0, 255, 255, 0, 0, 0]);
-        assert_eq!(picture(&[0.5]).to_srgb8(1.0), [0, 255, 188]);
     }
 }

@@ -9,7 +9,9 @@ pub mod planck;
 pub mod skylight;
 pub mod table;
 pub mod temperature;
+pub mod tone;
 pub mod upsample;
+pub mod warp;
 
 pub use channels::{Channels, Response};
 pub use curve::{Curve, Outside};

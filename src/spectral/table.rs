@@ -1,6 +1,7 @@
 //! Spectra as the device wants them: for every channel a few strata of the wavelength coordinate μ, in each of them a
 //! value and a slope; and exact knots for what no affordable number of strata resolves.
 
+use super::warp::Warp;
 use super::{Channels, Curve};
 
 /// Pointwise bound relative to the channel's peak (DESIGN section 7).
@@ -28,6 +29,21 @@ impl<'a> Tabulated<'a> {
             Tabulated::Same(curve) => curve,
             Tabulated::PerChannel(curves) => &curves[k],
         }
+    }
+}
+
+/// A spectrum, and how the device is to hold it.
+#[derive(Debug, Clone, Copy)]
+pub struct Wanted<'a> {
+    pub spectrum: Tabulated<'a>,
+    pub exactness: Exactness,
+    /// Times the weights of the wavelengths, see [`Warp::weight`].
+    pub weighted: bool,
+}
+
+impl<'a> From<Tabulated<'a>> for Wanted<'a> {
+    fn from(spectrum: Tabulated<'a>) -> Self {
+        Wanted { spectrum, exactness: Exactness::Peak, weighted: false }
     }
 }
 
@@ -79,36 +95,38 @@ pub struct Bounds {
 }
 
 impl SpectralTables {
-    /// Tables for `curves` over `channels`, in the order given (spectra that need knots move to the end).
+    /// Tables for `curves` over `channels`, in the order given (spectra that need knots move to the end), with strata of equal
+    /// width.
     pub fn build(curves: &[Tabulated], channels: &Channels) -> SpectralTables {
-        SpectralTables::with_exactness(curves, &[], channels)
+        let wanted: Vec<Wanted> = curves.iter().map(|&curve| curve.into()).collect();
+        SpectralTables::warped(&wanted, channels, &Warp::uniform(channels))
     }
 
-    /// [`SpectralTables::build`]; the curves at the given positions are held as exactly as said.
-    pub fn with_exactness(
-        curves: &[Tabulated],
-        exactness: &[(usize, Exactness)],
-        channels: &Channels,
-    ) -> SpectralTables {
+    /// log2 of the strata that so many spectra may have.
+    pub fn most_bits(spectra: usize, channels: &Channels) -> u32 {
+        let entries = MAX_ENTRIES.min(MAX_ENTRIES_IN_ALL / spectra.max(1));
+        (entries / channels.len().next_multiple_of(4)).max(1).ilog2().min(MAX_STRATUM_BITS)
+    }
+
+    /// [`SpectralTables::build`] with wavelengths drawn as `warp` says, which has at most [`SpectralTables::most_bits`].
+    pub fn warped(wanted: &[Wanted], channels: &Channels, warp: &Warp) -> SpectralTables {
         let channels_padded = channels.len().next_multiple_of(4);
         // All spectra have as many strata as the one that needs most.
-        let entries = MAX_ENTRIES.min(MAX_ENTRIES_IN_ALL / curves.len().max(1));
-        let max_bits = (entries / channels_padded).max(1).ilog2().min(MAX_STRATUM_BITS);
-        let of = |i: usize| exactness.iter().find(|e| e.0 == i).map_or(Exactness::Peak, |e| e.1);
-        let needed: Vec<Option<u32>> = curves
+        let max_bits = SpectralTables::most_bits(wanted.len(), channels);
+        let place = Place { channels, warp };
+        let needed: Vec<Option<u32>> = wanted
             .iter()
-            .enumerate()
-            .map(|(i, c)| match of(i) {
-                Exactness::Exact => strata_needed(*c, channels, 0, LINE_BOUND, Exactness::Peak),
-                kind => strata_needed(*c, channels, max_bits, POINTWISE_BOUND, kind),
+            .map(|w| match w.exactness {
+                Exactness::Exact => place.strata_needed(w.spectrum, warp.bits(), LINE_BOUND, Exactness::Peak),
+                kind => place.strata_needed(w.spectrum, max_bits, POINTWISE_BOUND, kind),
             })
             .collect();
-        let stratum_bits = needed.iter().flatten().copied().max().unwrap_or(0);
+        let stratum_bits = needed.iter().flatten().copied().max().unwrap_or(warp.bits());
 
         // The stratified first, the knotted after them.
-        let stratified: Vec<usize> = (0..curves.len()).filter(|&i| needed[i].is_some()).collect();
-        let knotted: Vec<usize> = (0..curves.len()).filter(|&i| needed[i].is_none()).collect();
-        let mut ids = vec![0; curves.len()];
+        let stratified: Vec<usize> = (0..wanted.len()).filter(|&i| needed[i].is_some()).collect();
+        let knotted: Vec<usize> = (0..wanted.len()).filter(|&i| needed[i].is_none()).collect();
+        let mut ids = vec![0; wanted.len()];
         for (id, &i) in stratified.iter().chain(&knotted).enumerate() {
             ids[i] = id as u32;
         }
@@ -121,45 +139,57 @@ impl SpectralTables {
             knot_starts: vec![0],
             knots: Vec::new(),
             ids,
-            bounds: vec![Bounds::default(); curves.len()],
+            bounds: vec![Bounds::default(); wanted.len()],
         };
         for (id, &i) in stratified.iter().enumerate() {
-            tables.bounds[i] = tables.fill_strata(id, curves[i], channels, of(i));
+            tables.bounds[i] = tables.fill_strata(id, &wanted[i], &place);
         }
         for &i in &knotted {
-            tables.bounds[i] = tables.add_knots(curves[i], channels);
+            tables.bounds[i] = tables.add_knots(&wanted[i], &place);
         }
         tables
     }
 
-    fn fill_strata(&mut self, id: usize, spectrum: Tabulated, channels: &Channels, kind: Exactness) -> Bounds {
-        let strata = 1usize << self.stratum_bits;
+    fn fill_strata(&mut self, id: usize, wanted: &Wanted, place: &Place) -> Bounds {
         let quads = self.channels_padded / 4;
+        let finer = self.stratum_bits - place.warp.bits();
         let mut bounds = Bounds::default();
-        for k in 0..channels.len() {
-            let curve = spectrum.of(k);
-            let lines = fit_channel(curve, channels, k, strata);
-            bounds = bounds.max(channel_bounds(curve, channels, k, &lines, kind));
+        for k in 0..place.channels.len() {
+            let curve = wanted.spectrum.of(k);
+            let lines = place.fit_channel(curve, k, self.stratum_bits);
+            bounds = bounds.max(place.channel_bounds(curve, k, &lines, self.stratum_bits, wanted.exactness));
             for (stratum, line) in lines.iter().enumerate() {
+                let weight = if wanted.weighted { place.warp.weight(k, stratum >> finer) } else { 1.0 };
                 let at = (((stratum * self.stratified + id) * quads + k / 4) * 2) * 4 + k % 4;
-                self.strata[at] = line.value as f32;
-                self.strata[at + 4] = line.slope as f32;
+                self.strata[at] = (weight * line.value) as f32;
+                self.strata[at + 4] = (weight * line.slope) as f32;
             }
         }
         bounds
     }
 
-    fn add_knots(&mut self, spectrum: Tabulated, channels: &Channels) -> Bounds {
+    fn add_knots(&mut self, wanted: &Wanted, place: &Place) -> Bounds {
+        let (channels, warp) = (place.channels, place.warp);
         let mut bounds = Bounds::default();
         for k in 0..self.channels_padded {
             if k < channels.len() {
-                let ([from, to], curve) = (channels.bounds[k], spectrum.of(k));
-                let nodes = curve.linear_pieces(from, to).unwrap_or_else(|| smooth_nodes(curve, from, to));
+                let ([from, to], curve) = (channels.bounds[k], wanted.spectrum.of(k));
                 let exact = curve.mean(from, to);
-                let knots: Vec<(f64, f64)> =
-                    nodes.iter().map(|(nm, value)| (fixed_point((nm - from) / (to - from)), *value)).collect();
-                // A line much narrower than the channel changes its width a little when its ends are rounded.
-                let area: f64 = knots.windows(2).map(|w| (w[1].0 - w[0].0) * 0.5 * (w[0].1 + w[1].1)).sum();
+                // (μ, value), μ in units of the device, and the integral over wavelength of what lies between.
+                let (mut knots, mut area) = (Vec::<(f64, f64)>::new(), 0.0);
+                for stratum in 0..1usize << warp.bits() {
+                    let [a, b] = [stratum, stratum + 1].map(|j| warp.edge(k, j, warp.bits()));
+                    let weight = warp.weight(k, stratum);
+                    let nodes = curve.linear_pieces(a, b).unwrap_or_else(|| smooth_nodes(curve, a, b));
+                    let mu = |nm: f64| (stratum as f64 + (nm - a) / (b - a)) / f64::from(1u32 << warp.bits());
+                    let first = knots.len();
+                    let factor = if wanted.weighted { weight } else { 1.0 };
+                    knots.extend(nodes.iter().map(|(nm, value)| (fixed_point(mu(*nm)), factor * value)));
+                    // A line much narrower than the channel changes its width a little when its ends are rounded.
+                    let pieces = knots[first..].windows(2).map(|w| (w[1].0 - w[0].0) * 0.5 * (w[0].1 + w[1].1));
+                    area += pieces.sum::<f64>() * if wanted.weighted { 1.0 } else { weight };
+                }
+                knots.dedup();
                 let correction = if area > 0.0 { exact / (area / FIXED_ONE) } else { 1.0 };
                 let small = (correction - 1.0).abs() <= POINTWISE_BOUND;
                 let scale = if small { correction } else { 1.0 };
@@ -201,22 +231,53 @@ impl Bounds {
     }
 }
 
-/// Stratum bits that keep the pointwise bound in every channel, or `None` where `max_bits` do not.
-fn strata_needed(spectrum: Tabulated, channels: &Channels, max_bits: u32, bound: f64, kind: Exactness) -> Option<u32> {
-    // What satisfied the channels so far is where the next channel starts.
-    (0..channels.len()).try_fold(0, |least, k| {
-        let curve = spectrum.of(k);
-        let keeps_bound = |bits: &u32| {
-            let lines = fit_channel(curve, channels, k, 1 << bits);
-            channel_bounds(curve, channels, k, &lines, kind).pointwise <= bound
-        };
-        (least..=max_bits).find(keeps_bound)
-    })
+/// Where in the channels the wavelengths of strata are.
+struct Place<'a> {
+    channels: &'a Channels,
+    warp: &'a Warp,
 }
 
-fn fit_channel(curve: &Curve, channels: &Channels, k: usize, strata: usize) -> Vec<Line> {
-    let edge = |j: usize| channels.wavelength(k, j as f64 / strata as f64);
-    (0..strata).map(|j| fit(curve, edge(j), edge(j + 1))).collect()
+impl Place<'_> {
+    /// Stratum bits that keep the pointwise bound in every channel, or `None` where `max_bits` do not.
+    fn strata_needed(&self, spectrum: Tabulated, max_bits: u32, bound: f64, kind: Exactness) -> Option<u32> {
+        // What satisfied the channels so far is where the next channel starts.
+        (0..self.channels.len()).try_fold(self.warp.bits(), |least, k| {
+            let curve = spectrum.of(k);
+            let keeps_bound = |bits: &u32| {
+                let lines = self.fit_channel(curve, k, *bits);
+                self.channel_bounds(curve, k, &lines, *bits, kind).pointwise <= bound
+            };
+            (least..=max_bits).find(keeps_bound)
+        })
+    }
+
+    fn fit_channel(&self, curve: &Curve, k: usize, bits: u32) -> Vec<Line> {
+        let edge = |j: usize| self.warp.edge(k, j, bits);
+        (0..1usize << bits).map(|j| fit(curve, edge(j), edge(j + 1))).collect()
+    }
+
+    fn channel_bounds(&self, curve: &Curve, k: usize, lines: &[Line], bits: u32, kind: Exactness) -> Bounds {
+        let [from, to] = self.channels.bounds[k];
+        let peak = curve.max(from, to);
+        if peak <= 0.0 {
+            return Bounds::default();
+        }
+        let (mut pointwise, mut mean) = (0.0f64, 0.0);
+        for (j, line) in lines.iter().enumerate() {
+            let (a, b) = (self.warp.edge(k, j, bits), self.warp.edge(k, j + 1, bits));
+            mean += (line.value + 0.5 * line.slope) * (b - a) / (to - from);
+            let nodes = curve.linear_pieces(a, b).unwrap_or_else(|| {
+                (0..=8).map(|i| a + (b - a) * f64::from(i) / 8.0).map(|nm| (nm, curve.eval(nm))).collect()
+            });
+            for (nm, value) in nodes {
+                let place = (nm - a) / (b - a);
+                let of = if kind == Exactness::Pointwise { value.max(1e-9 * peak) } else { peak };
+                pointwise = pointwise.max((line.value + place * line.slope - value).abs() / of);
+            }
+        }
+        let exact = curve.mean(from, to);
+        Bounds { pointwise, mean: if exact != 0.0 { (mean / exact - 1.0).abs() } else { mean.abs() } }
+    }
 }
 
 /// The line over [from, to] with the curve's mean and first moment (so that its product with a linear factor has the
@@ -255,31 +316,6 @@ fn fit(curve: &Curve, from: f64, to: f64) -> Line {
 fn non_negative(mean: f64, slope: f64) -> Line {
     let slope = slope.clamp(-2.0 * mean.max(0.0), 2.0 * mean.max(0.0));
     Line { value: mean - 0.5 * slope, slope }
-}
-
-fn channel_bounds(curve: &Curve, channels: &Channels, k: usize, lines: &[Line], kind: Exactness) -> Bounds {
-    let [from, to] = channels.bounds[k];
-    let peak = curve.max(from, to);
-    if peak <= 0.0 {
-        return Bounds::default();
-    }
-    let strata = lines.len() as f64;
-    let mut pointwise = 0.0f64;
-    for (j, line) in lines.iter().enumerate() {
-        let edge = |j: f64| channels.wavelength(k, j / strata);
-        let (a, b) = (edge(j as f64), edge(j as f64 + 1.0));
-        let nodes = curve.linear_pieces(a, b).unwrap_or_else(|| {
-            (0..=8).map(|i| a + (b - a) * f64::from(i) / 8.0).map(|nm| (nm, curve.eval(nm))).collect()
-        });
-        for (nm, value) in nodes {
-            let place = (nm - a) / (b - a);
-            let of = if kind == Exactness::Pointwise { value.max(1e-9 * peak) } else { peak };
-            pointwise = pointwise.max((line.value + place * line.slope - value).abs() / of);
-        }
-    }
-    let mean = lines.iter().map(|l| l.value + 0.5 * l.slope).sum::<f64>() / strata;
-    let exact = curve.mean(from, to);
-    Bounds { pointwise, mean: if exact != 0.0 { (mean / exact - 1.0).abs() } else { mean.abs() } }
 }
 
 /// A smooth curve as nodes close enough for linear interpolation.

@@ -9,6 +9,20 @@ const COLDEST: f64 = 1.0;
 const HOTTEST: f64 = 1e6;
 const NODES: usize = 256;
 
+/// From this wavelength on, nm, a channel is thermal: bodies at room temperature glow in it, and the sun hardly does.
+pub const THERMAL_NM: f64 = 2500.0;
+
+/// Whether brightness temperatures in channel `k` say how warm something is.
+pub fn is_thermal(channels: &Channels, k: usize) -> bool {
+    channels.centre(k) >= THERMAL_NM
+}
+
+/// The ends of a scale on which temperatures, K, of these percentiles are shown: where they are less than half a kelvin apart,
+/// a kelvin below and above, so that noise does not look like a picture.
+pub fn shown_range([low, high]: [f64; 2]) -> [f64; 2] {
+    if high - low < 0.5 { [low - 1.0, high + 1.0] } else { [low, high] }
+}
+
 /// Temperature over radiance of one channel: 1/T by cubic Hermite interpolation over ln L, from exact values and slopes at
 /// 256 temperatures in equal ratios. Relative error below 1e-6.
 pub struct BandTemperature {
@@ -165,6 +179,30 @@ mod tests {
         let radiance = Curve::Blackbody { kelvin: 250.0, scale: 1.0 }.mean(8e3, 12e3);
         let got = BandTemperature::of_all(&channels, &[0, 1]).kelvin(radiance);
         assert!((got / 250.0 - 1.0).abs() < 1e-6, "{got}");
+    }
+
+    /// Means by a plain sum of 20,000 midpoints, in the f32 that cubes hold.
+    #[test]
+    fn radiance_of_a_cube_is_good_for_microkelvins() {
+        for [from, to] in [[8e3, 12e3], [3e3, 5e3], [9_990.0, 10_010.0], [1e3, 20e3]] {
+            let band = BandTemperature::of(&Channels::from_bounds(vec![[from, to]], None), 0);
+            for kelvin in [77.0, 233.15, 300.0, 305.3, 1500.0, 5778.0] {
+                let at =
+                    |i: i32| super::super::planck::radiance(from + (f64::from(i) + 0.5) * (to - from) / 2e4, kelvin);
+                let mean = (0..20_000).map(at).sum::<f64>() / 2e4;
+                let got = band.kelvin(f64::from(mean as f32));
+                // Rounding to f32 is worth 6e-8 / (d ln B / d ln T), which is at least 1; the sum is good for 1e-6.
+                assert!((got / kelvin - 1.0).abs() < 2e-6, "{from}-{to} nm, {kelvin} K: {got}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_thermal_and_on_which_scale_it_is_shown() {
+        let channels = Channels::from_bounds(vec![[500.0, 510.0], [2e3, 3e3], [8e3, 12e3]], None);
+        assert_eq!([0, 1, 2].map(|k| is_thermal(&channels, k)), [false, true, true]);
+        assert_eq!(shown_range([280.0, 290.0]), [280.0, 290.0]);
+        assert_eq!(shown_range([300.0, 300.25]), [299.0, 301.25]);
     }
 
     #[test]

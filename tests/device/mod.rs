@@ -89,7 +89,7 @@ pub fn render(scene: &Scene, epochs: u32, samples: u32, settings: Settings) -> E
                 rays += collected.counters.rays();
                 let unit_size = (tw * th) as usize * channels;
                 // As the renderer does where responses weight.
-                let sums = integration.as_ref().map(|(integration, _)| integration.sums(collected.means));
+                let sums = integration.as_ref().map(|integration| integration.sums(collected.means));
                 let means: &[f32] = sums.as_deref().unwrap_or(collected.means);
                 for (unit, means) in collected.units.iter().zip(means.chunks(unit_size)) {
                     for y in unit[1]..unit[3] {

@@ -26,11 +26,25 @@ const download = async (act) => {
   return { name: file.suggestedFilename(), text: fs.readFileSync(await file.path(), "utf8") };
 };
 
+// The largest difference between the picture as the page makes it and as the server does.
+const against_png = () => page.evaluate(async () => {
+  const { picture } = window.spectile, { tone, show } = picture;
+  const [square] = picture.inSight(picture.scales().base, [0, 0, ...picture.cube.size]), [x0, y0, x1, y1] = square.rect;
+  const shown = show.mode === "temperature" ? `low=${tone.low}&high=${tone.high}` : `ev=${tone.ev}`;
+  const url = `/api/image?${square.what}&x0=${x0}&y0=${y0}&x1=${x1}&y1=${y1}&scale=${square.scale}&${shown}`;
+  const bitmap = await createImageBitmap(await (await fetch(url)).blob());
+  const { width, height } = square.canvas, copy = new OffscreenCanvas(width, height).getContext("2d");
+  copy.drawImage(bitmap, 0, 0);
+  const [server, own] = [copy, square.canvas.getContext("2d")].map((c) => c.getImageData(0, 0, width, height).data);
+  return own.reduce((most, v, i) => Math.max(most, Math.abs(v - server[i])), square.look === picture.look ? 0 : 999);
+});
+
 await page.waitForFunction(() => window.spectile.picture.drawn > 0);
 seen.first_picture_ms = Date.now() - browser.began;
 await browser.settled();
 seen.start = await browser.look();
 seen.title = await page.title();
+if (what === "view") seen.against_png = await against_png();
 
 if (what === "render") {
   // It fills in by itself.
@@ -68,6 +82,7 @@ if (what === "heat") {
   await page.waitForFunction(() => document.getElementById("cursor").textContent.includes(" K"));
   seen.cursor = await page.locator("#cursor").textContent();
   seen.range = [await page.locator("#low").inputValue(), await page.locator("#high").inputValue()];
+  seen.against_png = await against_png();
   await shot("heat");
 } else {
   // A click pins a pixel; its spectrum can be had as a file.
@@ -111,6 +126,7 @@ if (what === "heat") {
   seen.slider.label = before !== (await name());
   seen.step = await change(() => page.keyboard.press(","));
   await shot(`${what}-channel`);
+  if (what === "view") seen.channel_against_png = await against_png();
   seen.false_colour = await change(() => page.keyboard.press("3"));
   seen.closer = await change(async () => {
     await page.mouse.move(...(await browser.at(Number(x), Number(y))));

@@ -70,6 +70,32 @@ fn a_hundred_gibibytes_open_and_a_spectrum_is_one_read() {
     assert_eq!(answer.floats().len(), (53 * 4) * (64 * 4));
     assert!(read <= 53 * 64 * 256 + slack && mapped <= pages, "{read} {mapped}");
     assert!(began.elapsed() < Duration::from_secs(60), "{:?}", began.elapsed());
+    // Zoomed out, nothing but `overview` is needed for any picture, nor read: of it the channels that are shown, which for
+    // true colour are those of up to 830 nm.
+    let seen = (0..CHANNELS).filter(|&k| cube.channels().bounds[k][0] < 830.0).count() as u64;
+    let away = |array: &str| cube.path().join(format!("{array} away"));
+    for array in ["radiance", "preview"] {
+        fs::rename(cube.path().join(array), away(array)).expect("moved");
+    }
+    for (target, planes, channels) in [
+        ("show=colour&scale=16", 3, seen),
+        ("show=colour&scale=64", 3, seen),
+        ("show=false&r=0&g=1000&b=1999&scale=16", 3, 3),
+        ("show=channel&k=7&scale=16", 1, 1),
+    ] {
+        let began = Instant::now();
+        let (answer, read, mapped) = cost(&format!("/api/image?{target}&format=f32"));
+        let values = answer.floats();
+        let scale: usize = target.rsplit('=').next().expect("a scale").parse().expect("a number");
+        assert_eq!(values.len(), (53 * 64 / scale) * (64 * 64 / scale) * planes);
+        assert!(values.iter().all(|&v| v == 0.0), "{target}");
+        let overview = 53 * 64 * (pixels / 64) * channels * 4;
+        assert!(read <= overview + slack && mapped <= pages, "{target}: {read} {overview} {mapped}");
+        println!("{target}: {} MiB read in {:?}", read >> 20, began.elapsed());
+    }
+    for array in ["radiance", "preview"] {
+        fs::rename(away(array), cube.path().join(array)).expect("moved");
+    }
     // A spectrum, in one contiguous read of the file.
     let (answer, read, mapped) = cost("/api/spectrum?x=3000&y=4000");
     assert_eq!(answer.json()["radiance"].as_array().expect("a list").len(), CHANNELS);

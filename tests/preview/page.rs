@@ -121,6 +121,10 @@ fn a_finished_cube_opens() {
     let Some(seen) = drive("view", &running.url, place) else { return };
     check_looking(&seen, folder.path(), place);
     assert_eq!(seen["stage"], "viewing");
+    // The page looks sRGB up in a table of 8192 steps, which are 0.05 of a value apart at most.
+    for how in ["against_png", "channel_against_png"] {
+        assert!(seen[how].as_u64() <= Some(1) && seen[how].is_u64(), "{how}: {}", seen[how]);
+    }
 }
 
 #[test]
@@ -136,6 +140,7 @@ fn heat_is_shown_in_kelvins() {
     }
     let running = Running::start(folder.path(), &["view", "cube.zarr", "--listen", "127.0.0.1:0", "--json"]);
     let Some(seen) = drive("heat", &running.url, [80, 60]) else { return };
+    assert_eq!(seen["against_png"], 0, "one colour map for the page and for pictures");
     let cursor = seen["cursor"].as_str().expect("text");
     let shown: f64 =
         cursor.split(": ").nth(1).and_then(|text| text.split(' ').next()).expect("a number").parse().expect("a number");

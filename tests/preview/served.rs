@@ -47,6 +47,21 @@ fn pictures_hold_every_bit_of_the_cube() {
             assert!((f64::from(got) - sum / n).abs() <= bound, "{scale} {x} {y}: {got} {}", sum / n);
         }
     }
+    for scale in [8u32, 16] {
+        let (_, got) = floats(&format!("show=colour&scale={scale}"));
+        let columns = 100u32.div_ceil(scale);
+        for (i, got) in (0u32..).zip(got) {
+            let (block, c) = (i / 3, (i % 3) as usize);
+            let (x, y) = (block % columns * scale, block / columns * scale);
+            let inside =
+                (y..(y + scale).min(70)).flat_map(|y| (x..(x + scale).min(100)).map(move |x| (y * 100 + x) as usize));
+            let (sum, n) = inside.fold((0.0, 0.0), |(sum, n), p| (sum + f64::from(preview.rgb[3 * p + c]), n + 1.0));
+            // Means of radiance below 4.1e5 are rounded to f32; the weights of all channels add up to 5.3 at most, signs left
+            // aside. The colour is rounded three times more.
+            let bound = (5.3 + 3.0) * 4.1e5 * f64::from(f32::EPSILON);
+            assert!((f64::from(got) - sum / n).abs() <= bound, "{scale} {x} {y} {c}: {got} {}", sum / n);
+        }
+    }
     // PNG as `export` makes it.
     let png = get(address, "/api/image?show=colour&ev=-12");
     let mut reader = png::Decoder::new(Cursor::new(&png.body)).read_info().expect("a PNG");

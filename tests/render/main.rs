@@ -1,6 +1,7 @@
 //! `render`, `plan` and `devices` as users meet them: the real binary, in fresh directories, on the device that is
 //! there.
 
+mod accuracy;
 #[path = "../cube_files/mod.rs"]
 mod cube_files;
 mod json;

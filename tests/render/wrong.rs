@@ -42,7 +42,7 @@ fn a_scene_that_is_not_there_or_not_right() {
     fails(&place, &render(&["."]), 2, &["."]);
     fs::write(place.path().join("text.toml"), "film = [").expect("written");
     fails(&place, &render(&["text.toml"]), 2, &["text.toml:1"]);
-    fails(&place, &render(&["scene.toml", "--set", "film.width=-3"]), 2, &["film.width", "-3", "1 to 65535"]);
+    fails(&place, &render(&["scene.toml", "--set", "film.width=-3"]), 2, &["film.width", "-3", "1 to 131072"]);
     fails(&place, &render(&["scene.toml", "--set", "films.width=3"]), 2, &["films"]);
     fails(
         &place,

@@ -63,7 +63,7 @@ fn settings_resolve_with_their_defaults() {
     assert_eq!(scene.film.filter, Filter::Box);
     let integrator = &scene.integrator;
     assert_eq!((integrator.max_bounces, integrator.russian_roulette_start, integrator.epoch), (5, 0, 64));
-    assert_eq!((integrator.sampler, integrator.wavelengths), (Sampler::Sobol, Wavelengths::Uniform));
+    assert_eq!((integrator.sampler, integrator.wavelengths), (Sampler::Sobol, Wavelengths::Emission));
     assert_eq!(integrator.evaluator, "auto");
     assert!(scene.file.is_absolute());
     let scene = good(

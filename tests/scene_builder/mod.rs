@@ -29,7 +29,7 @@ impl Builder {
                 max_bounces: 1,
                 russian_roulette_start: 0,
                 sampler: Sampler::Independent,
-                wavelengths: Wavelengths::Uniform,
+                wavelengths: Wavelengths::Emission,
                 evaluator: "auto".into(),
                 epoch: 64,
             },

@@ -135,6 +135,11 @@ impl Place {
 
     /// Waits for the end of everything; then the cube must be whole, and every byte that of the one-machine render.
     fn ends_with_the_same_bytes(&self, spp: &'static str) {
+        self.ends_with_the_bytes_of(&["--spp", spp]);
+    }
+
+    /// The same, of the render with these options.
+    fn ends_with_the_bytes_of(&self, options: &[&'static str]) {
         self.cluster.wait_until_empty();
         let summary = self.summary();
         assert!(summary.contains("\nresult       complete: 64 tiles of "), "{summary}\n{}", self.logs());
@@ -142,7 +147,7 @@ impl Place {
         self.success(&["info", "cube.zarr", "--verify"]);
         let aside = fs::read_dir(self.at("cube.zarr/.spectile/aside")).expect("a folder").count();
         assert_eq!(aside, 0, "nothing lies aside");
-        assert!(arrays(&self.at("cube.zarr")) == *straight(spp), "{}", self.logs());
+        assert!(arrays(&self.at("cube.zarr")) == *straight(options), "{}", self.logs());
     }
 
     /// What tasks and finalisers have said, for when something is not as it should be.
@@ -169,19 +174,20 @@ impl Place {
 const SUBMIT: &[&str] = &["scene.toml", "-o", "cube.zarr", "--tile", "8", "--gpus-per-task", "0"];
 
 /// The arrays that one process makes, without a cluster; each is made once.
-fn straight(spp: &'static str) -> &'static Files {
-    static MADE: OnceLock<Mutex<Vec<(&'static str, &'static Files)>>> = OnceLock::new();
+fn straight(options: &[&'static str]) -> &'static Files {
+    type Made = Vec<(Vec<&'static str>, &'static Files)>;
+    static MADE: OnceLock<Mutex<Made>> = OnceLock::new();
     let mut made = MADE.get_or_init(Mutex::default).lock().unwrap_or_else(|e| e.into_inner());
-    if let Some((_, files)) = made.iter().find(|(of, _)| *of == spp) {
+    if let Some((_, files)) = made.iter().find(|(of, _)| *of == options) {
         return files;
     }
     let folder = folder_with_scene();
     let mut command = Command::new(env!("CARGO_BIN_EXE_spectile"));
     command.env("XDG_RUNTIME_DIR", folder.path()).current_dir(folder.path());
-    command.args(["render", "scene.toml", "-o", "cube.zarr", "--tile", "8", "--quiet", "--spp", spp]);
+    command.args(["render", "scene.toml", "-o", "cube.zarr", "--tile", "8", "--quiet"]).args(options);
     assert!(command.status().expect("the binary runs").success());
     let files: &'static Files = Box::leak(Box::new(arrays(&folder.path().join("cube.zarr"))));
-    made.push((spp, files));
+    made.push((options.to_vec(), files));
     files
 }
 
@@ -213,6 +219,28 @@ fn an_array_render_is_byte_equal_to_the_one_machine_render() {
     place.ends_with_the_same_bytes("128");
 }
 
+/// With `--uncertainty` the cube has an array more, of which every task writes its part.
+#[test]
+fn an_array_job_makes_standard_errors_too() {
+    let Some(place) = Place::new(2, 2) else { return };
+    place.submit(&["--spp", "128", "--tasks", "4", "--uncertainty"]);
+    place.ends_with_the_bytes_of(&["--spp", "128", "--uncertainty"]);
+    let [radiance, error] = ["radiance", "standard_error"].map(|array| {
+        straight(&["--spp", "128", "--uncertainty"])
+            .keys()
+            .filter(|name| name.starts_with(&format!("{array}/c/")))
+            .count()
+    });
+    assert_eq!((radiance, error), (64, 64));
+    // Going on without it would be another cube.
+    let output = place.run(&[&["submit", "--resume", "--spp", "256"], SUBMIT].concat());
+    assert!(
+        output.status.code() == Some(2) && text(&output.stderr).contains("uncertainty"),
+        "{}",
+        text(&output.stderr)
+    );
+}
+
 /// The script and what would be typed, to the letter. If this has to change, look at it, and write it anew by hand.
 #[test]
 fn a_dry_run_shows_everything_and_changes_nothing() {
@@ -220,7 +248,17 @@ fn a_dry_run_shows_everything_and_changes_nothing() {
     let path = folder.path().canonicalize().expect("a folder");
     let mut command = Command::new(env!("CARGO_BIN_EXE_spectile"));
     command.current_dir(&path).args(["submit", "scene.toml", "-o", "cube.zarr", "--spp", "100", "--tile", "8"]);
-    command.args(["--set", "channels.equal.count=7", "--seed", "3", "--memory", "1GiB", "--tasks", "20"]);
+    command.args([
+        "--set",
+        "channels.equal.count=7",
+        "--seed",
+        "3",
+        "--uncertainty",
+        "--memory",
+        "1GiB",
+        "--tasks",
+        "20",
+    ]);
     command.args(["--partition", "gpu", "--time-limit", "90m", "--array-limit", "1001", "--dry-run"]);
     command.args(["--sbatch", "--account=optics --comment='two words'"]);
     let output = command.output().expect("the binary runs");

@@ -10,6 +10,7 @@ mod zarr;
 use std::io::Read;
 use std::path::Path;
 
+use super::text::nanometres;
 use crate::error::Problem;
 
 /// A picture of colours or spectra, rows from the top.
@@ -67,9 +68,9 @@ pub fn read(path: &Path) -> Result<Map, Box<Problem>> {
     match &start[..length] {
         [0x76, 0x2f, 0x31, 0x01] => exr::read_map(path),
         [b'#', b'?', ..] => hdr::read(path),
-        b"ENVI" => envi::read_header(path, None),
+        b"ENVI" => envi::read(path, None),
         _ => match envi::header_of(path) {
-            Some(header) => envi::read_header(&header, Some(path)),
+            Some(header) => envi::read(&header, Some(path)),
             None => {
                 let help = "use OpenEXR, Radiance RGBE (.hdr), ENVI (with its .hdr beside it) or a Zarr store";
                 Err(with_help(path, "is no map in a known format".to_owned(), help))
@@ -114,18 +115,5 @@ fn ascending(path: &Path, nm: &[f64]) -> Result<Vec<usize>, Box<Problem>> {
     match order.windows(2).find(|w| nm[w[0]] == nm[w[1]]) {
         Some(w) => Err(whole(path, format!("has two bands at {} nm", nm[w[0]]))),
         None => Ok(order),
-    }
-}
-
-/// Nanometres in a unit of wavelength, under the names that files give it.
-fn nanometres(unit: &str) -> Option<f64> {
-    match unit.trim().to_ascii_lowercase().as_str() {
-        "nm" | "nanometer" | "nanometers" | "nanometre" | "nanometres" => Some(1.0),
-        "um" | "µm" | "μm" | "micron" | "microns" | "micrometer" | "micrometers" | "micrometre" | "micrometres" => {
-            Some(1e3)
-        }
-        "mm" | "millimeter" | "millimeters" | "millimetre" | "millimetres" => Some(1e6),
-        "m" | "meter" | "meters" | "metre" | "metres" => Some(1e9),
-        _ => None,
     }
 }

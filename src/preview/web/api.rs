@@ -20,6 +20,8 @@ use super::guard::Peer;
 use super::{App, events, image, page};
 use crate::cube::{Look, Rect};
 use crate::format::text;
+use crate::spectral::colour::{ProjectionKind, three_of};
+use crate::spectral::temperature::is_thermal;
 use crate::{Error, Result};
 
 /// Bytes of a body; no request needs one.
@@ -182,19 +184,19 @@ async fn status(State(app): State<Arc<App>>) -> Response {
 async fn channels(State(app): State<Arc<App>>) -> std::result::Result<Response, Refused> {
     app.cube(|look| {
         let (cube, channels) = (look.cube(), look.cube().channels());
-        let rgb = match cube.projection().kind {
-            crate::spectral::colour::ProjectionKind::Xyz => None,
-            crate::spectral::colour::ProjectionKind::FalseColour(rgb) => Some(rgb),
+        let (false_colour, rgb) = match cube.projection().kind {
+            ProjectionKind::Xyz => (None, three_of(channels, true)),
+            ProjectionKind::FalseColour(rgb) => (Some(rgb), rgb),
         };
-        let thermal = |k: usize| channels.centre(k) >= image::THERMAL_NM;
         json_response(
             json!({
                 "count": channels.len(),
                 "centre_nm": (0..channels.len()).map(|k| channels.centre(k)).collect::<Vec<_>>(),
                 "bounds_nm": channels.bounds,
                 "names": channels.names,
-                "false_colour": rgb,
-                "thermal": (0..channels.len()).filter(|&k| thermal(k)).collect::<Vec<_>>(),
+                "false_colour": false_colour,
+                "rgb": rgb,
+                "thermal": (0..channels.len()).filter(|&k| is_thermal(channels, k)).collect::<Vec<_>>(),
             })
             .to_string(),
         )

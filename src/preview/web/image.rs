@@ -15,11 +15,11 @@ use super::App;
 use super::api::Refused;
 use crate::cube::{BLOCK, Look, Rect, Window};
 use crate::format::png;
-use crate::spectral::planck::Thermometer;
+use crate::spectral::Channels;
+use crate::spectral::temperature::{BandTemperature, THERMAL_NM, is_thermal, shown_range};
+use crate::spectral::tone::{Tone, percentiles};
 use crate::{Error, Result};
 
-/// From this wavelength on a channel counts as thermal: bodies at room temperature glow in it, and the sun hardly does.
-pub const THERMAL_NM: f64 = 2500.0;
 /// Pixels of an answer.
 const MOST_PIXELS: u64 = 4 << 20;
 /// Pixels of one side that may become one.
@@ -27,16 +27,16 @@ const LARGEST_SCALE: u32 = 1 << 16;
 
 /// Tables of brightness temperatures by channel, made when first asked for.
 #[derive(Default)]
-pub struct Thermometers(Mutex<HashMap<usize, Arc<Thermometer>>>);
+pub struct Thermometers(Mutex<HashMap<usize, Arc<BandTemperature>>>);
 
 impl Thermometers {
-    fn of(&self, k: usize, bounds: [f64; 2]) -> Arc<Thermometer> {
+    fn of(&self, channels: &Channels, k: usize) -> Arc<BandTemperature> {
         const KEPT: usize = 64;
         let mut kept = self.0.lock().unwrap_or_else(|e| e.into_inner());
         if kept.len() >= KEPT && !kept.contains_key(&k) {
             kept.clear();
         }
-        Arc::clone(kept.entry(k).or_insert_with(|| Arc::new(Thermometer::new(bounds))))
+        Arc::clone(kept.entry(k).or_insert_with(|| Arc::new(BandTemperature::of(channels, k))))
     }
 }
 
@@ -57,7 +57,7 @@ pub struct Asked {
     #[serde(default)]
     format: Format,
     ev: Option<f64>,
-    /// Kelvins that are black and white.
+    /// Kelvins at the ends of the colour map.
     low: Option<f64>,
     high: Option<f64>,
 }
@@ -86,26 +86,22 @@ pub async fn image(
 ) -> std::result::Result<Response, Refused> {
     let Query(asked) = asked.map_err(|error| Refused::bad(error.body_text()))?;
     let thermometers = Arc::clone(&app);
-    let (window, png) = app
+    let (window, tone, png) = app
         .read(move |look| {
             let window = asked.window(look, &thermometers.thermometers)?;
-            let png = (asked.format == Format::Png).then(|| asked.png(window.clone())).transpose()?;
-            Ok((window, png))
+            let tone = asked.tone(&window);
+            let png = (asked.format == Format::Png).then(|| asked.png(window.clone(), tone)).transpose()?;
+            Ok((window, tone, png))
         })
         .await?;
     let header = |name: &'static str, value: String| (HeaderName::from_static(name), value);
     let size = header("x-size", format!("{},{}", window.size[0], window.size[1]));
     let planes = header("x-planes", window.planes.to_string());
-    Ok(match png {
-        Some((bytes, ev)) => {
-            let ev = header("x-exposure-ev", ev.to_string());
-            ([(CONTENT_TYPE, "image/png".into()), size, planes, ev], Body::from(bytes)).into_response()
-        }
-        None => {
-            let bytes = bytemuck::cast_slice::<f32, u8>(&window.values).to_vec();
-            ([(CONTENT_TYPE, "application/octet-stream".into()), size, planes], Body::from(bytes)).into_response()
-        }
-    })
+    let (kind, bytes) = match png {
+        Some(bytes) => ("image/png", bytes),
+        None => ("application/octet-stream", bytemuck::cast_slice::<f32, u8>(&window.values).to_vec()),
+    };
+    Ok(([(CONTENT_TYPE, kind.into()), size, planes, tone_header(tone)], Body::from(bytes)).into_response())
 }
 
 impl Asked {
@@ -146,12 +142,12 @@ impl Asked {
             }
             Show::Temperature => {
                 let k = channel("k", self.k)?;
-                if channels.centre(k) < THERMAL_NM {
+                if !is_thermal(channels, k) {
                     return refuse(format!(
                         "k={k}: its centre is below {THERMAL_NM} nm, where nothing glows by itself"
                     ));
                 }
-                let thermometer = thermometers.of(k, channels.bounds[k]);
+                let thermometer = thermometers.of(channels, k);
                 let mut window = look.channels(&[k], rect, scale)?;
                 window.values.iter_mut().for_each(|v| *v = thermometer.kelvin(f64::from(*v)) as f32);
                 Ok(window)
@@ -159,35 +155,32 @@ impl Asked {
         }
     }
 
-    /// The PNG, and the exposure it has.
-    fn png(&self, mut window: Window) -> Result<(Vec<u8>, f64)> {
-        let mut ev = self.ev;
-        if self.show == Show::Temperature {
-            let (low, high) = range(&window.values);
-            let (low, high) = (self.low.unwrap_or(low), self.high.unwrap_or(high));
-            // What is linear in kelvins is to look linear: the transfer function is undone.
-            window.values.iter_mut().for_each(|v| {
-                let t = ((f64::from(*v) - low) / (high - low).max(1e-6)).clamp(0.0, 1.0);
-                *v = if t <= 0.040_45 { t / 12.92 } else { ((t + 0.055) / 1.055).powf(2.4) } as f32;
-            });
-            ev = Some(0.0);
+    /// How the values are shown where nobody has said how: the exposure, or the ends of the colour map.
+    fn tone(&self, window: &Window) -> Tone {
+        match self.show {
+            Show::Temperature => {
+                let [low, high] = shown_range(percentiles(&window.values));
+                Tone::Range([self.low.unwrap_or(low), self.high.unwrap_or(high)])
+            }
+            _ => Tone::Exposure(self.ev.unwrap_or_else(|| window.clone().into_picture().auto_exposure())),
         }
-        let picture = window.into_picture();
-        let ev = ev.unwrap_or_else(|| picture.auto_exposure());
-        let made = png::encode(&picture, ev);
-        made.map(|bytes| (bytes, ev)).map_err(|error| Error::Internal(format!("PNG: {error}")))
+    }
+
+    fn png(&self, window: Window, tone: Tone) -> Result<Vec<u8>> {
+        let size = window.size;
+        let values = match tone {
+            Tone::Exposure(_) => window.into_picture().rgb,
+            Tone::Range(_) => window.values,
+        };
+        let made = png::encode(size, &tone.srgb8(&values));
+        made.map_err(|error| Error::Internal(format!("PNG: {error}")))
     }
 }
 
-/// The 1st and the 99th percentile of what is there and not zero.
-fn range(values: &[f32]) -> (f64, f64) {
-    let mut there: Vec<f32> = values.iter().copied().filter(|v| v.is_finite() && *v > 0.0).collect();
-    if there.is_empty() {
-        return (0.0, 1.0);
+/// What the answer says of how it is shown.
+fn tone_header(tone: Tone) -> (HeaderName, String) {
+    match tone {
+        Tone::Exposure(ev) => (HeaderName::from_static("x-exposure-ev"), ev.to_string()),
+        Tone::Range([low, high]) => (HeaderName::from_static("x-range-k"), format!("{low},{high}")),
     }
-    let mut at = |percent: usize| {
-        let rank = (there.len() - 1) * percent / 100;
-        f64::from(*there.select_nth_unstable_by(rank, f32::total_cmp).1)
-    };
-    (at(1), at(99))
 }

@@ -2,6 +2,10 @@
 
 use std::sync::OnceLock;
 
+use serde_json::json;
+
+use crate::spectral::tone::{MAP_LEVELS, map_level, srgb8};
+
 const DOCUMENT: &str = include_str!("page/page.html");
 const PARTS: [(&str, &str); 7] = [
     ("{{uPlot.css}}", include_str!("page/vendor/uPlot.min.css")),
@@ -21,9 +25,19 @@ pub fn page(nonce: &str) -> String {
         for (place, part) in PARTS {
             page = page.replace(place, part);
         }
-        page
+        page.replace("{{tone}}", &tone())
     });
     page.replace("{{nonce}}", nonce)
+}
+
+/// What the page needs to show numbers as colours, so that exposure follows the hand without asking for pictures: 8-bit sRGB
+/// over the square root of linear values from 0 to 1, of which it almost is a straight line, and the colour map.
+fn tone() -> String {
+    const STEPS: usize = 8191;
+    let srgb: Vec<u8> = (0..=STEPS).map(|i| srgb8((i as f64 / STEPS as f64).powi(2))).collect();
+    // A sorted table: how many steps have each value.
+    let steps = srgb.chunk_by(|a, b| a == b).map(<[u8]>::len).collect::<Vec<_>>();
+    json!({ "srgb_steps": steps, "map": (0..MAP_LEVELS).flat_map(map_level).collect::<Vec<u8>>() }).to_string()
 }
 
 #[cfg(test)]
@@ -40,6 +54,10 @@ mod tests {
         for loads in [" src=", "@import", "url(", "import("] {
             assert!(!page.contains(loads), "{loads}");
         }
+        let tone: serde_json::Value = serde_json::from_str(&super::tone()).expect("JSON");
+        let counts: Vec<u64> =
+            tone["srgb_steps"].as_array().expect("a list").iter().filter_map(|n| n.as_u64()).collect();
+        assert_eq!((counts.len(), counts.iter().sum()), (256, 8192), "every one of the 256 values occurs");
         assert!(page.len() < 150 << 10, "{} bytes", page.len());
     }
 }

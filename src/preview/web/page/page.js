@@ -29,7 +29,7 @@ function setMode(mode) {
   if (!channels || (mode === "temperature" && !channels.thermal.length)) return;
   const change = { mode };
   if (mode === "temperature" && !channels.thermal.includes(picture.show.k)) change.k = channels.thermal[0];
-  if (mode === "temperature") picture.tone.map = "helix";
+  if (mode === "temperature") picture.tone.map = "inferno";
   if (mode === "channel") picture.tone.map = "grey";
   picture.setShow(change);
   showControls();
@@ -345,12 +345,11 @@ async function hear(state) {
     try {
       const answer = await fetch("/api/channels");
       if (!answer.ok) throw new Error("no channels yet");
-      const channels = await answer.json(), n = channels.count - 1;
+      const channels = await answer.json();
       page.channels = channels;
       spectra.open(channels);
-      const at = (nm) => spectra.channelAt(nm), visible = channels.centre_nm.some((nm) => nm < 700);
-      picture.show.rgb = channels.false_colour || (visible ? [at(620), at(540), at(460)] : [0, n >> 1, n].map((i) => spectra.order[i]));
-      picture.show.k = spectra.order[n >> 1];
+      picture.show.rgb = channels.rgb;
+      picture.show.k = spectra.order[(channels.count - 1) >> 1];
       if (state.exposure_ev !== null) Object.assign(picture.tone, { auto: false, ev: state.exposure_ev });
       picture.open(state.cube, channels);
       notice("");

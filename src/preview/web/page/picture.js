@@ -11,24 +11,13 @@ const MOST_RADIANCE = 2 ** 31;
 const REFRESH_MS = 400;
 const REFRESH_SHARE = 10;
 
-// Green 2011: a helix through the colour cube, monotonic in brightness.
-const helix = (t) => {
-  const angle = 2 * Math.PI * (0.5 / 3 + 1 - 1.5 * t), a = 1.2 * t * (1 - t) / 2;
-  const [c, s] = [Math.cos(angle), Math.sin(angle)];
-  return [t + a * (-0.14861 * c + 1.78277 * s), t + a * (-0.29227 * c - 0.90649 * s), t + a * (1.97294 * c)];
-};
-const clamp8 = (v) => Math.max(0, Math.min(255, Math.round(255 * v)));
+// How numbers become colours is the server's to say: TONE has its sRGB, over square roots of linear values, and its map.
 const MAPS = {
   grey: Uint8Array.from({ length: 768 }, (_, i) => Math.floor(i / 3)),
-  helix: Uint8Array.from({ length: 768 }, (_, i) => clamp8(helix(Math.floor(i / 3) / 255)[i % 3])),
+  inferno: Uint8Array.from(TONE.map),
 };
-// sRGB by the square root of the linear value, which it almost is.
-const STEPS = 8191;
-const ENCODED = Uint8Array.from({ length: STEPS + 1 }, (_, i) => {
-  const v = (i / STEPS) ** 2;
-  return Math.floor(255 * (v <= 0.0031308 ? 12.92 * v : 1.055 * v ** (1 / 2.4) - 0.055) + 0.5);
-});
-const encode = (v) => (v >= 1 ? 255 : v > 0 ? ENCODED[(Math.sqrt(v) * STEPS + 0.5) | 0] : 0);
+const ENCODED = Uint8Array.from(TONE.srgb_steps.flatMap((steps, value) => Array(steps).fill(value)));
+const encode = (v) => (v >= 1 ? 255 : v > 0 ? ENCODED[(Math.sqrt(v) * (ENCODED.length - 1) + 0.5) | 0] : 0);
 
 class Picture {
   constructor(canvas, changed) {
@@ -227,6 +216,8 @@ class Picture {
       this.bytes += values.byteLength - (square.values ? square.values.byteLength : 0);
       [square.width, square.height] = answer.headers.get("x-size").split(",").map(Number);
       square.planes = Number(answer.headers.get("x-planes"));
+      square.ev = Number(answer.headers.get("x-exposure-ev"));
+      square.range = (answer.headers.get("x-range-k") || "").split(",").map(Number);
       square.values = values;
       square.look = 0;
       if (square.scale === this.scales().base) this.adapt();
@@ -270,28 +261,16 @@ class Picture {
     this.pump();
   }
 
-  // Automatic exposure: the 99th percentile of the largest component, over lit pixels, is white.
+  // Automatic exposure, and ends of the colour map: as the server has them for the whole picture.
   adapt() {
     if (!this.cube) return;
     const { tone } = this, heat = this.show.mode === "temperature";
     if (heat ? !tone.autoRange : !tone.auto) return;
-    const light = [];
-    for (const square of this.inSight(this.scales().base, [0, 0, ...this.cube.size])) {
-      if (!square.values) continue;
-      const { values, planes } = square;
-      for (let i = 0; i < values.length; i += planes) {
-        let most = values[i];
-        for (let j = 1; j < planes; j++) if (values[i + j] > most) most = values[i + j];
-        if (most > 0 && most < Infinity) light.push(most);
-      }
-    }
-    if (!light.length) return;
-    const sorted = Float32Array.from(light).sort(), at = (p) => sorted[Math.floor((sorted.length - 1) * p)];
+    const [whole] = this.inSight(this.scales().base, [0, 0, ...this.cube.size]);
+    if (!whole.values) return;
     const before = [tone.ev, tone.low, tone.high];
-    if (heat) {
-      [tone.low, tone.high] = [at(0.01), at(0.99)];
-      if (tone.high - tone.low < 0.5) [tone.low, tone.high] = [tone.low - 1, tone.high + 1];
-    } else tone.ev = -Math.log2(at(0.99));
+    if (heat) [tone.low, tone.high] = whole.range;
+    else tone.ev = whole.ev;
     if (before.some((v, i) => v !== [tone.ev, tone.low, tone.high][i])) {
       this.look++;
       this.changed();
@@ -306,7 +285,7 @@ class Picture {
       [square.canvas.width, square.canvas.height] = [width, height];
     const context = square.canvas.getContext("2d"), image = context.createImageData(width, height), out = image.data;
     const scale = 2 ** tone.ev, map = MAPS[tone.map], n = width * height;
-    const heat = this.show.mode === "temperature", low = tone.low, span = Math.max(1e-6, tone.high - tone.low);
+    const heat = this.show.mode === "temperature", low = tone.low, span = tone.high - tone.low || 1e-9;
     for (let i = 0; i < n; i++) {
       const v = values[i * planes], o = 4 * i;
       if (v !== v) continue; // not rendered: transparent
@@ -315,7 +294,7 @@ class Picture {
         out[o + 1] = encode(values[3 * i + 1] * scale);
         out[o + 2] = encode(values[3 * i + 2] * scale);
       } else {
-        const level = heat ? Math.max(0, Math.min(255, (255 * (v - low)) / span)) | 0 : encode(v * scale);
+        const level = heat ? (255 * Math.max(0, Math.min(1, (v - low) / span)) + 0.5) | 0 : encode(v * scale);
         out[o] = map[3 * level];
         out[o + 1] = map[3 * level + 1];
         out[o + 2] = map[3 * level + 2];
