@@ -201,57 +201,28 @@ fn words(output: &Output) -> String {
     format!("{}\n{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr))
 }
 
-/// Whether devices cannot render this scene yet, and say so: only the one with gases and heat may.
-fn waits(name: &str, output: &Output) -> bool {
-    let refused = output.status.code() == Some(2) && words(output).contains("cannot be rendered yet");
-    if refused && name == "aircraft-infrared" {
-        println!("SKIPPED: {name}: {}", words(output));
-    }
-    refused && name == "aircraft-infrared"
-}
-
+/// A small picture of every scene, and the plan of it: without a warning, which a sample that is not finite or negative would
+/// be. One scene after the other, so that the driver compiles each kernel once: the plan finds them in its cache.
 #[test]
-fn every_scene_loads_without_a_warning() {
+fn every_scene_renders_a_small_picture_cleanly() {
     let scenes = scenes();
     assert!(scenes.len() >= 5, "{scenes:?}");
     for (folder, name) in scenes {
         let scene = made().join(&folder).join(format!("{name}.toml"));
-        let output = spectile(&["plan", &scene.to_string_lossy()]);
-        if waits(&name, &output) {
-            continue;
-        }
-        assert!(output.status.success(), "{name}: {}", words(&output));
-        let warned = String::from_utf8_lossy(&output.stderr).contains("warning");
-        assert!(!warned, "{name}: {}", words(&output));
-    }
-}
-
-#[test]
-fn every_scene_renders_a_small_picture_cleanly() {
-    for (folder, name) in scenes() {
-        let scene = made().join(&folder).join(format!("{name}.toml"));
         let out = TempDir::new().expect("a folder");
         let cube = out.path().join("cube.zarr");
-        let output = spectile(&[
-            "render",
-            &scene.to_string_lossy(),
-            "-o",
-            &cube.to_string_lossy(),
-            "--size",
-            "40x25",
-            "--spp",
-            "4",
-        ]);
-        if waits(&name, &output) {
-            continue;
-        }
+        let (scene, path) = (scene.to_string_lossy(), cube.to_string_lossy());
+        let small = ["--size", "40x25", "--spp", "4"];
+        let output = spectile(&[&["render", &scene, "-o", &path][..], &small].concat());
         if output.status.code() == Some(3) {
             println!("SKIPPED: no device: {}", words(&output));
             assert!(std::env::var_os("CI").is_none(), "must not be skipped under CI");
             return;
         }
-        // A sample that is not finite or negative is a warning.
-        assert!(output.status.success() && !words(&output).contains("warning"), "{name}: {}", words(&output));
+        let clean = |output: &Output| output.status.success() && !words(output).contains("warning");
+        assert!(clean(&output), "{name}: {}", words(&output));
+        let plan = spectile(&[&["plan", &scene][..], &small].concat());
+        assert!(clean(&plan), "{name}: {}", words(&plan));
         let cube = Cube::open(&cube).expect("a cube");
         let mut lit = 0;
         for tile in 0..cube.grid().count() {

@@ -5,6 +5,9 @@
 //! `render::radiators`.
 
 use std::borrow::Cow;
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::rc::Rc;
 
 use glam::DVec3;
 
@@ -70,6 +73,23 @@ struct Leaf<'a> {
     absorber: Absorber,
     /// What the absorber depends on, in its order.
     curves: Vec<Cow<'a, Curve>>,
+    /// At the bits of the curves' values met so far: all cosines of a surface ask for the same.
+    facets: RefCell<HashMap<[u64; 2], Rc<OfFacets>>>,
+}
+
+/// 1 - F of metals or F of coats at each [`facet_cosine`], and the mean of F of metals.
+type OfFacets = (Vec<f64>, f64);
+
+/// A side of a leaf, seen at a cosine.
+struct Seen<'l> {
+    leaf: &'l Leaf<'l>,
+    back: bool,
+    cosine: f64,
+    /// Of facets.
+    weights: Vec<f64>,
+    /// What they lose, of which `again` comes back in the end, times something that depends on the metal.
+    lost: f64,
+    again: f64,
 }
 
 enum Absorber {
@@ -82,45 +102,73 @@ enum Absorber {
 }
 
 impl Leaf<'_> {
-    /// ε at `cosine` where the curves have `values`: 1 - what is reflected (see `reference`, which has its own).
-    fn emittance(&self, cosine: f64, back: bool, values: &[f64]) -> f64 {
-        if back && !self.two_sided {
+    fn seen(&self, cosine: f64, back: bool) -> Seen<'_> {
+        let o = DVec3::new(((1.0 - cosine) * (1.0 + cosine)).max(0.0).sqrt(), 0.0, cosine);
+        let (weights, again) = match &self.absorber {
+            Absorber::RoughMetal { facets, again } => {
+                (facets.weights(o), again.as_ref().map_or(0.0, |albedo| albedo.loss(o)))
+            }
+            Absorber::RoughPlastic { facets, .. } => (facets.weights(o), 0.0),
+            _ => (Vec::new(), 0.0),
+        };
+        let lost = 1.0 - weights.iter().sum::<f64>();
+        Seen { leaf: self, back, cosine, weights, lost, again }
+    }
+
+    /// What `make` makes for these values of the curves, once.
+    fn facets(&self, values: [f64; 2], make: impl FnOnce() -> OfFacets) -> Rc<OfFacets> {
+        Rc::clone(self.facets.borrow_mut().entry(values.map(f64::to_bits)).or_insert_with(|| Rc::new(make())))
+    }
+}
+
+impl Seen<'_> {
+    /// ε where the curves have `values`: 1 - what is reflected (see `reference`, which has its own).
+    fn emittance(&self, values: &[f64]) -> f64 {
+        if self.back && !self.leaf.two_sided {
             return 1.0;
         }
-        let o = DVec3::new(((1.0 - cosine) * (1.0 + cosine)).max(0.0).sqrt(), 0.0, cosine);
+        let cosine = self.cosine;
+        let mean = |of_facets: &[f64]| self.weights.iter().zip(of_facets).map(|(w, v)| w * v).sum::<f64>();
         // What the base under a coat of index η keeps of light that got through.
         let kept = |rho: f64, eta: f64, mean_reflected: f64| {
             let leaves = (1.0 - mean_reflected) / (eta * eta);
             (1.0 - rho) / (1.0 - rho * (1.0 - leaves))
         };
-        let emittance = match &self.absorber {
+        let emittance = match &self.leaf.absorber {
             Absorber::Black => 1.0,
             Absorber::Diffuse => 1.0 - values[0],
             Absorber::Mirror => 1.0 - conductor(cosine, values[0], values[1]),
-            Absorber::RoughMetal { facets, again } => {
+            Absorber::RoughMetal { again, .. } => {
                 let (eta, k) = (values[0], values[1]);
-                let once = facets.mean(o, &std::array::from_fn(|j| 1.0 - conductor(facet_cosine(j), eta, k)));
-                let lost = 1.0 - facets.mean(o, &[1.0; FACET_COSINES]);
-                let comes_back = again.as_ref().map_or(0.0, |albedo| {
-                    let (f, missing) = (mean_conductor(eta, k), albedo.mean_loss());
-                    albedo.loss(o) * f * f * (1.0 - missing) / (1.0 - f * missing)
+                let facets = self.leaf.facets([eta, k], || {
+                    let absorbed = (0..FACET_COSINES).map(|j| 1.0 - conductor(facet_cosine(j), eta, k));
+                    (absorbed.collect(), mean_conductor(eta, k))
                 });
-                once + lost - comes_back
+                let comes_back = again.as_ref().map_or(0.0, |albedo| {
+                    let (f, missing) = (facets.1, albedo.mean_loss());
+                    self.again * f * f * (1.0 - missing) / (1.0 - f * missing)
+                });
+                mean(&facets.0) + self.lost - comes_back
             }
             Absorber::Varnish => {
                 let (rho, eta) = (values[0], values[1]);
                 (1.0 - dielectric(cosine, eta)) * kept(rho, eta, mean_dielectric(eta))
             }
-            Absorber::RoughPlastic { facets, coat } => {
+            Absorber::RoughPlastic { coat, .. } => {
                 let (rho, eta) = (values[0], values[1]);
-                let reflected = facets.mean(o, &std::array::from_fn(|j| dielectric(facet_cosine(j), eta)));
+                let facets = self.leaf.facets([eta, 0.0], || {
+                    ((0..FACET_COSINES).map(|j| dielectric(facet_cosine(j), eta)).collect(), 0.0)
+                });
+                let reflected = mean(&facets.0);
                 let enters = 1.0 - coat.reflected(eta, false, cosine);
                 1.0 - reflected - enters * (1.0 - kept(rho, eta, coat.mean_reflected(eta, false)))
             }
         };
         emittance.max(0.0)
     }
+}
 
+impl Leaf<'_> {
     /// Whether ε is the same in all directions.
     fn is_even(&self) -> bool {
         match self.absorber {
@@ -280,7 +328,14 @@ impl HotPart {
             }
             Bsdf::Dielectric { .. } | Bsdf::Blend { .. } => unreachable!("`collect` has none"),
         };
-        Leaf { weight: self.weight, kelvin, two_sided: material.two_sided, absorber, curves }
+        Leaf {
+            weight: self.weight,
+            kelvin,
+            two_sided: material.two_sided,
+            absorber,
+            curves,
+            facets: RefCell::default(),
+        }
     }
 
     /// What it emits on the whole, for choosing among lights: facets lie flat, textures are their means, of temperatures a
@@ -309,7 +364,8 @@ impl HotPart {
                 Bsdf::Plastic { reflectance, eta, .. } => (Absorber::Varnish, vec![mean(reflectance), curve(eta)]),
                 Bsdf::Dielectric { .. } | Bsdf::Blend { .. } => unreachable!("`collect` has none"),
             };
-            Leaf { weight: weight * share, kelvin, two_sided: material.two_sided, absorber, curves }
+            let two_sided = material.two_sided;
+            Leaf { weight: weight * share, kelvin, two_sided, absorber, curves, facets: RefCell::default() }
         };
         temperatures.into_iter().map(leaf).collect()
     }
@@ -317,14 +373,16 @@ impl HotPart {
 
 /// E + Σ w ε B(λ, T) at a cosine, within `channels`.
 fn radiance(emitted: Option<&Curve>, leaves: &[Leaf], cosine: f64, back: bool, channels: &Channels) -> Curve {
+    let seen: Vec<Seen> = leaves.iter().map(|leaf| leaf.seen(cosine, back)).collect();
     if emitted.is_none() && leaves.iter().all(|leaf| leaf.kelvin == leaves[0].kelvin) {
         // Grey: Planck's law itself.
-        let grey = |leaf: &Leaf| {
+        let grey = |seen: &Seen| {
+            let leaf = seen.leaf;
             let values: Option<Vec<f64>> =
                 leaf.curves.iter().map(|c| c.is_constant().then(|| c.eval(channels.centre(0)))).collect();
-            values.map(|values| leaf.weight * leaf.emittance(cosine, back, &values))
+            values.map(|values| leaf.weight * seen.emittance(&values))
         };
-        let scale: Option<f64> = leaves.iter().map(grey).sum();
+        let scale: Option<f64> = seen.iter().map(grey).sum();
         match scale {
             Some(0.0) => return Curve::Constant(0.0),
             Some(scale) => return Curve::Blackbody { kelvin: leaves[0].kelvin, scale },
@@ -335,12 +393,13 @@ fn radiance(emitted: Option<&Curve>, leaves: &[Leaf], cosine: f64, back: bool, c
     let tables: Vec<&Curve> = tables.collect();
     let at = |nm: f64, values: &[f64]| {
         let (lamp, mut values) = values.split_at(usize::from(emitted.is_some()));
-        let mut of_leaf = |leaf: &Leaf| {
+        let mut of_leaf = |seen: &Seen| {
+            let leaf = seen.leaf;
             let (own, rest) = values.split_at(leaf.curves.len());
             values = rest;
-            leaf.weight * leaf.emittance(cosine, back, own) * planck::radiance(nm, leaf.kelvin)
+            leaf.weight * seen.emittance(own) * planck::radiance(nm, leaf.kelvin)
         };
-        leaves.iter().map(&mut of_leaf).sum::<f64>() + lamp.iter().sum::<f64>()
+        seen.iter().map(&mut of_leaf).sum::<f64>() + lamp.iter().sum::<f64>()
     };
     Curve::derived_by_stretch(&tables, channels, at)
 }
@@ -352,7 +411,8 @@ mod tests {
 
     fn leaf<'a>(reflectance: Option<&'a Curve>, weight: f64, kelvin: f64) -> Leaf<'a> {
         let absorber = if reflectance.is_some() { Absorber::Diffuse } else { Absorber::Black };
-        Leaf { weight, kelvin, two_sided: true, absorber, curves: reflectance.into_iter().map(Cow::Borrowed).collect() }
+        let curves = reflectance.into_iter().map(Cow::Borrowed).collect();
+        Leaf { weight, kelvin, two_sided: true, absorber, curves, facets: RefCell::default() }
     }
 
     /// Means of every channel to 2e-5, also 30 orders below the peak.

@@ -50,11 +50,23 @@ impl FacetCosines {
         FacetCosines { alpha, cosines, weights: weights.concat() }
     }
 
+    /// The weights w_j of a direction with z in [0, 1].
+    pub fn weights(&self, direction: DVec3) -> Vec<f64> {
+        let mut weights = vec![0.0; FACET_COSINES];
+        for (row, share) in self.rows(direction) {
+            let (above, place) = self.between(direction.z);
+            for (node, share) in [(above - 1, share * (1.0 - place)), (above, share * place)] {
+                let start = (row * self.cosines.len() + node) * FACET_COSINES;
+                let of_node = &self.weights[start..start + FACET_COSINES];
+                weights.iter_mut().zip(of_node).for_each(|(sum, weight)| *sum += share * f64::from(*weight));
+            }
+        }
+        weights
+    }
+
     /// Σ w_j `values`[j] for a direction with z in [0, 1].
     pub fn mean(&self, direction: DVec3, values: &[f64; FACET_COSINES]) -> f64 {
-        let above = self.cosines.partition_point(|&z| z <= direction.z).clamp(1, self.cosines.len() - 1);
-        let (low, high) = (self.cosines[above - 1], self.cosines[above]);
-        let place = ((direction.z - low) / (high - low)).clamp(0.0, 1.0);
+        let (above, place) = self.between(direction.z);
         let row = |row: usize| {
             let at = |node: usize| {
                 let start = (row * self.cosines.len() + node) * FACET_COSINES;
@@ -64,14 +76,25 @@ impl FacetCosines {
             let a = at(above - 1);
             a + place * (at(above) - a)
         };
-        let across = direction.x.hypot(direction.y);
-        if self.alpha[0] == self.alpha[1] || across == 0.0 {
-            return row(0);
+        self.rows(direction).map(|(number, share)| share * row(number)).sum()
+    }
+
+    /// The cosine above `z`, by its number, and where z is between that and the one before.
+    fn between(&self, z: f64) -> (usize, f64) {
+        let above = self.cosines.partition_point(|&cosine| cosine <= z).clamp(1, self.cosines.len() - 1);
+        let (low, high) = (self.cosines[above - 1], self.cosines[above]);
+        (above, ((z - low) / (high - low)).clamp(0.0, 1.0))
+    }
+
+    /// The azimuths nearest to that of a direction, with their shares.
+    fn rows(&self, direction: DVec3) -> impl Iterator<Item = (usize, f64)> {
+        let (mut first, mut share) = (0, 0.0);
+        if self.alpha[0] != self.alpha[1] && direction.x.hypot(direction.y) > 0.0 {
+            let turn = turn(direction.y.abs().atan2(direction.x.abs()), self.alpha, AZIMUTHS);
+            first = (turn as usize).min(AZIMUTHS - 2);
+            share = turn - first as f64;
         }
-        let turn = turn(direction.y.abs().atan2(direction.x.abs()), self.alpha, AZIMUTHS);
-        let first = (turn as usize).min(AZIMUTHS - 2);
-        let a = row(first);
-        a + (turn - first as f64) * (row(first + 1) - a)
+        [(first, 1.0 - share), (first + 1, share)].into_iter().filter(|(_, share)| *share > 0.0)
     }
 }
 
