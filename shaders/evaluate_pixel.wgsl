@@ -199,6 +199,9 @@ fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
 #if KEPT
         var kept_$v = vec4<f32>(0.0);
 #endif
+#if RADIATORS
+        var held_$v = vec4<f32>(0.0);
+#endif
 #end
         let first_record = path * frame.max_records;
         for (var r = first_record; r < first_record + used; r += 1u) {
@@ -245,9 +248,25 @@ fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
             }
 #endif
 #endif
+#if RADIATORS
+            if ((record.x & 0x3fu) == OP_HOLD) {
+#repeat VECTORS v
+                held_$v = factor_$v;
+                factor_$v = vec4<f32>(0.0);
+#end
+                continue;
+            }
+#endif
 #repeat VECTORS v
             var value_$v = operation_value(record, raw, quad_$v, s);
 #end
+#if RADIATORS
+            if ((record.x & 0x3fu) == OP_HELD) {
+#repeat VECTORS v
+                value_$v = held_$v;
+#end
+            }
+#endif
 #if KEPT
             if ((record.x & MODE_KEEP) != 0u) {
 #repeat VECTORS v
@@ -255,6 +274,14 @@ fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
 #end
                 continue;
             }
+#if RADIATORS
+            if ((record.x & 0x3fu) == OP_ABSORBED) {
+#repeat VECTORS v
+                value_$v = max(1.0 - kept_$v, vec4<f32>(0.0)) / (1.0 - kept_$v * bitcast<f32>(record.w) * value_$v);
+                kept_$v = vec4<f32>(0.0);
+#end
+            }
+#endif
             if ((record.x & 0x3fu) == OP_INNER) {
 #repeat VECTORS v
                 value_$v = kept_$v / (1.0 - kept_$v * value_$v);

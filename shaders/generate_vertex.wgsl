@@ -6,7 +6,6 @@
 @group(1) @binding(1) var<storage, read> units: array<vec4<u32>>;
 @group(1) @binding(2) var<storage, read_write> states: array<vec4<u32>>;
 @group(1) @binding(3) var<storage, read_write> heads: array<vec2<u32>>;
-@group(1) @binding(4) var<storage, read_write> records: array<vec4<u32>>;
 @group(1) @binding(5) var<storage, read_write> counters: array<atomic<u32>>;
 @group(1) @binding(6) var<uniform> step: Step;
 #if ROULETTE
@@ -16,72 +15,8 @@
 @group(1) @binding(12) var<storage, read_write> queue: array<u32>;
 @group(1) @binding(13) var<storage, read_write> queue_lengths: array<atomic<u32>>;
 
-#if HOT
-const EMITS_BY_ANGLE: u32 = 0x20000000u;
-
-// A random number beside those of the bounce.
-fn hot_numbers(path: u32) -> vec2<f32> {
-    let slot = wave.pixel_begin + path / wave.samples;
-    let index = wave.sample_begin + path % wave.samples;
-    let in_tile = slot % wave.tile_pixels;
-    let pixel = units[slot / wave.tile_pixels].xy + vec2<u32>(in_tile % wave.tile_width, in_tile / wave.tile_width);
-    let key = pixel_key(frame.seed_low, frame.seed_high, pixel.x, pixel.y, wave.epoch) ^ 0x85ebca6bu;
-    return random_pair(key, DIMENSION_BOUNCE + step.bounce * DIMENSIONS_PER_VERTEX, index, wave.epoch_mask);
-}
-
-// What an emitter sends out at a cosine: where that depends on the angle, one of the two spectra nearest to it, by chance,
-// so that the mean is linear between them.
-fn emitted_spectrum(emitter: Emitter, front: bool, cosine: f32, u: f32) -> u32 {
-    if ((emitter.spectrum & EMITS_BY_ANGLE) == 0u) {
-        return emitter.spectrum & SPECTRUM_MASK;
-    }
-    let x = pow(clamp(cosine, 1.0e-9, 1.0), 1.0 / 3.0) * f32(HOT_COSINES - 1u);
-    let node = min(u32(x), HOT_COSINES - 2u);
-    let nearer = select(0u, 1u, u < x - f32(node));
-    let row = (emitter.spectrum & 0x1fffffffu) + select(HOT_COSINES, 0u, front);
-    return emitters[row + node + nearer].primitive;
-}
-#endif
-
 const DIMENSION_LOBE: u32 = 3u;
 const DIMENSIONS_PER_VERTEX: u32 = 4u;
-
-// `count` records so far; evaluation may stop after the last one that adds radiance, `used`. `last`: the last instruction.
-struct RecordList {
-    path: u32,
-    count: u32,
-    used: u32,
-    last: u32,
-}
-
-fn append_raw(list: ptr<function, RecordList>, words: vec4<f32>) {
-    records[(*list).path * frame.max_records + (*list).count] = bitcast<vec4<u32>>(words);
-    (*list).count += 1u;
-}
-
-fn append(list: ptr<function, RecordList>, operation: u32, ab: u32, weight: f32, parameter: f32) {
-    (*list).last = (*list).path * frame.max_records + (*list).count;
-    records[(*list).last] = vec4<u32>(operation, ab, bitcast<u32>(weight), bitcast<u32>(parameter));
-    (*list).count += 1u;
-}
-
-#if MAP
-// The instruction that looks the map up: X = its value there over the source spectrum.
-fn append_map(list: ptr<function, RecordList>, mode: u32, place: MapPlace, weight: f32) {
-    let fraction = vec2<u32>(place.fraction * 65535.0 + 0.5);
-    (*list).last = (*list).path * frame.max_records + (*list).count;
-    records[(*list).last] = vec4<u32>(OP_MAP | mode, place.column | (place.row << 16u), bitcast<u32>(weight), fraction.x | (fraction.y << 16u));
-    (*list).count += 1u;
-}
-#endif
-
-// Lets the instructions since record `begin` add to the radiance what they built, times a source.
-fn gather(list: ptr<function, RecordList>, begin: u32, source: u32) {
-    if ((*list).count > begin) {
-        records[(*list).last].x |= MODE_GATHER | (source << 16u);
-        (*list).used = (*list).count;
-    }
-}
 
 fn end_path(list: RecordList, rays: u32, overflow: bool) {
     if (overflow) {
@@ -117,9 +52,11 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     // Density of `direction`, for MIS; negative where it competes with nothing: the camera's own rays, mirrors, ideal
     // refraction.
     let density = state0.w;
-#if DISPERSION
     // The one channel that refraction left, or NONE.
+#if DISPERSION
     var live = states[STATE_WORDS * path + 2u].x;
+#else
+    let live = NONE;
 #endif
     var list = RecordList(path, packed & 0xffffu, packed >> 16u, 0u);
     var overflow = false;
@@ -178,6 +115,11 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 #endif
     let from_front = dot(surface.normal, ray.direction) < 0.0;
 
+    let material = surface_materials[surface.material];
+    // The geometric normal on the side of the ray.
+    let face = select(-surface.normal, surface.normal, from_front);
+    var v = vertex_at(hit, surface, from_front, -ray.direction);
+
     // What it emits.
 #if EMITTERS
     if (surface.emitter != NONE) {
@@ -188,45 +130,29 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
                 weight = power_heuristic(density, light_density(surface.emitter, ray.origin, ray.direction, distance, surface.normal));
             }
             let begin = list.count;
+#if RADIATORS
+            if ((spectrum & EMITS_BY_PLACE) != 0u) {
+#if HOT_FACETS
+                append_heat(&list, spectrum, v, scale * weight, hot_numbers(path, SALT_MET));
+#else
+                append_heat(&list, spectrum, v, scale * weight, vec2<f32>(0.0));
+#endif
+                gather(&list, begin, 0u);
+            } else {
+#endif
             append(&list, OP_ONE | MODE_SINGLE, 0u, scale * weight, 0.0);
 #if HOT
             let cosine = abs(dot(surface.normal, ray.direction));
-            gather(&list, begin, emitted_spectrum(emitters[surface.emitter], from_front, cosine, hot_numbers(path).x));
+            gather(&list, begin, emitted_spectrum(emitters[surface.emitter], from_front, cosine, hot_numbers(path, SALT_ANGLE).x));
 #else
             gather(&list, begin, spectrum & SPECTRUM_MASK);
+#endif
+#if RADIATORS
+            }
 #endif
         }
     }
 #endif
-
-    let material = surface_materials[surface.material];
-    var v: Vertex;
-    // The geometric normal on the side of the ray.
-    let face = select(-surface.normal, surface.normal, from_front);
-    v.normal = face;
-    v.inside = !from_front;
-#if ATTRIBUTES
-    let carried = carried_at(hit, surface);
-#if SMOOTH
-    v.normal = shading_normal(select(-carried.normal, carried.normal, from_front), -ray.direction);
-#endif
-#if TEXTURES
-    v.uv = carried.uv;
-#endif
-#endif
-#if ANISOTROPIC
-#if ATTRIBUTES
-    v.s = surface_tangent(hit, surface, v.normal, carried.tangent);
-#else
-    v.s = surface_tangent(hit, surface, v.normal, vec3<f32>(0.0));
-#endif
-    v.t = cross(v.normal, v.s);
-#else
-    let around = tangents(v.normal);
-    v.s = around.s;
-    v.t = around.t;
-#endif
-    v.o = to_local(v, -ray.direction);
     if (step.bounce == frame.max_bounces || material.part_count == 0u || !(v.o.z > 0.0) || overflow) {
         end_path(list, 2u * step.bounce + 1u, overflow);
         return;
@@ -243,132 +169,15 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     let u_choice = random_pair(key, dimension + DIMENSION_CHOICE, index, wave.epoch_mask);
     let u_lobe = random_pair(key, dimension + DIMENSION_LOBE, index, wave.epoch_mask);
 
-#if SHARES
-    v.pick_scale = 1.0;
-    var picks = 0.0;
-    for (var p = material.first_part; p < material.first_part + material.part_count; p += 1u) {
-        picks += part_pick(p, v);
-    }
-    v.pick_scale = select(1.0 / picks, 0.0, picks == 0.0);
-#endif
-    // The part that goes on.
-    var chosen = NONE;
-    var chosen_pick = 0.0;
-    var below = 0.0;
-    for (var p = material.first_part; p < material.first_part + material.part_count; p += 1u) {
-        let pick = part_pick(p, v);
-        if (pick > 0.0 && (chosen == NONE || u_lobe.x >= below)) {
-            chosen = p;
-            chosen_pick = pick;
-        }
-        below += pick;
-    }
-    if (chosen == NONE) {
+    let choice = choose_direction(material, &v, u_bsdf, u_lobe, heads[path].x, live);
+    if (choice.part == NONE) {
         end_path(list, 2u * step.bounce + 1u, overflow);
         return;
     }
-    let part = part_at(chosen, v);
-    // The next direction, and its density; negative where it is the only one.
-    var i = cosine_hemisphere(vec3<f32>(0.0, 0.0, 1.0), u_bsdf);
-    var next_density = 0.0;
-    // What the only direction of a part does to every channel, as an instruction.
-    var only = OP_ONE;
-    var only_weight = part.weight / chosen_pick;
-    var only_parameter = v.o.z;
-    let behind = part_behind(part, v);
-    let mode_behind = select(0u, MODE_BEHIND, behind);
-    var goes_on = true;
-#if DISPERSION
-    var only_channel = NONE;
-#endif
-    switch (part.kind & 0xffu) {
-#if CONDUCTOR
-        case KIND_CONDUCTOR: {
-            i = vec3<f32>(-v.o.xy, v.o.z);
-            next_density = -1.0;
-            only = OP_CONDUCTOR | MODE_SINGLE;
-        }
-#endif
-#if MIRROR
-        case KIND_MIRROR: {
-            i = vec3<f32>(-v.o.xy, v.o.z);
-            next_density = -1.0;
-            only = reflecting(part, v.o.z, relative_index(part.eta, behind)) | mode_behind;
-        }
-#endif
-#if REFRACTION
-        case KIND_REFRACTION: {
-            next_density = -1.0;
-            only = OP_TRANSMIT | MODE_SINGLE | MODE_SQUARE | mode_behind;
-            var eta = part.eta;
-#if DISPERSION
-            if ((part.kind & PART_DISPERSES) != 0u) {
-                let channel = select(live, min(u32(u_lobe.y * f32(CHANNELS)), CHANNELS - 1u), live == NONE);
-                only_channel = select(NONE, channel, live == NONE);
-                eta = channel_value(part.ab & 0xffffu, channel, heads[path].x);
-            }
-#endif
-            eta = relative_index(eta, behind);
-            if ((part.kind & PART_DISPERSES) == 0u) {
-                only = OP_TRANSMIT | MODE_SINGLE | mode_behind;
-                only_weight /= eta * eta;
-            }
-            goes_on = beyond_square(v.o.z, eta) > 0.0;
-            if (goes_on) {
-                i = refracted(v.o, vec3<f32>(0.0, 0.0, 1.0), eta);
-            }
-        }
-#endif
-#if MICROFACETS
-        case KIND_ROUGH_CONDUCTOR, KIND_ROUGH_COAT: {
-            let h = ggx_visible_normal(part.alpha, v.o, u_bsdf);
-            i = 2.0 * dot(v.o, h) * h - v.o;
-            goes_on = i.z > 0.0;
-        }
-#endif
-#if ROUGH_GLASS
-        case KIND_ROUGH_BOUNDARY: {
-            let h = ggx_visible_normal(part.alpha, v.o, u_bsdf);
-            let cosine = min(dot(v.o, h), 1.0);
-            let reflects = cosine_table(part.decision, v.inside, cosine);
-            if (u_lobe.y < reflects) {
-                i = 2.0 * cosine * h - v.o;
-                goes_on = i.z > 0.0;
-            } else {
-                var eta = part.eta;
-#if DISPERSION
-                let u_channel = (u_lobe.y - reflects) / (1.0 - reflects);
-                if ((part.kind & PART_NARROW) != 0u) {
-                    let channel = select(live, min(u32(u_channel * f32(CHANNELS)), CHANNELS - 1u), live == NONE);
-                    only_channel = select(NONE, channel, live == NONE);
-                    eta = channel_value(part.ab & 0xffffu, channel, heads[path].x);
-                } else if ((part.kind & PART_DISPERSES) != 0u) {
-                    eta = spread_index(part, min(u32(3.0 * u_channel), 2u));
-                }
-#endif
-                eta = relative_index(eta, behind);
-                goes_on = beyond_square(cosine, eta) > 0.0;
-                if (goes_on) {
-                    i = refracted(v.o, h, eta);
-                    goes_on = i.z < 0.0;
-                }
-#if DISPERSION
-                if ((part.kind & PART_NARROW) != 0u) {
-                    next_density = -1.0;
-                    only = OP_TRANSMIT | MODE_SINGLE | MODE_SQUARE | mode_behind;
-                    only_weight *= ggx_visible(part.alpha, i) / (1.0 - reflects);
-                    only_parameter = cosine;
-                }
-#endif
-            }
-        }
-        case KIND_BEYOND_AGAIN: {
-            i.z = -i.z;
-        }
-#endif
-        default: {
-        }
-    }
+    let part = parts[choice.part];
+    let i = choice.direction;
+    var next_density = choice.density;
+    var goes_on = choice.goes_on;
 
 #if SMOOTH
     // No light is reflected into a surface, or passes to where it came from.
@@ -385,6 +194,16 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 #if LAMPS
     var light_strength = 1.0;
     var is_met = true;
+#endif
+#if RADIATORS
+    // Radiators of the light, and the point on it.
+    var hot = 0u;
+    var hot_vertex: Vertex;
+#if HOT_FACETS
+    let hot_random = hot_numbers(path, SALT_AIMED);
+#else
+    let hot_random = vec2<f32>(0.0);
+#endif
 #endif
 #if MAP
     var map_place: MapPlace;
@@ -439,7 +258,14 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
                 end = offset_origin(point.position, facing);
 #if HOT
                 let along = dot(point.normal, towards) / max(length(towards), 1.0e-30);
-                source = emitted_spectrum(emitter, along < 0.0, abs(along), hot_numbers(path).y);
+                source = emitted_spectrum(emitter, along < 0.0, abs(along), hot_numbers(path, SALT_ANGLE).y);
+#endif
+#if RADIATORS
+                if ((emitter.spectrum & EMITS_BY_PLACE) != 0u && light_pdf > 0.0) {
+                    hot = emitter.spectrum;
+                    hot_vertex = emitting_vertex(emitter, point, -normalize(towards));
+                    source = 0u;
+                }
 #endif
             }
 #endif
@@ -512,6 +338,17 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
                 continue;
             }
 #endif
+#if RADIATORS
+            if (to_light && hot != 0u) {
+                append(&list, OP_SPECTRUM | MODE_SINGLE, part.ab, weight * max(direction.z, 0.0) * INV_PI, 0.0);
+                append_heat_aimed_at(&list, hot, hot_vertex, hot_random);
+#if MEDIA
+                append_way(&list, &way, shadow, false, MODE_ON_F, 1.0);
+#endif
+                gather(&list, begin, 0u);
+                continue;
+            }
+#endif
 #if MEDIA
             if (to_light && way.count > 0u) {
                 append(&list, OP_SPECTRUM | MODE_SINGLE, part.ab, weight * max(direction.z, 0.0) * INV_PI, 0.0);
@@ -540,6 +377,11 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
                 append_map(&list, MODE_ON_F, map_place, 1.0);
             }
 #endif
+#if RADIATORS
+            if (hot != 0u && list.count > begin) {
+                append_heat_aimed_at(&list, hot, hot_vertex, hot_random);
+            }
+#endif
 #if MEDIA
             if (list.count > begin) {
                 append_way(&list, &way, shadow, shadow_limit == INFINITE, MODE_ON_F, 1.0);
@@ -553,10 +395,10 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
         }
     }
     if (goes_on && next_density < 0.0) {
-        append(&list, only | MODE_ADVANCE, part.ab, only_weight, only_parameter);
+        append(&list, choice.only | MODE_ADVANCE, part.ab, choice.only_weight, choice.only_parameter);
 #if DISPERSION
-        if (only_channel != NONE) {
-            live = only_channel;
+        if (choice.only_channel != NONE) {
+            live = choice.only_channel;
             append(&list, OP_ONLY | MODE_SINGLE | MODE_ADVANCE, live, f32(CHANNELS), 0.0);
         }
 #endif

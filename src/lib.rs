@@ -19,6 +19,7 @@ pub mod scattering;
 pub mod scene;
 pub mod slurm;
 pub mod spectral;
+pub mod stress;
 
 // The unit tests that need a scene build it as the integration tests do, and compare cubes as they do.
 #[cfg(test)]

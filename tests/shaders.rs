@@ -177,6 +177,7 @@ fn general_scenes() -> Vec<(String, Scene)> {
     scenes.extend(textured_scenes());
     scenes.extend(light_scenes());
     scenes.extend(media_scenes());
+    scenes.extend(hot_scenes());
     scenes
 }
 
@@ -196,6 +197,47 @@ fn light_scenes() -> Vec<(String, Scene)> {
         builder = if i % 3 == 0 { builder.dielectric(disk(), surfaces::glass_curve(), 0.5) } else { builder };
         scenes.push((format!("lights {i}"), builder.build()));
     }
+    scenes
+}
+
+/// Heat by angle and by place: each kind of surface alone, in a gas and in voxels, and all of them at once.
+fn hot_scenes() -> Vec<(String, Scene)> {
+    type Add = fn(Builder, usize) -> Builder;
+    let parts: [(&str, Add); 6] = [
+        ("soot as hot as a texture", |b, t| b.black(disk()).heated_by(t)),
+        ("a lamp as hot as a texture", |b, t| b.lamp(disk(), 1.0, Sides::Front).heated_by(t)),
+        ("hot brushed metal", |b, _| b.conductor(disk(), 0.2, 3.4, [0.3, 0.1]).at_kelvin(300.0)),
+        ("a mirror as hot as a texture", |b, t| b.conductor(disk(), 0.2, 3.4, [0.0; 2]).heated_by(t)),
+        ("varnish over a hot mixture", |mut b, t| {
+            let texture = b.mixture([1, 1], &[0.5], &[Curve::Constant(0.5)]);
+            b.coated(disk(), texture, 1.5, 0.0).heated_by(t)
+        }),
+        ("a mask of hot plastics", |b, t| {
+            let b = b.plastic(disk(), 0.5, 1.5, 0.3).plastic(disk(), 0.5, 1.5, 0.1);
+            b.masked_last_two(disk(), t).at_kelvin(300.0)
+        }),
+    ];
+    let voxels = || heat::grid([2, 1, 1], |[x, _, _]| 300.0 + f64::from(x));
+    let plain = || {
+        let mut b = Builder(plain_scene());
+        let t = b.texture([2, 1], &[0.3, 0.7], TextureKind::Number);
+        (b, t)
+    };
+    let with = |add: Add| {
+        let (b, t) = plain();
+        add(b, t)
+    };
+    let mut scenes: Vec<(String, Scene)> =
+        parts.iter().map(|(name, add)| ((*name).to_owned(), with(*add).build())).collect();
+    for (name, add) in &parts[..3] {
+        scenes.push((format!("{name}, in a gas"), with(*add).gas(0.5).outer().build()));
+        let grid = with(*add).medium(0.5, Some(voxels()), Field::Constant(1.0)).null_box(-DVec3::ONE, DVec3::ONE);
+        scenes.push((format!("{name}, in voxels"), grid.build()));
+    }
+    let (b, t) = plain();
+    let all = parts.iter().fold(b, |b, (_, add)| add(b, t));
+    let all = all.plastic(disk(), 0.5, 1.5, 0.2).at_kelvin(300.0).dielectric(disk(), surfaces::glass_curve(), 0.5);
+    scenes.push(("everything hot".into(), all.build()));
     scenes
 }
 

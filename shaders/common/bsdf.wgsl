@@ -18,6 +18,36 @@ struct Vertex {
 #endif
 }
 
+// The vertex where `o`, a unit vector, leads away from a surface; `front`: on the side of the geometric normal.
+fn vertex_at(hit: Hit, surface: Surface, front: bool, o: vec3<f32>) -> Vertex {
+    var v: Vertex;
+    v.normal = select(-surface.normal, surface.normal, front);
+    v.inside = !front;
+#if ATTRIBUTES
+    let carried = carried_at(hit, surface);
+#if SMOOTH
+    v.normal = shading_normal(select(-carried.normal, carried.normal, front), o);
+#endif
+#if TEXTURES
+    v.uv = carried.uv;
+#endif
+#endif
+#if ANISOTROPIC
+#if ATTRIBUTES
+    v.s = surface_tangent(hit, surface, v.normal, carried.tangent);
+#else
+    v.s = surface_tangent(hit, surface, v.normal, vec3<f32>(0.0));
+#endif
+    v.t = cross(v.normal, v.s);
+#else
+    let around = tangents(v.normal);
+    v.s = around.s;
+    v.t = around.t;
+#endif
+    v.o = to_local(v, o);
+    return v;
+}
+
 fn to_local(v: Vertex, d: vec3<f32>) -> vec3<f32> {
     return vec3<f32>(dot(d, v.s), dot(d, v.t), dot(d, v.normal));
 }

@@ -124,6 +124,11 @@ fn operation_value(record: vec4<u32>, raw: vec4<f32>, quad: u32, s: SpectralSamp
         return map_value(record.y, record.w, spectrum_value(MAP_AXIS, quad, s));
     }
 #endif
+#if RADIATORS
+    if (operation == OP_PLANCK) {
+        return planck(spectrum_value(WAVELENGTH, quad, s), bitcast<f32>(record.w));
+    }
+#endif
     let a = spectrum_value(record.y & 0xffffu, quad, s);
     let parameter = bitcast<f32>(record.w);
     // Channels that only fill up the last quad have index 0.

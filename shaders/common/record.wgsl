@@ -50,6 +50,18 @@ const OP_MAP: u32 = 9u;
 // X = D(h) |o h| |i h| / (o h + n i h)^2 (1 - F), each channel with its own half vector h; parameter: roughness; the next
 // record holds cos o, and i.
 const OP_ROUGH_TRANSMIT: u32 = 48u;
+#if RADIATORS
+// X = Planck's law at `parameter` kelvins.
+const OP_PLANCK: u32 = 25u;
+// The sixth register H = F, F = 0; and X = H. No mode of its own, and MODE_ON_F.
+const OP_HOLD: u32 = 26u;
+const OP_HELD: u32 = 27u;
+#if KEPT
+// X = (1 - Q) / (1 - Q S_a parameter), Q = 0: what a base of reflectance Q keeps of what it gets, under a coat that reflects S_a
+// back to it (parameter 1) or none (0).
+const OP_ABSORBED: u32 = 28u;
+#endif
+#endif
 #if MEDIA
 // A stretch of `parameter` metres through a medium of absorption S_a: R += weight T (1 - exp(-S_a parameter)) S_source, then
 // T *= exp(-S_a parameter). No mode.

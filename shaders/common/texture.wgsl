@@ -69,10 +69,10 @@ fn append_reflectance(list: ptr<function, RecordList>, texture: u32, uv: vec2<f3
 }
 #endif
 
-#if SHARES
-// What blend textures leave of a part: the product of their numbers, or of what these lack to 1.
-fn part_share(p: u32, uv: vec2<f32>) -> f32 {
-    let factors = textures[FIRST_SHARE + p];
+#if PRODUCTS
+// What blend textures leave of something: the product of their numbers, or of what these lack to 1. `factors`: where they
+// stand, and how many.
+fn product_of_shares(factors: u32, uv: vec2<f32>) -> f32 {
     var share = 1.0;
     for (var n = factors >> 8u; n < (factors >> 8u) + (factors & 0xffu); n += 1u) {
         let texture = textures[n] & 0x7fffffffu;
@@ -80,5 +80,11 @@ fn part_share(p: u32, uv: vec2<f32>) -> f32 {
         share *= select(number, 1.0 - number, textures[n] != texture);
     }
     return share;
+}
+#endif
+
+#if SHARES
+fn part_share(p: u32, uv: vec2<f32>) -> f32 {
+    return product_of_shares(textures[FIRST_SHARE + p], uv);
 }
 #endif

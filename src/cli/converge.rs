@@ -137,7 +137,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         })?;
     }
     output.event("done", json!({ "report": report.json(), "folder": args.output }))?;
-    output.text(&format!("{}\n{}", report.summary(), args.output.join("converge.html").display()))
+    output.text(&format!("{}{}\n", report.summary(), args.output.join("converge.html").display()))
 }
 
 /// The scene with every combination of what varies, and names that tell them apart.

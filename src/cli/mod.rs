@@ -17,6 +17,7 @@ mod sensor;
 mod sinks;
 mod spectrum;
 mod standing;
+mod stress;
 mod submit;
 mod view;
 
@@ -48,6 +49,7 @@ Examples:
   spectile view cube.zarr                               a page to look at it
   spectile compare cube.zarr reference.zarr             how it differs from another cube
   spectile converge scene.toml -o report                error against run time, as a report
+  spectile stress                                       stiff and extreme cases against their answers
 
 Radiance is in W m-2 sr-1 nm-1, wavelengths are in nm (vacuum), pixels are counted from 0 at the top left.
 
@@ -74,6 +76,7 @@ enum Command {
     Sensor(sensor::Args),
     View(view::Args),
     Converge(converge::Args),
+    Stress(stress::Args),
     /// A task of an array job (written into the batch script by `submit`)
     #[command(hide = true)]
     ArrayTask(array::Args),
@@ -98,6 +101,7 @@ impl Cli {
             Command::Sensor(args) => args.json,
             Command::View(args) => args.json,
             Command::Converge(args) => args.json,
+            Command::Stress(args) => args.json,
             Command::Submit(args) => args.json,
             Command::Spectrum(_) | Command::ArrayTask(_) | Command::ArrayEnd(_) | Command::ArrayProbe(_) => false,
         }
@@ -116,6 +120,7 @@ impl Cli {
             Command::Sensor(args) => sensor::run(args, output),
             Command::View(args) => view::run(args, output),
             Command::Converge(args) => converge::run(args, output),
+            Command::Stress(args) => stress::run(args, output),
             Command::Submit(args) => submit::run(args, output),
             Command::ArrayTask(args) => array::task(args, output),
             Command::ArrayEnd(args) => array::end(args),

@@ -65,6 +65,8 @@ pub struct Emitter {
 pub const EMITS_BOTH_SIDES: u32 = 0x8000_0000;
 /// Bit of [`Emitter::spectrum`], which is then the place among the emitters of the first spectrum of a row over cosines.
 pub const EMITS_BY_ANGLE: u32 = 0x2000_0000;
+/// Bit of [`Emitter::spectrum`], which is then the first of some radiators and, from bit 16, their number.
+pub const EMITS_BY_PLACE: u32 = 0x1000_0000;
 
 /// `Material` in WGSL.
 #[repr(C)]
@@ -111,6 +113,26 @@ pub struct Part {
     pub eta: f32,
     pub eta_least: f32,
     pub eta_greatest: f32,
+}
+
+/// `Radiator` in WGSL: a hot part of a surface that emits by place.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
+pub struct Radiator {
+    /// A `RADIATOR_…`, with flags.
+    pub kind: u32,
+    /// Spectrum ids a | b << 16.
+    pub spectra: u32,
+    /// A spectrum id, and the number of a table over index and cosine << 16.
+    pub inner: u32,
+    pub weight: f32,
+    pub alpha: [f32; 2],
+    pub kelvin: f32,
+    /// Textures, or [`NONE`].
+    pub temperature: u32,
+    pub reflectance: u32,
+    /// Where the textures of its share are, and how many.
+    pub shares: u32,
 }
 
 /// A light without a surface, two vectors of words (shaders/common/lamp.wgsl).
@@ -212,6 +234,7 @@ mod tests {
             include_str!("../../shaders/common/types.wgsl"),
             include_str!("../../shaders/common/tables.wgsl"),
             include_str!("../../shaders/common/material.wgsl"),
+            include_str!("../../shaders/common/radiator.wgsl"),
         ];
         let module = naga::front::wgsl::parse_str(&sources.concat()).unwrap();
         let found = module.types.iter().find_map(|(_, t)| match &t.inner {
@@ -285,6 +308,7 @@ mod tests {
             eta_least,
             eta_greatest
         });
+        same_layout!(Radiator { kind, spectra, inner, weight, alpha, kelvin, temperature, reflectance, shares });
         assert_eq!(size_of::<Primitive>(), 48);
         let constants = [
             ("COUNTER_OVERFLOW", offset_of!(Counters, overflow)),

@@ -78,6 +78,9 @@ fn parts<'a>(prepared: &'a Prepared, windows: &Windows) -> Vec<(String, &'a [u8]
         parts.push(("textures".into(), bytemuck::cast_slice(&textures.words)));
         parts.push(("texels".into(), bytemuck::cast_slice(&textures.texels)));
     }
+    if let Some(radiators) = &prepared.radiators {
+        parts.push(("radiators".into(), bytemuck::cast_slice(&radiators.all)));
+    }
     if !prepared.accel.attributes.is_empty() {
         parts.push(("attributes".into(), bytemuck::cast_slice(&prepared.accel.attributes)));
     }

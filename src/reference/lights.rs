@@ -161,7 +161,10 @@ fn shares(scene: &Scene, area: &[f64], radius: f64, sky: Option<&Sky>, materials
     shares
 }
 
-/// Thermal radiance of both sides at the channels' centres, averaged over the hemisphere; `None` where there is none.
+/// Places along u and along v that stand for a textured surface.
+const TEXTURED_PLACES: u32 = 6;
+
+/// Thermal radiance of both sides at the channels' centres, averaged over the hemisphere and over texture coordinates; `None` where there is none.
 fn heat(scene: &Scene, bsdf: &Bsdf) -> Option<Vec<f64>> {
     if !bsdf.is_hot() {
         return None;
@@ -169,13 +172,17 @@ fn heat(scene: &Scene, bsdf: &Bsdf) -> Option<Vec<f64>> {
     let mut spectra = SpectralValues::new(scene);
     spectra.begin(0.5);
     spectra.fill(bsdf.spectra());
-    // Any place will do: what is chosen too seldom there is met instead.
-    spectra.look_up(bsdf.textures(), glam::DVec2::splat(0.5));
+    // Some places: what is chosen too seldom is met instead.
+    let places = if bsdf.textures().is_empty() { 1 } else { TEXTURED_PLACES };
     let (mut sum, mut directions) = (vec![0.0; scene.channels.len()], 0.0);
-    for o in hemisphere() {
-        directions += 1.0;
-        for inside in [false, true] {
-            bsdf.emit(&Vertex { o, inside, spectra: &spectra, alive: 0..sum.len() }, &mut sum);
+    for i in 0..places * places {
+        let at = glam::DVec2::new(f64::from(i % places), f64::from(i / places)) + 0.5;
+        spectra.look_up(bsdf.textures(), at / f64::from(places));
+        for o in hemisphere() {
+            directions += 1.0;
+            for inside in [false, true] {
+                bsdf.emit(&Vertex { o, inside, spectra: &spectra, alive: 0..sum.len() }, &mut sum);
+            }
         }
     }
     sum.iter_mut().for_each(|radiance| *radiance /= directions);

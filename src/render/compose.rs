@@ -64,7 +64,14 @@ impl Prepared {
         if general.map.is_some() {
             modules.push(shader::MAP);
         }
-        modules.extend([shader::RECORD, shader::TABLES, shader::MATERIAL, shader::GGX, shader::BSDF]);
+        modules.extend([shader::RECORD, shader::APPEND, shader::TABLES, shader::MATERIAL]);
+        modules.extend([shader::GGX, shader::BSDF, shader::CHOICE]);
+        if general.radiators.is_some() {
+            modules.push(shader::RADIATOR);
+        }
+        if general.hot || general.radiators.is_some() {
+            modules.push(shader::HEAT);
+        }
         if general.media.is_some() {
             modules.extend([shader::VOLUME, shader::MEDIUM]);
         }
@@ -93,6 +100,9 @@ impl Prepared {
             }
             if general.map.is_some() {
                 modules.push(shader::MAP_VALUE);
+            }
+            if general.media.is_some() || general.wavelength.is_some() {
+                modules.push(shader::PLANCK);
             }
             if let Some(media) = &general.media {
                 modules.push(shader::EXTINCTION);
@@ -135,15 +145,25 @@ impl Prepared {
         d.set("ROUGH_BASE", general.rough_base).set("OP_ETA_TABLE", rough_glass || general.rough_base);
         if let Some(media) = &general.media {
             d.set("MEDIA", true).constant("OUTER_VOLUME", media.outer).constant("MOST_STRETCHES", media.stretches);
-            if let Some([wavelength, columns]) = media.grids {
+            if let Some(columns) = media.grids {
                 d.set("GRIDS", true).set("MOST_COLUMNS", columns);
-                d.constant("WAVELENGTH", wavelength);
             }
         }
+        if let Some(wavelength) = general.wavelength {
+            d.set("PLANCK", true).constant("WAVELENGTH", wavelength);
+        }
+        let radiators = general.radiators.unwrap_or_default();
+        d.set("RADIATORS", general.radiators.is_some()).set("HOT_LAMPS", radiators.lamps);
+        d.set("HOT_FACETS", radiators.facets).set("HOT_MIRRORS", radiators.mirrors);
+        d.set("HOT_VARNISH", radiators.varnish).set("HOT_COATS", radiators.coats);
+        d.set("HOT_TEXTURED", radiators.textured).set("HOT_NUMBERS", radiators.numbers);
+        d.set("HOT_RANDOM", general.hot || radiators.facets);
         d.set("OP_ONLY", general.dispersion);
-        d.set("TEXTURES", general.textures).set("TEXTURED", general.textured).set("KEPT", general.textured_base);
+        d.set("TEXTURES", general.textures).set("TEXTURED", general.textured || radiators.textured);
+        d.set("KEPT", general.textured_base || radiators.textured);
         d.set("COLOURS", general.colours).set("MIXTURES", general.mixtures).set("SHARES", general.shares);
-        d.set("TEXEL_NUMBERS", general.mixtures || general.shares);
+        d.set("TEXEL_NUMBERS", general.mixtures || general.shares || radiators.numbers);
+        d.set("PRODUCTS", general.shares || radiators.numbers);
         d.set("ATTRIBUTES", general.attributes).set("SMOOTH", general.smooth);
         if let Some(surfaces) = &self.surfaces {
             if let Some(first) = surfaces.textures.as_ref().and_then(|textures| textures.first_share) {

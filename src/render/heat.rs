@@ -1,17 +1,23 @@
 //! Hot surfaces as devices have them: emission of objects. Where a surface sends the same radiance in all directions, as
 //! diffuse and black ones and blends of such do, it is a lamp like any other, and costs nothing else. What depends on the
-//! angle (metals, plastics, fronts that differ from backs) is a row of spectra, one for each of some cosines.
+//! angle (metals, plastics, fronts that differ from backs) is a row of spectra, one for each of some cosines. What also
+//! differs from place to place (textures) or by azimuth (brushed metals) is worked out where a path meets it:
+//! `render::radiators`.
 
 use std::borrow::Cow;
 
 use glam::DVec3;
 
+use crate::render::textures::{self, Share};
 use crate::scattering::fresnel::{conductor, dielectric, mean_conductor, mean_dielectric};
 use crate::scattering::{DielectricAlbedo, FACET_COSINES, FacetCosines, ReflectionAlbedo, facet_cosine, index_range};
-use crate::scene::{Bsdf, Emission, MaterialId, Reflectance, SMOOTH, Scene, Sides, Spectrum, SpectrumId, Weight};
+use crate::scene::{
+    Bsdf, Emission, MaterialId, Reflectance, SMOOTH, Scene, Sides, Spectrum, SpectrumId, Temperature, Weight,
+};
 use crate::spectral::{Channels, Curve, planck};
-use crate::{Error, Result};
 
+/// The mean over a hemisphere by projected solid angle.
+const TYPICAL_COSINE: f64 = 2.0 / 3.0;
 /// Cosines (j / (n - 1))³ at which the emission of a side is known; between them it is linear in j.
 pub const COSINES: usize = 128;
 
@@ -20,21 +26,50 @@ pub struct Heat<'a> {
     pub scene: Cow<'a, Scene>,
     /// Spectra of the scene at [`COSINES`] cosines, of fronts and backs.
     pub by_angle: Vec<[Vec<SpectrumId>; 2]>,
-    /// For each object that emits by angle, its place in `by_angle`.
-    pub groups: Vec<Option<usize>>,
+    /// Of surfaces that emit otherwise at every place; each once.
+    pub radiating: Vec<Radiating>,
+    /// For each object.
+    pub kinds: Vec<Kind>,
 }
 
-/// What decides an object's emission: its material, and the spectrum of its lamp and whether that is on both sides.
-type Source = (MaterialId, Option<(SpectrumId, bool)>);
+/// How an object emits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// As its emission says, in all directions.
+    Lamp,
+    /// As a place in [`Heat::by_angle`] says; its emission is a typical spectrum.
+    ByAngle(usize),
+    /// As a place in [`Heat::radiating`] says, likewise.
+    ByPlace(usize),
+}
 
-/// A hot part of a surface.
+/// The spectrum of an object's lamp, and whether that is on both sides.
+type OfLamp = Option<(SpectrumId, bool)>;
+
+/// A surface of hot parts, and its lamp.
+pub struct Radiating {
+    pub parts: Vec<HotPart>,
+    pub lamp: OfLamp,
+}
+
+/// A hot part of a material, at the end of its blends.
+#[derive(Debug, Clone)]
+pub struct HotPart {
+    pub material: MaterialId,
+    pub weight: f64,
+    /// What blend textures leave of it.
+    pub shares: Vec<Share>,
+    pub temperature: Temperature,
+}
+
+/// A hot part of a surface that is the same all over.
 struct Leaf<'a> {
     weight: f64,
     kelvin: f64,
     two_sided: bool,
     absorber: Absorber,
     /// What the absorber depends on, in its order.
-    curves: Vec<&'a Curve>,
+    curves: Vec<Cow<'a, Curve>>,
 }
 
 enum Absorber {
@@ -96,26 +131,32 @@ impl Leaf<'_> {
     }
 }
 
-/// `scene` with the heat of its surfaces as emission of objects. Errors: heat that no device renders yet.
-pub fn as_emission(scene: &Scene) -> Result<Heat<'_>> {
-    let mut heat = Heat { scene: Cow::Borrowed(scene), by_angle: Vec::new(), groups: vec![None; scene.objects.len()] };
+/// `scene` with the heat of its surfaces as emission of objects.
+pub fn as_emission(scene: &Scene) -> Heat<'_> {
+    let kinds = vec![Kind::Lamp; scene.objects.len()];
+    let mut heat = Heat { scene: Cow::Borrowed(scene), by_angle: Vec::new(), radiating: Vec::new(), kinds };
     if scene.materials.iter().all(|material| material.temperature.is_none()) {
-        return Ok(heat);
+        return heat;
     }
     let mut lit = scene.clone();
-    let mut made: Vec<(Source, (SpectrumId, Option<usize>))> = Vec::new();
+    let mut made: Vec<((MaterialId, OfLamp), (SpectrumId, Kind))> = Vec::new();
     for (index, object) in scene.objects.iter().enumerate() {
         let Some(material) = object.material else { continue };
         let emitted = object.emission.as_ref().map(|e| (e.radiance, e.sides == Sides::Both));
         let known = made.iter().find(|(key, _)| *key == (material, emitted)).map(|(_, made)| *made);
-        let (radiance, group) = match known {
+        let (radiance, kind) = match known {
             Some(known) => known,
             None => {
-                let mut leaves = Vec::new();
-                collect(scene, material, 1.0, None, &mut leaves)?;
-                if leaves.is_empty() {
+                let mut parts = Vec::new();
+                collect(scene, material, 1.0, &[], None, &mut parts);
+                if parts.is_empty() {
                     continue;
                 }
+                let by_place = parts.iter().any(|part| part.differs_by_place(scene));
+                let leaves: Vec<Leaf> = match by_place {
+                    true => parts.iter().flat_map(|part| part.typical(scene)).collect(),
+                    false => parts.iter().map(|part| part.leaf(scene)).collect(),
+                };
                 let name = format!("heat of \"{}\"", scene.materials[material].name);
                 let of_lamp = |back: bool| {
                     emitted.filter(|(_, both)| *both || !back).map(|(spectrum, _)| &scene.spectra[spectrum].curve)
@@ -125,8 +166,12 @@ pub fn as_emission(scene: &Scene) -> Result<Heat<'_>> {
                     lit.spectra.len() - 1
                 };
                 let even = leaves.iter().all(Leaf::is_even) && emitted.is_none_or(|(_, both)| both);
-                let new = if even {
-                    (push(radiance(of_lamp(false), &leaves, 1.0, false, &scene.channels)), None)
+                let new = if by_place {
+                    let typical = radiance(of_lamp(false), &leaves, TYPICAL_COSINE, false, &scene.channels);
+                    heat.radiating.push(Radiating { parts, lamp: emitted });
+                    (push(typical), Kind::ByPlace(heat.radiating.len() - 1))
+                } else if even {
+                    (push(radiance(of_lamp(false), &leaves, 1.0, false, &scene.channels)), Kind::Lamp)
                 } else {
                     let row = |back: bool| -> Vec<Curve> {
                         let cosine = |j: usize| (j as f64 / (COSINES - 1) as f64).powi(3);
@@ -134,19 +179,19 @@ pub fn as_emission(scene: &Scene) -> Result<Heat<'_>> {
                         (0..COSINES).map(at).collect()
                     };
                     let front = row(false);
-                    // Lights are chosen by what they send at a cosine of 2/3, the mean over the hemisphere.
-                    let typical = front[(0.874 * (COSINES - 1) as f64) as usize].clone();
+                    // Lights are chosen by what they send typically.
+                    let typical = front[(TYPICAL_COSINE.cbrt() * (COSINES - 1) as f64) as usize].clone();
                     let same = leaves.iter().all(|leaf| leaf.two_sided) && emitted.is_none_or(|(_, both)| both);
                     let front: Vec<SpectrumId> = front.into_iter().map(&mut push).collect();
                     let back = if same { front.clone() } else { row(true).into_iter().map(&mut push).collect() };
                     heat.by_angle.push([front, back]);
-                    (push(typical), Some(heat.by_angle.len() - 1))
+                    (push(typical), Kind::ByAngle(heat.by_angle.len() - 1))
                 };
                 made.push(((material, emitted), new));
                 new
             }
         };
-        heat.groups[index] = group;
+        heat.kinds[index] = kind;
         // A white surface is hot in vain.
         if lit.spectra[radiance].curve != Curve::Constant(0.0) {
             lit.objects[index].emission = Some(Emission { radiance, sides: Sides::Both });
@@ -154,79 +199,120 @@ pub fn as_emission(scene: &Scene) -> Result<Heat<'_>> {
     }
     lit.materials.iter_mut().for_each(|material| material.temperature = None);
     heat.scene = Cow::Owned(lit);
-    Ok(heat)
+    heat
 }
 
-fn refusal(scene: &Scene, what: &str, help: &str) -> Error {
-    Error::input(&scene.file, format!("{what}, which cannot be rendered yet: {help}"))
-}
-
-/// The hot parts of a material; `kelvin`: of the blend around, for what has no temperature of its own.
-fn collect<'a>(
-    scene: &'a Scene,
+/// The hot parts of a material; `temperature`: of the blend around, for what has none of its own.
+fn collect(
+    scene: &Scene,
     id: MaterialId,
     weight: f64,
-    kelvin: Option<f64>,
-    out: &mut Vec<Leaf<'a>>,
-) -> Result<()> {
+    shares: &[Share],
+    temperature: Option<Temperature>,
+    out: &mut Vec<HotPart>,
+) {
     let material = &scene.materials[id];
-    let kelvin = material.temperature.or(kelvin);
-    let curve = |spectrum: SpectrumId| &scene.spectra[spectrum].curve;
-    let refuse = |what: &str, help: &str| {
-        Err(refusal(scene, &format!("material \"{}\" is hot and {what}", material.name), help))
-    };
-    if let Bsdf::Blend { a, b, weight: of_b } = material.bsdf {
-        if let Weight::Constant(of_b) = of_b {
-            collect(scene, a, weight * (1.0 - of_b), kelvin, out)?;
-            return collect(scene, b, weight * of_b, kelvin, out);
+    let temperature = material.temperature.or(temperature);
+    match (&material.bsdf, temperature) {
+        (Bsdf::Blend { a, b, weight: Weight::Constant(of_b) }, _) => {
+            collect(scene, *a, weight * (1.0 - of_b), shares, temperature, out);
+            collect(scene, *b, weight * of_b, shares, temperature, out);
         }
-        let mut hot = Vec::new();
-        for part in [a, b] {
-            collect(scene, part, weight, kelvin, &mut hot)?;
+        (Bsdf::Blend { a, b, weight: Weight::Texture(texture) }, _) => {
+            let with = |missing| [shares, &[(*texture, missing)]].concat();
+            collect(scene, *a, weight, &with(true), temperature, out);
+            collect(scene, *b, weight, &with(false), temperature, out);
         }
-        return match hot.is_empty() {
-            true => Ok(()),
-            false => refuse("blended by a texture", "blend by a number, or remove the `temperature`"),
-        };
-    }
-    let Some(kelvin) = kelvin.filter(|_| weight > 0.0) else { return Ok(()) };
-    let one_reflectance = |reflectance: Reflectance| match reflectance {
-        Reflectance::Spectrum(spectrum) => Ok(curve(spectrum)),
-        Reflectance::Texture(_) => {
-            refuse("textured", "give it one reflectance, or remove the `temperature`").map(|()| curve(0))
-        }
-    };
-    let (absorber, curves) = match material.bsdf {
         // Absorbs nothing.
-        Bsdf::Dielectric { .. } | Bsdf::Blend { .. } => return Ok(()),
-        Bsdf::Black => (Absorber::Black, vec![]),
-        Bsdf::Diffuse { reflectance } => (Absorber::Diffuse, vec![one_reflectance(reflectance)?]),
-        Bsdf::Conductor { roughness: [x, y], .. } if x != y => {
-            return refuse("brushed, of two roughnesses", "give it one roughness, or remove the `temperature`");
+        (Bsdf::Dielectric { .. }, _) | (_, None) => {}
+        (_, Some(temperature)) if weight > 0.0 => {
+            out.push(HotPart { material: id, weight, shares: shares.to_vec(), temperature });
         }
-        Bsdf::Conductor { eta, k, roughness, energy_compensation } => {
-            let absorber = match roughness[0] < SMOOTH {
-                true => Absorber::Mirror,
-                false => Absorber::RoughMetal {
-                    facets: FacetCosines::new(roughness),
-                    again: energy_compensation.then(|| ReflectionAlbedo::new(roughness)),
-                },
+        _ => {}
+    }
+}
+
+impl HotPart {
+    /// Whether what it emits depends on more than the cosine.
+    fn differs_by_place(&self, scene: &Scene) -> bool {
+        let bsdf = &scene.materials[self.material].bsdf;
+        let textured = match bsdf {
+            Bsdf::Diffuse { reflectance } | Bsdf::Plastic { reflectance, .. } => {
+                matches!(reflectance, Reflectance::Texture(_))
+            }
+            Bsdf::Conductor { roughness: [x, y], .. } => x != y && *x >= SMOOTH,
+            Bsdf::Dielectric { .. } | Bsdf::Blend { .. } | Bsdf::Black => false,
+        };
+        textured || !self.shares.is_empty() || matches!(self.temperature, Temperature::Texture(_))
+    }
+
+    /// What it emits, of a part that is the same all over.
+    fn leaf<'a>(&self, scene: &'a Scene) -> Leaf<'a> {
+        let material = &scene.materials[self.material];
+        let curve = |spectrum: SpectrumId| Cow::Borrowed(&scene.spectra[spectrum].curve);
+        let all_over = |reflectance: Reflectance| match reflectance {
+            Reflectance::Spectrum(spectrum) => curve(spectrum),
+            Reflectance::Texture(_) => unreachable!("textures differ by place"),
+        };
+        let Temperature::Constant(kelvin) = self.temperature else { unreachable!("textures differ by place") };
+        let (absorber, curves) = match material.bsdf {
+            Bsdf::Black => (Absorber::Black, vec![]),
+            Bsdf::Diffuse { reflectance } => (Absorber::Diffuse, vec![all_over(reflectance)]),
+            Bsdf::Conductor { eta, k, roughness, energy_compensation } => {
+                let absorber = match roughness[0] < SMOOTH {
+                    true => Absorber::Mirror,
+                    false => Absorber::RoughMetal {
+                        facets: FacetCosines::new(roughness),
+                        again: energy_compensation.then(|| ReflectionAlbedo::new(roughness)),
+                    },
+                };
+                (absorber, vec![curve(eta), curve(k)])
+            }
+            Bsdf::Plastic { reflectance, eta, roughness } => {
+                let absorber = match roughness < SMOOTH {
+                    true => Absorber::Varnish,
+                    false => Absorber::RoughPlastic {
+                        facets: FacetCosines::new([roughness; 2]),
+                        coat: DielectricAlbedo::new(roughness, index_range(&curve(eta), &scene.channels)),
+                    },
+                };
+                (absorber, vec![all_over(reflectance), curve(eta)])
+            }
+            Bsdf::Dielectric { .. } | Bsdf::Blend { .. } => unreachable!("`collect` has none"),
+        };
+        Leaf { weight: self.weight, kelvin, two_sided: material.two_sided, absorber, curves }
+    }
+
+    /// What it emits on the whole, for choosing among lights: facets lie flat, textures are their means, of temperatures a
+    /// few. Something wherever the part emits anywhere.
+    fn typical<'a>(&self, scene: &'a Scene) -> Vec<Leaf<'a>> {
+        let material = &scene.materials[self.material];
+        let curve = |spectrum: SpectrumId| Cow::Borrowed(&scene.spectra[spectrum].curve);
+        let mean = |reflectance: Reflectance| match reflectance {
+            Reflectance::Spectrum(spectrum) => curve(spectrum),
+            Reflectance::Texture(texture) => Cow::Owned(textures::mean_reflectance(scene, texture)),
+        };
+        let share = |&(texture, missing): &Share| {
+            let mean = textures::mean_number(&scene.textures[texture]);
+            if missing { 1.0 - mean } else { mean }
+        };
+        let weight = self.weight * self.shares.iter().map(share).product::<f64>();
+        let temperatures = match self.temperature {
+            Temperature::Constant(kelvin) => vec![(1.0, kelvin)],
+            Temperature::Texture(texture) => textures::typical_numbers(&scene.textures[texture]),
+        };
+        let leaf = |(share, kelvin): (f64, f64)| {
+            let (absorber, curves) = match material.bsdf {
+                Bsdf::Black => (Absorber::Black, vec![]),
+                Bsdf::Diffuse { reflectance } => (Absorber::Diffuse, vec![mean(reflectance)]),
+                Bsdf::Conductor { eta, k, .. } => (Absorber::Mirror, vec![curve(eta), curve(k)]),
+                Bsdf::Plastic { reflectance, eta, .. } => (Absorber::Varnish, vec![mean(reflectance), curve(eta)]),
+                Bsdf::Dielectric { .. } | Bsdf::Blend { .. } => unreachable!("`collect` has none"),
             };
-            (absorber, vec![curve(eta), curve(k)])
-        }
-        Bsdf::Plastic { reflectance, eta, roughness } => {
-            let absorber = match roughness < SMOOTH {
-                true => Absorber::Varnish,
-                false => Absorber::RoughPlastic {
-                    facets: FacetCosines::new([roughness; 2]),
-                    coat: DielectricAlbedo::new(roughness, index_range(curve(eta), &scene.channels)),
-                },
-            };
-            (absorber, vec![one_reflectance(reflectance)?, curve(eta)])
-        }
-    };
-    out.push(Leaf { weight, kelvin, two_sided: material.two_sided, absorber, curves });
-    Ok(())
+            Leaf { weight: weight * share, kelvin, two_sided: material.two_sided, absorber, curves }
+        };
+        temperatures.into_iter().map(leaf).collect()
+    }
 }
 
 /// E + Σ w ε B(λ, T) at a cosine, within `channels`.
@@ -245,7 +331,7 @@ fn radiance(emitted: Option<&Curve>, leaves: &[Leaf], cosine: f64, back: bool, c
             None => {}
         }
     }
-    let tables = emitted.into_iter().chain(leaves.iter().flat_map(|leaf| leaf.curves.iter().copied()));
+    let tables = emitted.into_iter().chain(leaves.iter().flat_map(|leaf| leaf.curves.iter().map(|curve| &**curve)));
     let tables: Vec<&Curve> = tables.collect();
     let at = |nm: f64, values: &[f64]| {
         let (lamp, mut values) = values.split_at(usize::from(emitted.is_some()));
@@ -266,7 +352,7 @@ mod tests {
 
     fn leaf<'a>(reflectance: Option<&'a Curve>, weight: f64, kelvin: f64) -> Leaf<'a> {
         let absorber = if reflectance.is_some() { Absorber::Diffuse } else { Absorber::Black };
-        Leaf { weight, kelvin, two_sided: true, absorber, curves: reflectance.into_iter().collect() }
+        Leaf { weight, kelvin, two_sided: true, absorber, curves: reflectance.into_iter().map(Cow::Borrowed).collect() }
     }
 
     /// Means of every channel to 2e-5, also 30 orders below the peak.

@@ -5,10 +5,10 @@ use glam::{DAffine3, DVec3};
 use crate::accel::Accel;
 use crate::gpu::layout::{NONE, Primitive};
 use crate::scene::{Bsdf, Field, Interior, MaterialId, Medium, Projection, Scene, SpectrumId};
-use crate::spectral::{Curve, Outside, planck};
+use crate::spectral::{Curve, planck};
 use crate::{Error, Result};
 
-use super::surfaces::Needed;
+use super::surfaces::{Needed, wavelength};
 
 /// Numbers of volumes have 8 bits in a path's state, of which 0 is none.
 const MOST_VOLUMES: usize = 254;
@@ -46,8 +46,8 @@ pub struct Media {
 struct Volume<'a> {
     medium: &'a Medium,
     interior: Option<Interior>,
-    /// The index of refraction there, where its surface is a dielectric: radiance in matter is n² of that in a vacuum, and so
-    /// are sources.
+    /// The index of refraction behind its surface over that before, where that is a dielectric; then the index there, of all
+    /// bodies around it: radiance in matter is n² of that in a vacuum, and so are sources.
     index: Option<Curve>,
 }
 
@@ -98,7 +98,11 @@ impl Media {
         };
         media.volumes.resize(HEAD + WORDS * volumes.len(), 0);
         media.volumes[0] = (1.0 / accel.space.scale as f32).to_bits();
-        for (index, volume) in volumes.iter().enumerate() {
+        let within: Vec<Option<Curve>> = (0..volumes.len())
+            .map(|i| product_of_indices(scene, &volumes, &media.bodies_around(i as u32 + 1, &accel.primitives)))
+            .collect();
+        for (index, (volume, within)) in volumes.iter_mut().zip(within).enumerate() {
+            volume.index = within;
             media.fill(scene, accel, index, volume);
         }
         let around = media.around_camera(scene, accel)?;
@@ -190,13 +194,8 @@ impl Media {
         self.most_absorbers = self.most_absorbers.max(medium.absorbers.len() as u32);
         self.cells += size.iter().sum::<u32>() + 3;
         if self.wavelength.is_none() {
-            // µm, linear in every channel.
-            let bounds = scene.channels.bounds.iter().flatten();
-            let [low, high] = bounds.fold([f64::INFINITY, 0.0f64], |[low, high], &nm| [low.min(nm), high.max(nm)]);
-            let curve =
-                Curve::Linear { nm: vec![low, high], value: vec![low * 1e-3, high * 1e-3], outside: Outside::Hold };
             self.wavelength = Some(self.spectra.len());
-            self.spectra.push(Needed::Derived("wavelength".into(), curve));
+            self.spectra.push(wavelength(scene));
         }
     }
 
@@ -240,8 +239,22 @@ impl Media {
         Ok([around as u32, (around >> 32) as u32])
     }
 
+    /// Volume `number` and those around it, as they are at one place of its surface; the innermost first.
+    fn bodies_around(&self, number: u32, primitives: &[Primitive]) -> Vec<u32> {
+        let own = primitives.iter().zip(&self.boundaries).find(|(_, boundary)| **boundary & 0xff == number);
+        let around = own.map(|(primitive, _)| self.list_around(place_on(primitive), primitives)).unwrap_or_default();
+        let outer = around.into_iter().filter(|other| *other != number);
+        std::iter::once(number).chain(outer).collect()
+    }
+
     /// The volumes around a point in device units; `None` where they are more than a path can hold.
     fn around(&self, point: DVec3, primitives: &[Primitive]) -> Option<u64> {
+        let around = self.list_around(point, primitives);
+        (around.len() <= 8).then(|| around.iter().rev().fold(0, |word, &n| word << 8 | u64::from(n)))
+    }
+
+    /// The volumes around a point in device units, the innermost first.
+    fn list_around(&self, point: DVec3, primitives: &[Primitive]) -> Vec<u32> {
         // No edge of a model is likely to lie in this direction.
         let direction = DVec3::new(0.367_879_441, 0.577_215_664, 0.728_913_7).normalize();
         let mut crossings: Vec<(f64, u32, bool)> = Vec::new();
@@ -265,7 +278,7 @@ impl Media {
             }
         }
         around.extend((self.outer != NONE).then_some(self.outer + 1));
-        (around.len() <= 8).then(|| around.iter().rev().fold(0, |word, &n| word << 8 | u64::from(n)))
+        around
     }
 }
 
@@ -275,6 +288,28 @@ fn index(scene: &Scene, material: MaterialId) -> Option<Curve> {
     let (curve, bounds) = (&scene.spectra[eta].curve, &scene.channels.bounds);
     let mean = || bounds.iter().map(|b| curve.mean(b[0], b[1])).sum::<f64>() / bounds.len() as f64;
     Some(if dispersion { curve.clone() } else { Curve::Constant(mean()) })
+}
+
+/// The index of a place in volumes (numbers + 1), each of which knows its own over what is around it; `None` where none has one.
+fn product_of_indices(scene: &Scene, volumes: &[Volume], around: &[u32]) -> Option<Curve> {
+    let curves = around.iter().filter_map(|number| volumes.get(*number as usize - 1)?.index.as_ref());
+    let curves: Vec<&Curve> = curves.collect();
+    match curves[..] {
+        [] => None,
+        [one] => Some(one.clone()),
+        _ => Some(Curve::derived(&curves, &scene.channels, |v| v.iter().product())),
+    }
+}
+
+/// A point on a primitive.
+fn place_on(p: &Primitive) -> DVec3 {
+    let [a, b, c] = [p.a, p.b, p.c].map(|v| DVec3::from(v.map(f64::from)));
+    match p.tag >> 24 {
+        1 => a + b.x * DVec3::Z,
+        2 => a,
+        3 => 0.5 * (a + b) + c.x * (b - a).any_orthogonal_vector().normalize(),
+        _ => (a + b + c) / 3.0,
+    }
 }
 
 /// n² B(λ, T).

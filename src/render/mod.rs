@@ -14,6 +14,7 @@ pub mod plan;
 pub mod pool;
 pub mod prepare;
 pub mod queue;
+pub mod radiators;
 pub mod rng;
 pub mod schedule;
 pub mod sky;

@@ -2,8 +2,8 @@
 
 use crate::accel::{Accel, MAX_MATERIALS};
 use crate::gpu::layout::{
-    EMITS_BOTH_SIDES, EMITS_BY_ANGLE, EMITTER_IS_LAMP, Emitter, Frame, LAMP_DIRECTIONAL, LAMP_POINT, LAMP_SUN, Lamp,
-    Material, NONE,
+    EMITS_BOTH_SIDES, EMITS_BY_ANGLE, EMITS_BY_PLACE, EMITTER_IS_LAMP, Emitter, Frame, LAMP_DIRECTIONAL, LAMP_POINT,
+    LAMP_SUN, Lamp, Material, NONE,
 };
 use crate::gpu::self_test::LOOP_LIMIT;
 use crate::render::emission::{Emitted, Share};
@@ -11,6 +11,7 @@ use crate::render::heat;
 use crate::render::integration::Integration;
 use crate::render::lights::{LightPicks, STEPS, light_picks};
 use crate::render::media::Media;
+use crate::render::radiators::{self, Radiators};
 use crate::render::sky::SkyMap;
 use crate::render::surfaces::{Kind, Needed, Surfaces};
 use crate::scene::{
@@ -80,6 +81,10 @@ pub struct General {
     pub suns: u32,
     /// Surfaces that emit by angle.
     pub hot: bool,
+    /// And by place.
+    pub radiators: Option<radiators::Features>,
+    /// Id of the wavelength's spectrum, where evaluation works out Planck's law.
+    pub wavelength: Option<u32>,
     pub map: Option<Map>,
     pub media: Option<MediaShape>,
 }
@@ -89,8 +94,8 @@ pub struct General {
 pub struct MediaShape {
     pub outer: u32,
     pub stretches: u32,
-    /// Id of the wavelength's spectrum, and the most columns of an absorber, where there are grids.
-    pub grids: Option<[u32; 2]>,
+    /// The most columns of an absorber, where there are grids.
+    pub grids: Option<u32>,
 }
 
 /// An environment map, as shaders are composed for it.
@@ -142,6 +147,8 @@ pub struct Prepared {
     /// Emitting primitives, then lamps.
     pub emitters: Vec<Emitter>,
     pub lamps: Vec<Lamp>,
+    /// What emits by place.
+    pub radiators: Option<Radiators>,
     /// The environment, where it is a map.
     pub sky: Option<SkyMap>,
     pub picks: LightPicks,
@@ -178,7 +185,7 @@ impl Prepared {
 
     /// `scene` in the channels that the device renders.
     fn flatten(scene: &Scene, seed: u64, integration: Option<Integration>) -> Result<Prepared> {
-        let heat = heat::as_emission(scene)?;
+        let heat = heat::as_emission(scene);
         let scene = &*heat.scene;
         let accel = Accel::build(scene);
         if scene.materials.len() > MAX_MATERIALS {
@@ -192,9 +199,14 @@ impl Prepared {
             || !scene.lights.is_empty()
             || sky.is_some()
             || !scene.media.is_empty()
-            || !heat.by_angle.is_empty();
+            || !heat.by_angle.is_empty()
+            || !heat.radiating.is_empty();
         let mut media = Media::new(scene, &accel)?;
         let mut surfaces = general.then(|| Surfaces::new(scene));
+        let mut radiators = match &mut surfaces {
+            Some(surfaces) if !heat.radiating.is_empty() => Some(Radiators::new(scene, &heat.radiating, surfaces)?),
+            _ => None,
+        };
         let axis = surfaces.as_mut().zip(sky.as_ref()).map(|(surfaces, sky)| {
             surfaces.spectra.push(Needed::Exact("places in the environment map".into(), sky.axis.clone()));
             surfaces.spectra.len() - 1
@@ -216,14 +228,19 @@ impl Prepared {
         if let Some(surfaces) = &mut surfaces {
             surfaces.name_spectra(|position| tables.ids[ids.needed[position]]);
         }
+        if let Some(radiators) = &mut radiators {
+            radiators.name_spectra(|position| tables.ids[ids.needed[position]]);
+        }
         if let Some(media) = &mut media {
             media.name_spectra(|position| tables.ids[ids.needed[media_spectra + position]]);
         }
         let media_shape = media.as_ref().map(|m| MediaShape {
             outer: m.outer,
             stretches: m.stretches,
-            grids: m.wavelength.map(|w| [tables.ids[ids.needed[media_spectra + w]], m.most_columns]),
+            grids: m.wavelength.map(|_| m.most_columns),
         });
+        let of_grids = media.as_ref().and_then(|m| m.wavelength).map(|w| tables.ids[ids.needed[media_spectra + w]]);
+        let wavelength = of_grids.or(radiators.as_ref().map(|r| r.wavelength));
 
         let factor = |s: usize| tables.ids[ids.factors[&s]];
         let source = |s: usize| tables.ids[ids.sources[&s]];
@@ -249,9 +266,10 @@ impl Prepared {
             .map(|(&(primitive, object, area), &pick)| {
                 let emission = scene.objects[object].emission.as_ref().expect("emitters come from emitting objects");
                 let sides = if emission.sides == Sides::Both { EMITS_BOTH_SIDES } else { 0 };
-                let spectrum = match heat.groups[object] {
-                    None => source(emission.radiance),
-                    Some(group) => (first_row + 2 * group * heat::COSINES) as u32 | EMITS_BY_ANGLE,
+                let spectrum = match (heat.kinds[object], &radiators) {
+                    (heat::Kind::ByAngle(group), _) => (first_row + 2 * group * heat::COSINES) as u32 | EMITS_BY_ANGLE,
+                    (heat::Kind::ByPlace(place), Some(radiators)) => radiators.words[place] | EMITS_BY_PLACE,
+                    _ => source(emission.radiance),
                 };
                 Emitter { primitive, spectrum: spectrum | sides, pick: pick as f32, area: area as f32 }
             })
@@ -263,6 +281,8 @@ impl Prepared {
         let suns = scene.lights.iter().filter(|light| matches!(light, Light::Sun { .. })).count() as u32;
         let of = |surfaces: &Surfaces| General {
             hot: !heat.by_angle.is_empty(),
+            radiators: radiators.as_ref().map(|r| r.features),
+            wavelength,
             lamps: !lamps.is_empty(),
             suns,
             map,
@@ -289,6 +309,7 @@ impl Prepared {
             media,
             emitters,
             lamps,
+            radiators,
             sky,
             picks,
             spectrum_names: ids.names,
@@ -397,7 +418,9 @@ fn spectral_tables<'a>(
         Bsdf::Diffuse { reflectance: Reflectance::Spectrum(reflectance) } => Some(reflectance),
         _ => None,
     });
-    let sources = scene.objects.iter().filter_map(|o| o.emission.as_ref().map(|e| e.radiance));
+    let kinds = scene.objects.iter().zip(&heat.kinds);
+    let sources = kinds.filter(|(_, kind)| !matches!(kind, heat::Kind::ByPlace(_)));
+    let sources = sources.filter_map(|(object, _)| object.emission.as_ref().map(|e| e.radiance));
     let sources = sources.chain(scene.environment.as_ref().and_then(|e| e.uniform().or(daylight(e))));
     let sources = sources.chain(scene.lights.iter().map(|light| light.spectrum()));
     let sources = sources.chain(heat.by_angle.iter().flatten().flatten().copied());
@@ -487,12 +510,15 @@ fn max_records(frame: &Frame, features: Features, surfaces: Option<&Surfaces>, m
     let bounces = frame.max_bounces;
     let general = features.general.unwrap_or_default();
     // Where a path leaves the scene: the environment, and suns that may cover one another.
-    let emission = if features.emitters { bounces + 1 } else { 1 } + general.suns;
+    let hot = general.radiators.map_or(0, |radiators| radiators.records);
+    let emission = if features.emitters { (bounces + 1).saturating_mul(hot.max(1)) } else { 1 } + general.suns;
     // A direction in a map is an instruction of its own, and parts a diffuse vertex in two.
     let aimed = if general.map.is_some() { 2 } else { 0 };
     // The way to each vertex, and from each to a light; a vertex that aims through a medium has no record for both.
     let way = media.map_or(0, Media::way_records);
     let through = if media.is_some() { way + 2 } else { 0 };
+    // What is aimed at may be hot: its records, put aside and back, and a diffuse vertex in two.
+    let aimed = aimed + if hot > 0 { hot + 3 } else { 0 };
     let vertex = surfaces.map_or(1, |s| s.vertex_records) + aimed + way + through;
     (emission + way).saturating_add(bounces.saturating_mul(vertex))
 }

@@ -11,7 +11,7 @@ use crate::render::textures::{self, Share, Textures};
 use crate::scattering::fresnel::{self, mean_conductor, mean_dielectric};
 use crate::scattering::{DielectricAlbedo, ReflectionAlbedo, ReflectionProbability, index_range};
 use crate::scene::{Bsdf, MaterialId, Reflectance, SMOOTH, Scene, SpectrumId, Texture, TextureKind, Weight};
-use crate::spectral::Curve;
+use crate::spectral::{Curve, Outside};
 
 /// What a part is: the `KIND_…` of `shaders/common/material.wgsl`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -116,7 +116,6 @@ impl Surfaces {
             }
             surfaces.textures = Some(textures);
         }
-        surfaces.albedos.clear();
         surfaces
     }
 
@@ -147,6 +146,7 @@ impl Surfaces {
                 _ => part.ab = low(part.ab),
             }
         }
+        self.albedos.clear();
         // Where nothing scatters, shaders still bind a part.
         if self.parts.is_empty() {
             self.parts.push(Part::default());
@@ -455,7 +455,7 @@ impl Surfaces {
     }
 
     /// The position of a scene's spectrum among those needed.
-    fn spectrum(&mut self, id: SpectrumId) -> u32 {
+    pub(super) fn spectrum(&mut self, id: SpectrumId) -> u32 {
         let known = self.spectra.iter().position(|s| *s == Needed::Scene(id));
         known.unwrap_or_else(|| {
             self.spectra.push(Needed::Scene(id));
@@ -463,9 +463,18 @@ impl Surfaces {
         }) as u32
     }
 
-    fn derived(&mut self, name: String, curve: Curve) -> u32 {
-        self.spectra.push(Needed::Derived(name, curve));
+    pub(super) fn derived(&mut self, name: String, curve: Curve) -> u32 {
+        self.need(Needed::Derived(name, curve))
+    }
+
+    pub(super) fn need(&mut self, spectrum: Needed) -> u32 {
+        self.spectra.push(spectrum);
         self.spectra.len() as u32 - 1
+    }
+
+    /// Appends what blend textures leave of something, and gives where that stands.
+    pub(super) fn append_shares(&mut self, shares: &[Share]) -> u32 {
+        self.textures.as_mut().expect("shares are of textures").append_shares(shares)
     }
 
     fn table(&mut self, values: &[f32]) -> u32 {
@@ -473,13 +482,13 @@ impl Surfaces {
         (self.tables.len() - values.len()) as u32
     }
 
-    fn dielectric_albedo(&mut self, alpha: f64, range: [f64; 2]) -> Arc<DielectricAlbedo> {
+    pub(super) fn dielectric_albedo(&mut self, alpha: f64, range: [f64; 2]) -> Arc<DielectricAlbedo> {
         let key = [alpha, range[0], range[1]].map(f64::to_bits);
         Arc::clone(self.albedos.entry(key).or_insert_with(|| Arc::new(DielectricAlbedo::new(alpha, range))))
     }
 
     /// Appends a table over index and cosine, as `eta_table` in `program.wgsl` reads it, and gives its number.
-    fn eta_table(&mut self, albedo: &DielectricAlbedo) -> u32 {
+    pub(super) fn eta_table(&mut self, albedo: &DielectricAlbedo) -> u32 {
         let aligned = self.tables.len().next_multiple_of(ROW);
         self.tables.resize(aligned, 0.0);
         let (first, step, columns) = albedo.columns();
@@ -492,12 +501,20 @@ impl Surfaces {
 }
 
 /// Most records that a textured reflectance takes.
-fn texture_records(texture: &Texture) -> u32 {
+pub(super) fn texture_records(texture: &Texture) -> u32 {
     match &texture.kind {
         TextureKind::Colour => 4,
         TextureKind::Mixture(endmembers) => endmembers.len() as u32,
         TextureKind::Number => unreachable!("numbers are no reflectance"),
     }
+}
+
+/// The wavelength in µm, linear in every channel.
+pub(super) fn wavelength(scene: &Scene) -> Needed {
+    let bounds = scene.channels.bounds.iter().flatten();
+    let [low, high] = bounds.fold([f64::INFINITY, 0.0f64], |[low, high], &nm| [low.min(nm), high.max(nm)]);
+    let curve = Curve::Linear { nm: vec![low, high], value: vec![low * 1e-3, high * 1e-3], outside: Outside::Hold };
+    Needed::Derived("wavelength".into(), curve)
 }
 
 /// The index of a boundary.

@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 
 use crate::gpu::layout::NONE;
-use crate::scene::{Scene, SpectrumId, Texture, TextureKind};
+use crate::scene::{Scene, SpectrumId, Texture, TextureId, TextureKind};
 use crate::spectral::upsample::{self, smooth_of};
 use crate::spectral::{Curve, Outside};
 
@@ -67,14 +67,20 @@ impl Textures {
         if of_parts.iter().all(Vec::is_empty) {
             return;
         }
-        self.first_share = Some(self.words.len() as u32);
-        let mut at = self.words.len() + of_parts.len();
-        for shares in of_parts {
-            self.words.push((at << 8 | shares.len()) as u32);
-            at += shares.len();
+        let first = self.words.len();
+        self.first_share = Some(first as u32);
+        self.words.resize(first + of_parts.len(), 0);
+        for (p, shares) in of_parts.iter().enumerate() {
+            self.words[first + p] = self.append_shares(shares);
         }
+    }
+
+    /// Appends shares, and gives the word that tells where they are and how many.
+    pub fn append_shares(&mut self, shares: &[Share]) -> u32 {
+        let at = self.words.len();
         let word = |&(texture, missing): &Share| texture as u32 | u32::from(missing) << 31;
-        self.words.extend(of_parts.iter().flatten().map(word));
+        self.words.extend(shares.iter().map(word));
+        (at << 8 | shares.len()) as u32
     }
 
     /// Replaces positions by the ids that the device's tables gave the spectra.
@@ -89,6 +95,42 @@ impl Textures {
 pub fn visible_place() -> Curve {
     let ends = [upsample::FIRST_NM, upsample::LAST_NM].map(f64::from);
     Curve::Linear { nm: ends.to_vec(), value: vec![0.0, 1.0], outside: Outside::Hold }
+}
+
+/// The mean over the texels of one number.
+pub fn mean_number(texture: &Texture) -> f64 {
+    texture.texels.iter().map(|v| f64::from(*v)).sum::<f64>() / texture.texels.len() as f64
+}
+
+/// Numbers of a texture above 0 that stand for all of them, each with its share of the texels: the largest of some of equally
+/// many.
+pub fn typical_numbers(texture: &Texture) -> Vec<(f64, f64)> {
+    const CLASSES: usize = 8;
+    let mut all: Vec<f32> = texture.texels.iter().copied().filter(|v| *v > 0.0).collect();
+    all.sort_by(f32::total_cmp);
+    let class = |class: &[f32]| {
+        (class.len() as f64 / texture.texels.len() as f64, f64::from(*class.last().expect("chunks are not empty")))
+    };
+    all.chunks(all.len().div_ceil(CLASSES).max(1)).map(class).collect()
+}
+
+/// The mean over the texels of a texture's reflectance; of colours the spectrum of the mean.
+pub fn mean_reflectance(scene: &Scene, texture: TextureId) -> Curve {
+    let texture = &scene.textures[texture];
+    let channels = texture.channels();
+    let texels = (texture.texels.len() / channels) as f64;
+    let mean = |channel: usize| {
+        texture.texels.iter().skip(channel).step_by(channels).map(|v| f64::from(*v)).sum::<f64>() / texels
+    };
+    let means: Vec<f64> = (0..channels).map(mean).collect();
+    match &texture.kind {
+        TextureKind::Mixture(endmembers) => {
+            let curves: Vec<&Curve> = endmembers.iter().map(|&id| &scene.spectra[id].curve).collect();
+            Curve::derived(&curves, &scene.channels, |v| v.iter().zip(&means).map(|(v, mean)| v * mean).sum())
+        }
+        TextureKind::Colour => upsample::reflectance([means[0], means[1], means[2]]),
+        TextureKind::Number => unreachable!("numbers are no reflectance"),
+    }
 }
 
 /// What no texel reflects more than, for each channel of the scene.

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use crate::cube::{Cube, epoch_samples};
 use crate::gpu::adapter::{Gpu, Selection};
+use crate::gpu::layout::Counters;
 use crate::render::plan;
 use crate::render::prepare::Prepared;
 use crate::render::wave::Budget;
@@ -21,6 +22,10 @@ pub struct Image {
     epochs: u32,
     pub samples: u32,
     channels: usize,
+    /// Samples of a path and channel that were not finite, or negative; and paths that found no end in a structure.
+    pub non_finite: u64,
+    pub negative: u64,
+    pub overflow: u64,
 }
 
 /// What `render` would have after an epoch.
@@ -49,7 +54,16 @@ pub struct Reference {
 impl Image {
     fn new(pixels: usize, channels: usize) -> Image {
         let values = vec![0.0; pixels * channels];
-        Image { spread: values.clone(), mean: values, epochs: 0, samples: 0, channels }
+        Image {
+            spread: values.clone(),
+            mean: values,
+            epochs: 0,
+            samples: 0,
+            channels,
+            non_finite: 0,
+            negative: 0,
+            overflow: 0,
+        }
     }
 
     /// Adds an epoch's means of all pixels.
@@ -207,7 +221,10 @@ pub fn render(
         }
         check_interrupt(interrupt)?;
         let began = Instant::now();
+        let mut bad = [0u64; 3];
         let mut place = |collected: crate::render::worker::Collected| {
+            let Counters { non_finite, negative, overflow, .. } = collected.counters;
+            bad = [0, 1, 2].map(|i| bad[i] + u64::from([non_finite, negative, overflow][i]));
             let sums = integration.as_ref().map(|integration| integration.sums(collected.means));
             let means = sums.as_deref().unwrap_or(collected.means);
             let unit_size = tile[0] as usize * tile[1] as usize * channels;
@@ -226,6 +243,8 @@ pub fn render(
         }
         worker.collect(&mut place)?;
         image.add(&epoch_means, samples, full);
+        [image.non_finite, image.negative, image.overflow] =
+            [image.non_finite + bad[0], image.negative + bad[1], image.overflow + bad[2]];
         seconds += began.elapsed().as_secs_f64();
         after(&image, seconds)?;
     }

@@ -5,7 +5,7 @@ use sha2::{Digest, Sha256};
 
 use super::{
     Attributes, Bsdf, Environment, EnvironmentMap, Field, Filter, Light, Medium, Projection, Reflectance, Sampler,
-    Scene, Shape, Sides, Texels, TextureKind, Wavelengths, Weight,
+    Scene, Shape, Sides, Temperature, Texels, TextureKind, Wavelengths, Weight,
 };
 use crate::spectral::{Curve, Outside};
 
@@ -72,7 +72,14 @@ pub fn digest(scene: &Scene) -> String {
             }
         }
         hash.tag(u8::from(material.two_sided));
-        hash.option(material.temperature, Hash::number);
+        hash.option(material.temperature, |hash, temperature| match temperature {
+            Temperature::Constant(kelvin) => hash.number(kelvin),
+            Temperature::Texture(texture) => {
+                // Which no temperature is.
+                hash.number(-1.0);
+                hash.count(texture);
+            }
+        });
     }
     hash.textures(scene);
     hash.count(scene.objects.len());

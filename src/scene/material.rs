@@ -6,7 +6,7 @@ use super::overrides::MATERIAL_KINDS;
 use super::spectrum::{Handle, Quantity, Spectra};
 use super::texture::{self, Number, Textures, is_texture};
 use super::tree::Value;
-use super::{Bsdf, Material, MaterialId, Reflectance, SMOOTH, Texture, Weight};
+use super::{Bsdf, Material, MaterialId, Reflectance, SMOOTH, Temperature, Texture, Weight};
 
 const KINDS: Keys = Keys::new(&MATERIAL_KINDS);
 const DIFFUSE: Keys = Keys::new(&["reflectance", "two_sided", "temperature"]);
@@ -30,7 +30,7 @@ pub enum Kind<'a> {
     Conductor { eta: Handle, k: Handle, roughness: [f64; 2], energy_compensation: bool },
     Dielectric { eta: Handle, dispersion: bool, roughness: f64 },
     Plastic { reflectance: Reflects, eta: Handle, roughness: f64 },
-    Blend { parts: Parts<'a>, weight: Share },
+    Blend { parts: Parts<'a>, weight: Varying },
     Black,
 }
 
@@ -41,9 +41,9 @@ pub enum Reflects {
     Texture(texture::Handle),
 }
 
-/// The share of a blend's second part.
+/// A number that may differ over the surface: the share of a blend's second part, a temperature.
 #[derive(Clone, Copy)]
-pub enum Share {
+pub enum Varying {
     Constant(f64),
     Texture(texture::Handle),
 }
@@ -62,7 +62,7 @@ pub struct Needs {
 pub struct Declared<'a> {
     pub kind: Kind<'a>,
     two_sided: bool,
-    temperature: Option<f64>,
+    temperature: Option<Varying>,
     taken: Option<MaterialId>,
 }
 
@@ -118,7 +118,11 @@ impl<'a> Materials<'a> {
         if let Some(id) = declared.taken {
             return Some(id);
         }
-        let (name, two_sided, temperature) = ((*name).to_owned(), declared.two_sided, declared.temperature);
+        let (name, two_sided) = ((*name).to_owned(), declared.two_sided);
+        let temperature = declared.temperature.map(|temperature| match temperature {
+            Varying::Constant(kelvin) => Temperature::Constant(kelvin),
+            Varying::Texture(handle) => Temperature::Texture(self.textures.take(handle, spectra)),
+        });
         let bsdf = match declared.kind {
             Kind::Diffuse { reflectance } => Bsdf::Diffuse { reflectance: self.take_reflectance(reflectance, spectra) },
             Kind::Conductor { eta, k, roughness, energy_compensation } => {
@@ -134,8 +138,8 @@ impl<'a> Materials<'a> {
             Kind::Blend { ref parts, weight } => {
                 let [a, b] = parts.indices?;
                 let weight = match weight {
-                    Share::Constant(weight) => Weight::Constant(weight),
-                    Share::Texture(handle) => Weight::Texture(self.textures.take(handle, spectra)),
+                    Varying::Constant(weight) => Weight::Constant(weight),
+                    Varying::Texture(handle) => Weight::Texture(self.textures.take(handle, spectra)),
                 };
                 let (a, b) = (self.take_declared(a, spectra), self.take_declared(b, spectra));
                 Bsdf::Blend { a: a?, b: b?, weight }
@@ -166,7 +170,8 @@ impl<'a> Materials<'a> {
     pub fn needs(&self, id: MaterialId) -> Needs {
         let textured =
             |reflectance| Needs { uv: matches!(reflectance, Reflectance::Texture(_)), tangent: false, normal: true };
-        match self.scene[id].bsdf {
+        let material = &self.scene[id];
+        let needs = match material.bsdf {
             Bsdf::Diffuse { reflectance } | Bsdf::Plastic { reflectance, .. } => textured(reflectance),
             Bsdf::Conductor { roughness: [x, y], .. } => Needs { uv: false, tangent: x != y, normal: true },
             Bsdf::Dielectric { .. } => Needs { uv: false, tangent: false, normal: true },
@@ -179,7 +184,8 @@ impl<'a> Materials<'a> {
                 }
             }
             Bsdf::Black => Needs::default(),
-        }
+        };
+        Needs { uv: needs.uv || matches!(material.temperature, Some(Temperature::Texture(_))), ..needs }
     }
 
     pub fn finish(self) -> (Vec<Material>, Vec<Texture>) {
@@ -279,12 +285,12 @@ fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>, textures: &mut Texture
         }
         Some("blend") => {
             let fields = kind.table(BLEND)?;
-            let (kind, temperature) = (blend(&fields, textures), temperature(&fields));
+            let (kind, temperature) = (blend(&fields, textures), temperature(&fields, textures));
             return Some(Declared { kind: kind?, two_sided: true, temperature: temperature?, taken: None });
         }
         _ => (kind.table(BLACK)?, Some(Kind::Black)),
     };
-    let (two_sided, temperature) = (boolean(&fields, "two_sided", true), temperature(&fields));
+    let (two_sided, temperature) = (boolean(&fields, "two_sided", true), temperature(&fields, textures));
     Some(Declared { kind: kind?, two_sided: two_sided?, temperature: temperature?, taken: None })
 }
 
@@ -338,8 +344,13 @@ fn roughness(fields: &Fields) -> Option<f64> {
 }
 
 /// The outer `None` is a mistake that has been said.
-fn temperature(fields: &Fields) -> Option<Option<f64>> {
-    fields.get("temperature").map_or(Some(None), |item| kelvin(&item).map(Some))
+fn temperature(fields: &Fields, textures: &mut Textures) -> Option<Option<Varying>> {
+    let Some(item) = fields.get("temperature") else { return Some(None) };
+    let temperature = match item.node.value {
+        Value::Table(_) => textures.number(&item, Number::Temperature).map(Varying::Texture),
+        _ => kelvin(&item).map(Varying::Constant),
+    };
+    temperature.map(Some)
 }
 
 /// A temperature that `item` holds.
@@ -355,9 +366,9 @@ fn blend<'a>(fields: &Fields<'a>, textures: &mut Textures) -> Option<Kind<'a>> {
     let (a, b) = (part("a"), part("b"));
     let weight = fields.require("weight", "weight = 0.5, the share of b").and_then(|item| {
         if matches!(item.node.value, Value::Table(_)) {
-            return textures.number(&item, Number::Weight).map(Share::Texture);
+            return textures.number(&item, Number::Weight).map(Varying::Texture);
         }
-        item.number_where(|weight| (0.0..=1.0).contains(&weight), "the share of b, in [0, 1]").map(Share::Constant)
+        item.number_where(|weight| (0.0..=1.0).contains(&weight), "the share of b, in [0, 1]").map(Varying::Constant)
     });
     Some(Kind::Blend { parts: Parts { items: [a?, b?], indices: None }, weight: weight? })
 }

@@ -167,9 +167,18 @@ pub struct Material {
     /// Whether the back side (against the geometric normal) scatters like the front; otherwise it absorbs. True, and
     /// without meaning, for dielectrics, whose back is their inside, and for blends, whose parts have their own.
     pub two_sided: bool,
-    /// K, above 0: emits ε(λ, ω) B(λ, T), ε = 1 - what the very same surface sends on of flux along ω, on either side. Of
-    /// a blend: for those of its parts that have none of their own. `None` on dielectrics, which absorb nothing.
-    pub temperature: Option<f64>,
+    /// Emits ε(λ, ω) B(λ, T), ε = 1 - what the very same surface sends on of flux along ω, on either side. Of a blend: for
+    /// those of its parts that have none of their own. `None` on dielectrics, which absorb nothing.
+    pub temperature: Option<Temperature>,
+}
+
+/// How hot a surface is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Temperature {
+    /// K, above 0, all over.
+    Constant(f64),
+    /// A texture of [`TextureKind::Number`], K; what is at 0 K emits nothing.
+    Texture(TextureId),
 }
 
 /// How a surface scatters. Roughness is the α of the GGX distribution in [0, 1]; what is below [`SMOOTH`] is smooth.

@@ -7,5 +7,6 @@ mod scene_builder;
 #[path = "../statistics/mod.rs"]
 mod statistics;
 
+mod by_place;
 mod on_devices;
 mod reference;

@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 use spectile::gpu::layout::{Emitter, Material};
 use spectile::reference;
 use spectile::render::prepare::Prepared;
-use spectile::scene::{Filter, Projection, Scene, Sides};
+use spectile::scene::{Filter, Projection, Scene, Sides, Temperature};
 use spectile::spectral::{Channels, Curve, Outside, planck as law};
 
 use crate::device::{Settings, measure, render};
@@ -122,20 +122,10 @@ fn heat_pays_for_nothing_but_lamps() {
     let cold = closed_forms::isothermal_cavity(5).0;
     let mut hot = cold.clone();
     hot.objects.iter_mut().for_each(|object| object.emission = None);
-    hot.materials.iter_mut().for_each(|material| material.temperature = Some(300.0));
+    hot.materials.iter_mut().for_each(|material| material.temperature = Some(Temperature::Constant(300.0)));
     let [cold, hot] = [cold, hot].map(|scene| Prepared::new(&scene, 0).unwrap_or_else(|e| panic!("{e}")));
     assert_eq!((hot.features, hot.emitters.len()), (cold.features, cold.emitters.len()));
     assert_eq!((size_of::<Emitter>(), size_of::<Material>()), (16, 16));
-}
-
-/// What no device renders yet is refused in one sentence that names it.
-#[test]
-fn brushed_heat_is_refused() {
-    let plate = quad(DVec3::ZERO, DVec3::X, DVec3::Y);
-    let scene = Builder::new().conductor(plate, 0.2, 3.4, [0.1, 0.3]).at_kelvin(300.0).build();
-    let Err(error) = Prepared::new(&scene, 0) else { panic!("accepted") };
-    assert_eq!(error.exit_code(), 2);
-    assert!(error.to_string().contains("brushed"), "{error}");
 }
 
 /// Surfaces whose emission depends on the angle, in an isothermal room: nothing of them can be seen. Emittances are within

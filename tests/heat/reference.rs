@@ -16,7 +16,7 @@ fn estimates(e: &spectile::reference::Estimate) -> Vec<Estimate> {
     e.mean.iter().zip(&e.standard_error).map(|(&mean, &error)| Estimate { mean, error, freedom }).collect()
 }
 
-fn shown(scene: &Scene, samples: u32, seed: u64) -> Vec<Estimate> {
+pub fn shown(scene: &Scene, samples: u32, seed: u64) -> Vec<Estimate> {
     estimates(&render_image(scene, samples, seed))
 }
 

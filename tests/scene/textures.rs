@@ -6,7 +6,7 @@ use exr::prelude::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer,
 use glam::{DMat3, DVec2, DVec3};
 use spectile::Error;
 use spectile::error::Problem;
-use spectile::scene::{self, Bsdf, Reflectance, Scene, TextureKind, Weight};
+use spectile::scene::{self, Bsdf, Reflectance, Scene, Temperature, TextureKind, Weight};
 
 use super::BASE;
 
@@ -174,6 +174,59 @@ fn wrong_textures() {
     ] {
         let problems = load(&text, &files).expect_err(words);
         assert!(problems.len() == 1 && problems[0].to_string().contains(words), "{words}: {problems:?}");
+    }
+}
+
+/// Kelvins from a texture: on every kind of material, which asks for texture coordinates then; black too.
+#[test]
+fn textures_of_temperatures() {
+    let files =
+        [("t.exr", float_exr((2, 1), &[("Y", &[300.0, 0.0])])), ("hot.exr", float_exr((1, 1), &[("T", &[301.0])]))];
+    let with = |temperature: &str| {
+        let hot = format!("[materials.m.black]\ntemperature = {temperature}\n[materials.white");
+        BASE.replacen("[materials.white", &hot, 1).replacen("material = \"white\"", "material = \"m\"", 1)
+    };
+    let scene = load(&with("{ texture = \"t.exr\" }"), &files).unwrap_or_else(|e| panic!("{e:?}"));
+    let m = scene.materials.iter().position(|m| m.name == "m").expect("it is in use");
+    assert_eq!(scene.materials[m].temperature, Some(Temperature::Texture(0)));
+    assert_eq!((&scene.textures[0].texels[..], &scene.textures[0].kind), (&[300.0, 0.0][..], &TextureKind::Number));
+    let object = scene.objects.iter().find(|object| object.material == Some(m)).expect("an object");
+    assert_ne!(object.attributes, scene::Attributes::default());
+    let digests = ["{ texture = \"t.exr\" }", "{ texture = \"hot.exr\" }", "301", "300"];
+    let digests = digests.map(|temperature| load(&with(temperature), &files).expect(temperature).digest);
+    for (i, digest) in digests.iter().enumerate() {
+        assert!(!digests[..i].contains(digest), "{i}");
+    }
+}
+
+#[test]
+fn wrong_textures_of_temperatures() {
+    let files = [
+        ("grey.png", png([2, 1], png::ColorType::Grayscale, &[0, 255])),
+        ("cold.exr", float_exr((2, 1), &[("Y", &[300.0, -5.0])])),
+        ("hot.exr", float_exr((1, 1), &[("Y", &[2e9])])),
+        ("nan.exr", float_exr((1, 1), &[("Y", &[f32::NAN])])),
+        ("two.exr", float_exr((1, 1), &[("a", &[300.0]), ("b", &[400.0])])),
+    ];
+    for (temperature, key, words) in [
+        (
+            "{ texture = \"grey.png\" }",
+            ".texture",
+            &["grey.png is a PNG, which cannot hold temperatures", "OpenEXR"][..],
+        ),
+        ("{ texture = \"cold.exr\" }", ".texture", &["[0, 1e9] K", "is -5 at column 1, row 0"]),
+        ("{ texture = \"hot.exr\" }", ".texture", &["[0, 1e9] K", "2000000000"]),
+        ("{ texture = \"nan.exr\" }", ".texture", &["NaN at column 0"]),
+        ("{ texture = \"two.exr\" }", ".texture", &["2 channels: a, b", "one channel is needed"]),
+        ("{ grid = \"two.exr\" }", ".grid", &["unknown key"]),
+        ("[300, 400]", "", &["must be a number, but is an array"]),
+    ] {
+        let hot = format!("[materials.m.black]\ntemperature = {temperature}\n[materials.white");
+        let text = BASE.replacen("[materials.white", &hot, 1);
+        let problems = load(&text, &files).expect_err(temperature);
+        let found = problems.iter().find(|p| p.key.as_deref() == Some(&*format!("materials.m.black.temperature{key}")));
+        let shown = found.unwrap_or_else(|| panic!("{temperature}: {problems:?}")).to_string();
+        words.iter().for_each(|word| assert!(shown.contains(word), "{temperature}: no {word:?} in {shown}"));
     }
 }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
-use spectile::scene::{Absorber, Camera, Field, Grid, Interior, Medium, Mesh, Object, Shape};
+use spectile::scene::{Absorber, Camera, Field, Grid, Interior, Medium, Mesh, Object, Shape, Temperature};
 use spectile::spectral::{Channels, Curve, Outside, planck as law};
 
 use super::{Builder, IntoCurve, disk, look, narrow};
@@ -11,7 +11,13 @@ use super::{Builder, IntoCurve, disk, look, narrow};
 impl Builder {
     /// The last material has a temperature.
     pub fn at_kelvin(mut self, kelvin: f64) -> Self {
-        self.0.materials.last_mut().expect("a material").temperature = Some(kelvin);
+        self.0.materials.last_mut().expect("a material").temperature = Some(Temperature::Constant(kelvin));
+        self
+    }
+
+    /// The last material has the temperatures of a texture.
+    pub fn heated_by(mut self, texture: usize) -> Self {
+        self.0.materials.last_mut().expect("a material").temperature = Some(Temperature::Texture(texture));
         self
     }
 

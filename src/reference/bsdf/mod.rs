@@ -31,7 +31,9 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use crate::scene::{Bsdf as Description, MaterialId, Reflectance, SMOOTH, Scene, SpectrumId, TextureId, Weight};
+use crate::scene::{
+    Bsdf as Description, MaterialId, Reflectance, SMOOTH, Scene, SpectrumId, Temperature, TextureId, Weight,
+};
 pub use spectra::SpectralValues;
 use thermal::Hot;
 pub use thermal::hemisphere;
@@ -150,22 +152,25 @@ impl Bsdf {
         }
     }
 
-    /// `kelvin`: of the blend around, for what has no temperature of its own.
+    /// `temperature`: of the blend around, for what has no temperature of its own.
     fn add(
         &mut self,
         scene: &Scene,
         material: MaterialId,
         weight: f64,
         shares: &[(TextureId, bool)],
-        kelvin: Option<f64>,
+        temperature: Option<Temperature>,
     ) {
         if weight == 0.0 {
             return;
         }
         let material = &scene.materials[material];
-        let kelvin = material.temperature.or(kelvin);
-        if let Some(kelvin) = kelvin {
-            self.hot.extend(Hot::new(scene, material, weight, shares, kelvin));
+        let temperature = material.temperature.or(temperature);
+        if let Some(temperature) = temperature {
+            if let Temperature::Texture(texture) = temperature {
+                self.textures.push(texture);
+            }
+            self.hot.extend(Hot::new(scene, material, weight, shares, temperature));
         }
         let smooth = |alpha: f64| alpha < SMOOTH;
         let (opaque, lobes): (bool, Vec<Box<dyn Lobe>>) = match material.bsdf {
@@ -191,14 +196,14 @@ impl Bsdf {
                 (true, plastic::lobes(scene, reflectance, eta, roughness))
             }
             Description::Blend { a, b, weight: Weight::Constant(of_b) } => {
-                self.add(scene, a, weight * (1.0 - of_b), shares, kelvin);
-                return self.add(scene, b, weight * of_b, shares, kelvin);
+                self.add(scene, a, weight * (1.0 - of_b), shares, temperature);
+                return self.add(scene, b, weight * of_b, shares, temperature);
             }
             Description::Blend { a, b, weight: Weight::Texture(texture) } => {
                 self.textures.push(texture);
                 let with = |missing| [shares, &[(texture, missing)]].concat();
-                self.add(scene, a, weight, &with(true), kelvin);
-                return self.add(scene, b, weight, &with(false), kelvin);
+                self.add(scene, a, weight, &with(true), temperature);
+                return self.add(scene, b, weight, &with(false), temperature);
             }
         };
         let two_sided = material.two_sided;

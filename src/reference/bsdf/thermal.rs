@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::{Vertex, fresnel};
 use crate::scattering::fresnel::{mean_conductor, mean_dielectric};
 use crate::scattering::{DielectricAlbedo, FACET_COSINES, FacetCosines, ReflectionAlbedo, facet_cosine, index_range};
-use crate::scene::{Bsdf as Description, Material, Reflectance, SMOOTH, Scene, SpectrumId, TextureId};
+use crate::scene::{Bsdf as Description, Material, Reflectance, SMOOTH, Scene, SpectrumId, Temperature, TextureId};
 use crate::spectral::planck;
 
 /// One material, of a blend or by itself, at a temperature.
@@ -15,7 +15,7 @@ pub struct Hot {
     pub weight: f64,
     /// Shares by texture, or what they leave.
     shares: Vec<(TextureId, bool)>,
-    pub kelvin: f64,
+    temperature: Temperature,
     /// Whether its back is as its front; otherwise it is black.
     pub two_sided: bool,
     absorber: Absorber,
@@ -58,7 +58,7 @@ impl Hot {
         material: &Material,
         weight: f64,
         shares: &[(TextureId, bool)],
-        kelvin: f64,
+        temperature: Temperature,
     ) -> Option<Self> {
         let smooth = |alpha: f64| alpha < SMOOTH;
         let absorber = match material.bsdf {
@@ -81,7 +81,7 @@ impl Hot {
             }
             Description::Dielectric { .. } | Description::Blend { .. } => return None,
         };
-        Some(Hot { weight, shares: shares.to_vec(), kelvin, two_sided: material.two_sided, absorber })
+        Some(Hot { weight, shares: shares.to_vec(), temperature, two_sided: material.two_sided, absorber })
     }
 
     /// Adds weight · ε · B of every live channel to `out`.
@@ -90,9 +90,13 @@ impl Hot {
             let number = at.spectra.number(texture);
             if missing { 1.0 - number } else { number }
         };
+        let kelvin = match self.temperature {
+            Temperature::Constant(kelvin) => kelvin,
+            Temperature::Texture(texture) => at.spectra.number(texture),
+        };
         let weight = self.weight * self.shares.iter().map(share).product::<f64>();
         for k in at.alive.clone() {
-            out[k] += weight * self.emittance(at, k) * planck::radiance(at.spectra.wavelength(k), self.kelvin);
+            out[k] += weight * self.emittance(at, k) * planck::radiance(at.spectra.wavelength(k), kelvin);
         }
     }
 
