@@ -214,6 +214,10 @@ fn tables_are_read_by_pandas() {
     let cube = cube(folder.path(), Channels::equal(380.0, 780.0, 4), &[3]);
     let (done, _) = export(folder.path(), &["-o", "all.csv"]);
     whole(&cube).check(folder.path(), "csv", &done["files"], json!({}));
+    let (done, _) =
+        export(folder.path(), &["-o", "part.csv", "--bands", "480nm..680nm,0", "--crop", "9,3,70,20", "--integrated"]);
+    let part = Part { cube: &cube, bands: vec![1, 2, 0], crop: [9, 3, 70, 20], integrated: true };
+    part.check(folder.path(), "csv", &done["files"], json!({}));
 }
 
 #[test]
@@ -247,6 +251,60 @@ fn blocks_put_together_are_the_picture() {
         assert_eq!(values.next(), None);
     }
     assert_eq!(picture, whole(&cube).values().0);
+
+    // Of a part: one block, which is that part.
+    let arguments = ["--blocks", "100", "--bands", "540nm..700nm,0", "--crop", "9,3,70,20", "--integrated"];
+    let (_, _) =
+        export(folder.path(), &[&["-o", "part", "--format", "envi", "--interleave", "bip"], &arguments[..]].concat());
+    let part = Part { cube: &cube, bands: vec![2, 3, 0], crop: [9, 3, 70, 20], integrated: true };
+    let index: Value =
+        serde_json::from_slice(&fs::read(folder.path().join("part/index.json")).expect("an index")).expect("JSON");
+    assert_eq!((&index["units"], &index["bands"][2]["wavelength_nm"]), (&"W m-2 sr-1".into(), &json!(420.0)));
+    let block = json!({ "files": ["x000109_y000053.img", "x000109_y000053.hdr"], "x": [109, 170], "y": [53, 70] });
+    assert_eq!(index["blocks"], json!([block]));
+    let file = fs::read(folder.path().join("part/x000109_y000053.img")).expect("a file");
+    assert_eq!(file, bytemuck::cast_slice::<f32, u8>(&part.values().0));
+}
+
+/// What is wrong with a cube is said by every format, and leaves nothing.
+#[test]
+fn damaged_cubes_are_not_exported() {
+    let folder = tempdir().expect("folder");
+    let cube = cube(folder.path(), Channels::equal(380.0, 780.0, 4), &[]);
+    let spoil = |name: &str, bytes: usize| {
+        let path = cube.path().join(name);
+        let whole = fs::read(&path).expect("read");
+        fs::write(&path, &whole[..bytes]).expect("written");
+        (path, whole)
+    };
+    let refused = |words: &str| {
+        for more in [
+            &["-o", "a.img"][..],
+            &["-o", "a.exr"],
+            &["-o", "a.zarr"],
+            &["-o", "a.csv"],
+            &["-o", "a.png", "--bands", "1"],
+            &["-o", "a.png"],
+            &["-o", "blocks", "--format", "csv", "--blocks", "16"],
+        ] {
+            let output = run(folder.path(), &[&["export", "cube.zarr"], more].concat());
+            let stderr = String::from_utf8_lossy(&output.stderr);
+            assert_eq!(output.status.code(), Some(5), "{more:?}: {stderr}");
+            assert!(stderr.contains("cube.zarr") && stderr.contains(words), "{more:?}: {stderr}");
+            assert!(stderr.starts_with("error: ") && stderr.lines().count() == 1, "{more:?}: {stderr}");
+            assert_eq!(fs::read_dir(folder.path()).expect("list").count(), 1, "{more:?}");
+        }
+    };
+    // The last tile, when most of the work is done; the preview is read where the radiance is not.
+    let spoilt = [spoil("radiance/c/0/4/4", 100), spoil("preview/c/4/4/0", 100)];
+    refused("is damaged");
+    spoilt.iter().for_each(|(path, whole)| fs::write(path, whole).expect("written"));
+    let (path, whole) = spoil("zarr.json", 50);
+    refused("zarr.json is not JSON");
+    fs::remove_file(&path).expect("removed");
+    refused("holds no zarr.json");
+    fs::write(path, whole).expect("written");
+    export(folder.path(), &["-o", "a.csv"]);
 }
 
 #[test]
@@ -354,11 +412,15 @@ fn what_is_interrupted_leaves_nothing() {
 mod memory {
     use super::*;
 
-    /// The peak, bytes, of an export of `arguments`.
+    /// The peak, bytes, of an export.
+    fn peak_of_export(folder: &Path, arguments: &[&str]) -> u64 {
+        peak(folder, &[&["export", "cube.zarr"], arguments].concat())
+    }
+
+    /// The peak, bytes, of the program with these arguments.
     fn peak(folder: &Path, arguments: &[&str]) -> u64 {
         let mut command = Command::new(env!("CARGO_BIN_EXE_spectile"));
-        let mut child =
-            command.current_dir(folder).args(["export", "cube.zarr"]).args(arguments).spawn().expect("started");
+        let mut child = command.current_dir(folder).args(arguments).spawn().expect("started");
         let mut peak = 0;
         loop {
             let status = fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap_or_default();
@@ -397,7 +459,7 @@ mod memory {
         let folder = tempdir().expect("folder");
         let (_cube, bytes) = sparse(folder.path(), side, channels);
         for arguments in formats {
-            let peak = peak(folder.path(), arguments);
+            let peak = peak_of_export(folder.path(), arguments);
             println!("{arguments:?}: {} MiB of a cube of {} MiB", peak >> 20, bytes >> 20);
             assert!(peak <= most, "{arguments:?}: {} MiB of {} allowed", peak >> 20, most >> 20);
         }
@@ -446,7 +508,7 @@ mod memory {
         }
         let (most, picture) = (96u64 << 20, 4096u64 * 4096 * 12);
         for arguments in [&["-o", "all.png"][..], &["-o", "some.png", "--bands", "2"]] {
-            let peak = peak(folder.path(), arguments);
+            let peak = peak_of_export(folder.path(), arguments);
             println!("{arguments:?}: {} MiB of a picture of {} MiB", peak >> 20, picture >> 20);
             assert!(peak <= most && picture >= 2 * most, "{arguments:?}: {} MiB", peak >> 20);
         }
@@ -500,6 +562,9 @@ mod memory {
             assert_eq!(child.wait().expect("ends").code(), Some(143), "{arguments:?}");
             assert_eq!(names(), ["cube.zarr", "s.csv"], "{arguments:?}");
         }
+        // The sensor, left to its work, holds a tile at a time.
+        let peak = peak(folder.path(), &["sensor", "cube.zarr", "--responses", "s.csv", "-o", "new.zarr"]);
+        assert!(peak <= 150 << 20, "{} MiB", peak >> 20);
     }
 
     #[test]

@@ -90,7 +90,7 @@ if (what === "heat") {
   await page.waitForFunction(() => window.spectile.spectra.pins.length === 1);
   seen.pin = await page.evaluate(() => {
     const { x, y, samples } = window.spectile.spectra.pins[0];
-    return { x, y, samples, plotted: window.spectile.spectra.plot.data[1].some((v) => v !== null) };
+    return { x, y, samples, bands: window.spectile.spectra.plot.bands.length, plotted: window.spectile.spectra.plot.data[1].some((v) => v !== null) };
   });
   seen.csv = await download(() => page.locator("#csv").click());
   // The same by keys: the cursor begins where the pointer was.
@@ -124,7 +124,11 @@ if (what === "heat") {
     for (let i = 0; i < 3; i++) await page.keyboard.press("ArrowRight");
   });
   seen.slider.label = before !== (await name());
+  const stepped = await name();
   seen.step = await change(() => page.keyboard.press(","));
+  await page.keyboard.press(".");
+  seen.step_back = stepped === (await name());
+  await page.keyboard.press(",");
   await shot(`${what}-channel`);
   if (what === "view") seen.channel_against_png = await against_png();
   seen.false_colour = await change(() => page.keyboard.press("3"));
@@ -133,6 +137,19 @@ if (what === "heat") {
     await page.mouse.wheel(0, -480);
   });
   seen.fit = await change(() => page.keyboard.press("0"));
+  const zoom = () => page.evaluate(() => window.spectile.picture.zoom);
+  seen.zooms = [await zoom()];
+  for (const key of ["+", "-", "9", "0"]) {
+    await page.keyboard.press(key);
+    seen.zooms.push(await zoom());
+  }
+  const background = () => page.evaluate(() => getComputedStyle(document.body).backgroundColor);
+  seen.themes = [await background()];
+  await page.locator("#theme").click();
+  seen.themes.push(await background());
+  await shot(`${what}-dark`);
+  await page.locator("#theme").click();
+  await page.locator("#picture").focus();
   await page.keyboard.press("1");
   await page.keyboard.press("Escape");
   seen.pins_left = await page.evaluate(() => window.spectile.spectra.pins.length);

@@ -12,7 +12,7 @@ use spectile::spectral::{Channels, planck};
 use tempfile::tempdir;
 
 use crate::client::{Running, command, cornell};
-use crate::common::{create, header, patterned, unit};
+use crate::common::{create, header, pattern, patterned, unit};
 
 /// What the page showed; `None` without a browser.
 fn drive(what: &str, url: &str, [x, y]: [u32; 2]) -> Option<Value> {
@@ -73,13 +73,18 @@ fn check_looking(seen: &Value, folder: &Path, [x, y]: [u32; 2]) {
         assert!((got - mean).abs() <= 1e-12 * mean.abs(), "{k}: {got} {mean}");
     }
     let all = seen["all_csv"].as_str().expect("text");
-    assert_eq!(all.lines().next().expect("a header").split(',').count(), 4);
+    let columns = |csv: &str| csv.lines().next().expect("a header").split(',').count();
+    assert_eq!(columns(all), 1 + 3 * (columns(downloaded) - 1));
     assert_eq!(all.lines().count(), cube.channels().len() + 1);
     for change in ["brighter", "automatic", "channel", "slider", "step", "false_colour", "closer", "fit"] {
         assert_eq!(seen[change]["changed"], true, "{change}: {}", seen[change]);
     }
     assert!(seen["brighter"]["after"].as_f64() > seen["brighter"]["before"].as_f64());
-    assert_eq!(seen["slider"]["label"], true);
+    assert_eq!((&seen["slider"]["label"], &seen["step_back"]), (&true.into(), &true.into()));
+    let zooms: Vec<f64> = seen["zooms"].as_array().expect("a list").iter().filter_map(Value::as_f64).collect();
+    let [fits, closer, farther, one, again] = zooms[..] else { panic!("{zooms:?}") };
+    assert!(closer > 1.4 * fits && (farther / fits - 1.0).abs() < 1e-9 && one == 1.0 && again == fits, "{zooms:?}");
+    assert_ne!(seen["themes"][0], seen["themes"][1], "light and dark");
     assert_eq!((&seen["pins_left"], &seen["help"]), (&0.into(), &true.into()));
 }
 
@@ -148,6 +153,30 @@ fn heat_is_shown_in_kelvins() {
     assert!((shown - kelvin(80, 60)).abs() < 0.1, "{cursor} {}", kelvin(80, 60));
     let range: Vec<f64> = [0, 1].map(|i| seen["range"][i].as_str().expect("text").parse().expect("a number")).to_vec();
     assert!(range[0] > 269.0 && range[0] < 276.0 && range[1] > 315.0 && range[1] < 323.0, "{range:?}");
+}
+
+/// Where the cube has standard errors, the plot has a band around each spectrum, and the file a column.
+#[test]
+fn standard_errors_are_plotted() {
+    let folder = tempdir().expect("folder");
+    let cube = create(folder.path(), "cube.zarr", header([64, 48], [16, 16], 12).with_uncertainty());
+    for (tile, epoch) in (0..cube.grid().count()).flat_map(|tile| [(tile, 0u32), (tile, 1)]) {
+        let value = |x, y, k| pattern(x, y, k) * (1.0 + 0.1 * epoch as f32);
+        cube.merge_unit(tile, 64, &unit(&cube, tile, value)).expect("merged");
+    }
+    let running = Running::start(folder.path(), &["view", "cube.zarr", "--listen", "127.0.0.1:0", "--json"]);
+    let Some(seen) = drive("view", &running.url, [30, 20]) else { return };
+    check_looking(&seen, folder.path(), [30, 20]);
+    assert_eq!(seen["pin"]["bands"], 1);
+    let downloaded = seen["csv"]["text"].as_str().expect("text");
+    assert!(downloaded.starts_with("wavelength_nm,radiance,standard_error\n"), "{downloaded}");
+    let errors = downloaded.lines().skip(1).map(|line| line.rsplit(',').next().expect("a column").parse::<f32>());
+    let errors: Vec<f32> = errors.map(|error| error.expect("a number")).collect();
+    assert_eq!(errors, cube.standard_error(30, 20).expect("read").expect("there"));
+    // Of two epochs, half their distance: 5 %.
+    for (k, error) in errors.into_iter().enumerate() {
+        assert!((error / pattern(30, 20, k) - 0.05).abs() < 1e-5, "{k}: {error}");
+    }
 }
 
 /// A cube under somebody's eyes in two browsers at once, which is what loopback is for.
