@@ -43,8 +43,9 @@ fn a_report_of_two_samplers_and_two_numbers_of_channels() {
         let ratio = number(21, "error_estimate") / number(21, "error");
         assert!((0.5..2.0).contains(&ratio), "{ratio}");
         let slope = curve["slope_samples"].as_f64().expect("a slope");
-        // Of one realisation in which the few pixels at the lamp's edge count most: tests/convergence.rs measures slopes.
-        assert!((-0.7..-0.3).contains(&slope), "{curve}");
+        // Of one realisation in which the few pixels at the lamp's edge count most, by Sobol points or without:
+        // tests/convergence.rs measures slopes.
+        assert!((-1.5..-0.3).contains(&slope), "{curve}");
     }
     let csv = read("converge.csv");
     assert_eq!(csv.lines().count(), 1 + 4 * 4 * 22);
