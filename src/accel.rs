@@ -106,24 +106,8 @@ impl Accel {
 
 /// The corners of a box around `shapes`; `None` without any.
 pub fn bounds<'a>(shapes: impl Iterator<Item = &'a Shape>) -> Option<[DVec3; 2]> {
-    let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    let mut include = |p: DVec3, extent: DVec3| {
-        min = min.min(p - extent);
-        max = max.max(p + extent);
-    };
-    for shape in shapes {
-        match shape {
-            Shape::Mesh(mesh) => {
-                mesh.triangles.iter().flatten().for_each(|&i| include(mesh.positions[i as usize], DVec3::ZERO))
-            }
-            Shape::Sphere { center, radius } => include(*center, DVec3::splat(*radius)),
-            Shape::Disk { center, radius, .. } => include(*center, DVec3::splat(*radius)),
-            Shape::Cylinder { from, to, radius } => {
-                include(*from, DVec3::splat(*radius));
-                include(*to, DVec3::splat(*radius));
-            }
-        }
-    }
+    let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+    let [min, max] = shapes.map(Shape::bounds).fold(none, |[min, max], [low, high]| [min.min(low), max.max(high)]);
     (min.x <= max.x).then_some([min, max])
 }
 

@@ -39,17 +39,9 @@ fn compare(what: &str, scene: &Scene, effort: &Effort) {
     ours.assert_clean();
     let reference = reference::render_image(scene, effort.reference, 12);
     let channels = scene.channels.len();
-    let pixels = reference.mean.len() / channels;
     let freedom = f64::from(effort.reference - 1);
 
-    let images: Vec<Estimate> = (0..channels)
-        .map(|k| {
-            let of_channel = |values: &[f64]| values.iter().skip(k).step_by(channels).copied().collect::<Vec<_>>();
-            let mean = of_channel(&reference.mean).iter().sum::<f64>() / pixels as f64;
-            let square = of_channel(&reference.standard_error).iter().map(|e| e * e).sum::<f64>();
-            Estimate { mean, error: square.sqrt() / pixels as f64, freedom }
-        })
-        .collect();
+    let images = image_estimates(&reference.mean, &reference.standard_error, channels, freedom);
     let means: Vec<f64> = images.iter().map(|e| e.mean).collect();
     let bound = Bound { resolution: effort.image, allowance: ALLOWANCE };
     assert_agreement(&format!("{what}, image"), &ours.image_means(), &images, &means, bound);

@@ -84,16 +84,8 @@ fn against_reference(what: &str, scene: &Scene, samples: u32, resolution: f64) {
     let rendered = render(scene, 64, 64, Settings { seed: 3, ..Settings::default() });
     rendered.assert_clean();
     let reference = reference::render_image(scene, samples, 4);
-    let channels = scene.channels.len();
-    let pixels = (reference.mean.len() / channels) as f64;
-    let image: Vec<Estimate> = (0..channels)
-        .map(|k| {
-            let of_channel = |values: &[f64]| values.iter().skip(k).step_by(channels).copied().collect::<Vec<_>>();
-            let square: f64 = of_channel(&reference.standard_error).iter().map(|e| e * e).sum();
-            let mean = of_channel(&reference.mean).iter().sum::<f64>() / pixels;
-            Estimate { mean, error: square.sqrt() / pixels, freedom: f64::from(samples - 1) }
-        })
-        .collect();
+    let (channels, freedom) = (scene.channels.len(), f64::from(samples - 1));
+    let image = image_estimates(&reference.mean, &reference.standard_error, channels, freedom);
     let scale: Vec<f64> = image.iter().map(|e| e.mean).collect();
     assert_agreement(what, &rendered.image_means(), &image, &scale, Bound { resolution, allowance: 1e-3 });
 }

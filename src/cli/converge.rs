@@ -1,6 +1,7 @@
 //! `spectile converge`: error against run time.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Duration;
 
 use serde_json::json;
@@ -12,10 +13,12 @@ use super::scene::SceneArgs;
 use crate::cube::Cube;
 use crate::gpu::adapter::{Gpu, Selection};
 use crate::render::plan;
+use crate::render::worker::Interrupt;
 use crate::report::converge::{Curve, Report};
 use crate::report::convergence::{Limit, Reference, measure, render};
 use crate::report::{Circumstances, make_folder, write};
 use crate::scene::Scene;
+use crate::spectral::Channels;
 use crate::{Error, Result};
 
 /// A reference has so many times the budget of a curve.
@@ -79,65 +82,56 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     let interrupt = super::interrupt::watch()?;
     let scenes = scenes(args)?;
     make_folder(&args.output)?;
-    let adapter = Gpu::open_all(&args.devices)?.remove(0).name.clone();
+    let gpu = Arc::new(Gpu::open_all(&args.devices)?.remove(0));
     let file = args.scene.scene.display().to_string();
-    let mut report = Report { scene: file, circumstances: Circumstances::now(&adapter), curves: Vec::new() };
-    output.event("start", json!({ "scene": args.scene.scene, "curves": scenes.len(), "device": adapter }))?;
-    // One for each set of channels, with the scene that it was made for.
-    let mut references: Vec<(usize, Reference)> = Vec::new();
-    for (index, (name, scene)) in scenes.iter().enumerate() {
-        let known = references.iter().position(|(of, _)| scenes[*of].1.channels == scene.channels);
-        let known = match known {
-            Some(known) => known,
-            None => {
-                say(&format!("reference for {} channels", scene.channels.len()));
-                let reference = match &args.reference {
-                    Some(path) => Reference::of_cube(&Cube::open(path)?, scene)?,
-                    None => {
-                        let time = args.budget * REFERENCE_BUDGETS;
-                        let samples = args.spp.saturating_mul(REFERENCE_BUDGETS).max(2 * scene.integrator.epoch);
-                        let limit = Limit { time, samples };
-                        let image = render(scene, args.seed + 1, &args.devices, limit, &interrupt, |_, _| Ok(()))?;
-                        if image.samples < 2 * scene.integrator.epoch {
-                            return Err(Error::Usage(format!(
-                                "the reference got {} samples per pixel in {:.0} s, and its noise is known from {} on: give a larger --budget \
-                                 or a smaller --size",
-                                image.samples,
-                                time.as_secs_f64(),
-                                2 * scene.integrator.epoch
-                            )));
-                        }
-                        Reference::of_image(&image)
-                    }
-                };
-                references.push((index, reference));
-                references.len() - 1
-            }
-        };
-        let reference = &references[known].1;
+    let mut report = Report { scene: file, circumstances: Circumstances::now(&gpu), curves: Vec::new() };
+    output.event("start", json!({ "scene": args.scene.scene, "curves": scenes.len(), "device": gpu.name }))?;
+    let mut references: Vec<(&Channels, Reference)> = Vec::new();
+    for (name, scene) in &scenes {
         let channels = &scene.channels;
+        if references.iter().all(|(known, _)| *known != channels) {
+            references.push((channels, reference(args, scene, &gpu, &interrupt)?));
+        }
+        let (_, reference) = references.iter().find(|(known, _)| *known == channels).expect("just seen to");
         report.curves.push(Curve {
             name: name.clone(),
-            channels: channels.len(),
             centres: (0..channels.len()).map(|k| channels.centre(k)).collect(),
             reference: reference.what.clone(),
             points: Vec::new(),
         });
         let limit = Limit { time: args.budget, samples: args.spp };
-        measure(scene, args.seed, &args.devices, limit, &interrupt, reference, |point| {
+        measure(scene, args.seed, &gpu, limit, &interrupt, reference, |point| {
             let curve = report.curves.last_mut().expect("just pushed");
-            say(&format!(
-                "{name}: {} samples/pixel, {:.1} s, mean relMSE {:.3e}",
-                point.samples,
-                point.seconds,
-                point.rel_mse.iter().sum::<f64>() / point.rel_mse.len() as f64
-            ));
+            let (samples, seconds, rel_mse) = (point.samples, point.seconds, point.mean_rel_mse());
+            say(&format!("{name}: {samples} samples/pixel, {seconds:.1} s, mean relMSE {rel_mse:.3e}"));
             curve.points.push(point);
             write(&args.output, "converge", &report.csv(), &report.json(), &report.html()?)
         })?;
     }
     output.event("done", json!({ "report": report.json(), "folder": args.output }))?;
     output.text(&format!("{}{}\n", report.summary(), args.output.join("converge.html").display()))
+}
+
+/// What curves in the channels of `scene` are compared with: the cube that was given, or a render of its own.
+fn reference(args: &Args, scene: &Scene, gpu: &Arc<Gpu>, interrupt: &Arc<Interrupt>) -> Result<Reference> {
+    say(&format!("reference for {} channels", scene.channels.len()));
+    if let Some(path) = &args.reference {
+        return Reference::of_cube(&Cube::open(path)?, scene);
+    }
+    // Its noise is known from two epochs on.
+    let least = 2 * scene.integrator.epoch;
+    let time = args.budget * REFERENCE_BUDGETS;
+    let limit = Limit { time, samples: args.spp.saturating_mul(REFERENCE_BUDGETS).max(least) };
+    let image = render(scene, args.seed + 1, gpu, limit, interrupt, |_, _| Ok(()))?;
+    if image.samples < least {
+        return Err(Error::Usage(format!(
+            "the reference got {} samples per pixel in {:.0} s, and its noise is known from {least} on: give a larger --budget \
+             or a smaller --size",
+            image.samples,
+            time.as_secs_f64()
+        )));
+    }
+    Ok(Reference::of_image(&image))
 }
 
 /// The scene with every combination of what varies, and names that tell them apart.

@@ -1,6 +1,7 @@
 //! `spectile stress`: numerical stability on stiff and extreme cases.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use serde_json::json;
 
@@ -18,18 +19,14 @@ use crate::{Error, Result};
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = "\
 Examples:
-  spectile stress                       all cases but the long ones
+  spectile stress                       all cases
   spectile stress --list                what there is
   spectile stress --case cavity         one of them, with every check
-  spectile stress --all -o report       all, and report/stress.html, .csv, .json")]
+  spectile stress -o report             all, and report/stress.html, .csv, .json")]
 pub struct Args {
     /// Only this case (repeatable); prints all of its checks
     #[arg(long = "case", value_name = "NAME")]
     pub cases: Vec<String>,
-
-    /// The long cases as well
-    #[arg(long)]
-    pub all: bool,
 
     /// Say which cases there are, and stop
     #[arg(long)]
@@ -57,14 +54,15 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         return Ok(());
     }
     let interrupt = super::interrupt::watch()?;
-    let circumstances = Circumstances::now(&Gpu::open_all(&args.devices)?.remove(0).name);
+    let gpu = Arc::new(Gpu::open_all(&args.devices)?.remove(0));
+    let circumstances = Circumstances::now(&gpu);
     if let Some(folder) = &args.output {
         report::make_folder(folder)?;
     }
     output.event("start", json!({ "cases": cases.len(), "measured": circumstances.facts() }))?;
     let mut outcomes = Vec::new();
     for case in cases {
-        let outcome = stress::run(&case, &args.devices, &interrupt)?;
+        let outcome = stress::run(&case, &gpu, &interrupt)?;
         output.event("case", stress::facts(&case, &outcome))?;
         output.text(&line(&case, &outcome))?;
         if !args.cases.is_empty() {
@@ -92,7 +90,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
 }
 
 fn line(case: &Case, outcome: &stress::Outcome) -> String {
-    let bad = outcome.non_finite + outcome.negative + outcome.overflow;
+    let bad = outcome.bad_samples();
     let bad = if bad > 0 { format!(", {bad} bad samples") } else { String::new() };
     let what = match (&outcome.error, outcome.worst()) {
         (Some(error), _) => error.clone(),
@@ -115,7 +113,7 @@ fn line(case: &Case, outcome: &stress::Outcome) -> String {
 fn chosen(args: &Args) -> Result<Vec<Case>> {
     let all = stress::cases();
     if args.cases.is_empty() {
-        return Ok(all.into_iter().filter(|case| args.all || args.list || !case.long).collect());
+        return Ok(all);
     }
     let find = |name: &String| {
         all.iter().find(|case| case.name == name).copied().ok_or_else(|| {

@@ -50,6 +50,13 @@ pub fn write_png(
     Ok(tone)
 }
 
+impl Shown {
+    /// Values of a pixel.
+    fn planes(&self) -> usize {
+        if let Shown::Map(_) = self { 1 } else { 3 }
+    }
+}
+
 /// The rows of a picture, a piece at a time.
 struct Rows<'a> {
     view: &'a View<'a>,
@@ -77,11 +84,6 @@ impl<'a> Rows<'a> {
         Rows { view, shown, reader: view.reader(), weights, temperature, values: Vec::new(), passes, passed: 0 }
     }
 
-    /// Values of a pixel.
-    fn planes(&self) -> usize {
-        if let Shown::Map(_) = self.shown { 1 } else { 3 }
-    }
-
     /// The values of the pixels in `rect`, rows from the top; NaN where nothing is rendered yet.
     fn read(&mut self, rect: Rect) -> Result<()> {
         let Rows { view, shown, reader, weights, temperature, values, .. } = self;
@@ -89,7 +91,7 @@ impl<'a> Rows<'a> {
             *values = view.cube().look().colour(rect, 1)?.values;
             return Ok(());
         }
-        let planes = if let Shown::Map(_) = shown { 1 } else { 3 };
+        let planes = shown.planes();
         values.clear();
         values.resize(rect.pixels() as usize * planes, f32::NAN);
         reader.spectra(rect, |x, y, spectrum| {
@@ -107,7 +109,7 @@ impl<'a> Rows<'a> {
     /// Calls `each` with all values, in pieces of whole rows.
     fn each(&mut self, progress: &mut Progress, mut each: impl FnMut(&[f32]) -> Result<()>) -> Result<()> {
         let (rect, tile) = (self.view.rect(), self.view.cube().grid().tile[1]);
-        let most = (PIECE_BYTES / (rect.width() as usize * self.planes() * 4)).max(1) as u32;
+        let most = (PIECE_BYTES / (rect.width() as usize * self.shown.planes() * 4)).max(1) as u32;
         let pixels = rect.pixels();
         let mut y0 = rect.y0;
         while y0 < rect.y1 {
@@ -124,7 +126,7 @@ impl<'a> Rows<'a> {
     }
 
     fn tone(&mut self, progress: &mut Progress) -> Result<Tone> {
-        let planes = self.planes();
+        let planes = self.shown.planes();
         let found = percentiles_of([1, 99], |take| {
             self.each(progress, |values| {
                 values.chunks_exact(planes).for_each(|pixel| take(largest(pixel)));

@@ -357,7 +357,7 @@ impl<'a> Render<'a> {
         for epoch in first.. {
             let n = epoch_samples(epoch, full);
             let enough = self.samples_limit.is_some_and(|limit| self.status.samples >= limit);
-            if enough || self.too_late(n) || self.is_accurate(cube) {
+            if enough || self.too_late(n) || self.is_accurate() {
                 return Ok(());
             }
             let (began, rested, there) = (Instant::now(), self.rested(), self.merged.front().copied().unwrap_or(0));
@@ -402,12 +402,11 @@ impl<'a> Render<'a> {
         }
     }
 
-    /// Whether the error estimate of every channel is as small as was asked for.
-    fn is_accurate(&self, cube: &Writer) -> bool {
+    /// Whether the error estimate of every channel, [`Status::error_estimate`] is the largest, is as small as was asked for.
+    fn is_accurate(&self) -> bool {
         let Some(wanted) = self.job.stop.error else { return false };
-        // A NaN is never small enough.
         self.status.samples / self.job.scene.integrator.epoch >= SURE_EPOCHS
-            && cube.error_estimate().into_iter().all(|estimate| estimate <= wanted)
+            && self.status.error_estimate.is_some_and(|estimate| estimate <= wanted)
     }
 
     fn rendering_s(&self) -> f64 {

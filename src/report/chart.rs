@@ -76,8 +76,6 @@ fn draw(
         .configure_mesh()
         .x_desc(x)
         .y_desc(y)
-        .x_label_formatter(&|v| Decades::label(*v))
-        .y_label_formatter(&|v| Decades::label(*v))
         .label_style(("sans-serif", 13))
         .axis_desc_style(("sans-serif", 15))
         .light_line_style(BLACK.mix(0.06))

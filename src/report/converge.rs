@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::Circumstances;
 use super::chart::{Line, log_log};
-use super::convergence::Point;
+use super::convergence::{Point, mean, root_mean_square};
 use super::page::Page;
 use crate::Result;
 
@@ -20,7 +20,6 @@ const SLOPE_FROM: u32 = 4;
 /// One way to render, and how it went so far.
 pub struct Curve {
     pub name: String,
-    pub channels: usize,
     /// Wavelengths of the channels, nm, for groups.
     pub centres: Vec<f64>,
     /// What it is compared with.
@@ -63,20 +62,12 @@ impl Fit {
     }
 }
 
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
-}
-
-fn root_mean_square(values: &[f64]) -> f64 {
-    (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
-}
-
 impl Curve {
     /// Channels by wavelength, in groups of equal numbers: name and members.
     fn groups(&self) -> Vec<(String, Vec<usize>)> {
-        let mut order: Vec<usize> = (0..self.channels).collect();
+        let mut order: Vec<usize> = (0..self.centres.len()).collect();
         order.sort_by(|&a, &b| self.centres[a].total_cmp(&self.centres[b]));
-        let size = self.channels.div_ceil(GROUPS);
+        let size = self.centres.len().div_ceil(GROUPS);
         let name = |members: &[usize]| {
             let [first, last] = [members[0], members[members.len() - 1]].map(|k| self.centres[k]);
             if members.len() == 1 { format!("{first:.0} nm") } else { format!("{first:.0} to {last:.0} nm") }
@@ -85,26 +76,26 @@ impl Curve {
     }
 
     fn rel_mse(&self, y: impl Fn(&Point) -> f64) -> Vec<(f64, f64)> {
-        self.points.iter().map(|p| (y(p), mean(&p.rel_mse))).collect()
+        self.points.iter().map(|p| (y(p), p.mean_rel_mse())).collect()
     }
 
     /// The exponent of the error, root mean square over channels, in samples and in seconds.
     pub fn slopes(&self) -> [Option<Fit>; 2] {
         let points = || self.points.iter().filter(|p| p.samples >= SLOPE_FROM);
-        let error = |p: &Point| root_mean_square(&p.error);
+        let error = |p: &Point| p.rms_error();
         [Fit::of(points().map(|p| (f64::from(p.samples), error(p)))), Fit::of(points().map(|p| (p.seconds, error(p))))]
     }
 
     /// Mean relMSE after so many seconds, between points; `None` outside them.
     fn rel_mse_at(&self, seconds: f64) -> Option<f64> {
         let pair = self.points.windows(2).find(|w| w[0].seconds <= seconds && seconds <= w[1].seconds)?;
-        let point = |p: &Point| (p.seconds, mean(&p.rel_mse));
+        let point = |p: &Point| (p.seconds, p.mean_rel_mse());
         Fit::of(pair.iter().map(point)).map(|fit| fit.at(seconds))
     }
 
     /// Seconds until the error, root mean square over channels, is this; and whether that was reached.
     fn seconds_to(&self, error: f64) -> Option<(f64, bool)> {
-        let of = |p: &Point| (root_mean_square(&p.error), p.seconds);
+        let of = |p: &Point| (p.rms_error(), p.seconds);
         if let Some(pair) = self.points.windows(2).find(|w| of(&w[0]).0 > error && of(&w[1]).0 <= error) {
             return Fit::of(pair.iter().map(of)).map(|fit| (fit.at(error), true));
         }
@@ -129,7 +120,7 @@ impl Report {
                         text,
                         "\"{}\",{},{},{:.6},{group},{relmse:e},{error:e},{estimate}",
                         curve.name.replace('"', "\"\""),
-                        curve.channels,
+                        curve.centres.len(),
                         p.samples,
                         p.seconds
                     );
@@ -143,15 +134,15 @@ impl Report {
         let curves = self.curves.iter().map(|curve| {
             let [samples, seconds] = curve.slopes().map(|fit| fit.map(|fit| fit.slope));
             let points = curve.points.iter().map(|p| {
-                let estimate = root_mean_square(&p.estimate);
+                let estimate = p.rms_estimate();
                 json!({
-                    "samples": p.samples, "seconds": p.seconds, "mean_relmse": mean(&p.rel_mse),
-                    "largest_relmse": p.rel_mse.iter().copied().fold(0.0, f64::max), "error": root_mean_square(&p.error),
+                    "samples": p.samples, "seconds": p.seconds, "mean_relmse": p.mean_rel_mse(),
+                    "largest_relmse": p.rel_mse.iter().copied().fold(0.0, f64::max), "error": p.rms_error(),
                     "error_estimate": if estimate.is_nan() { Value::Null } else { json!(estimate) },
                 })
             });
             json!({
-                "name": curve.name, "channels": curve.channels, "reference": curve.reference,
+                "name": curve.name, "channels": curve.centres.len(), "reference": curve.reference,
                 "slope_samples": samples, "slope_seconds": seconds, "points": points.collect::<Vec<_>>(),
             })
         });
@@ -171,8 +162,8 @@ impl Report {
                 curve.name,
                 last.samples,
                 last.seconds,
-                mean(&last.rel_mse),
-                root_mean_square(&last.error)
+                last.mean_rel_mse(),
+                last.rms_error()
             );
         }
         text
@@ -218,7 +209,7 @@ impl Report {
         page.heading("Estimated against true error");
         let line = |c: &Curve| Line {
             name: c.name.clone(),
-            points: c.points.iter().map(|p| (root_mean_square(&p.error), root_mean_square(&p.estimate))).collect(),
+            points: c.points.iter().map(|p| (p.rms_error(), p.rms_estimate())).collect(),
             guide: false,
         };
         let mut lines: Vec<Line> = self.curves.iter().map(line).collect();
@@ -302,7 +293,6 @@ mod tests {
         };
         Curve {
             name: "a".into(),
-            channels: 5,
             centres: vec![500.0, 400.0, 600.0, 700.0, 800.0],
             reference: "a cube".into(),
             points: (0..=10).map(|i| point(1 << i)).collect(),

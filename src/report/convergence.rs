@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::cube::{Cube, epoch_samples};
-use crate::gpu::adapter::{Gpu, Selection};
+use crate::gpu::adapter::Gpu;
 use crate::gpu::layout::Counters;
 use crate::render::plan;
 use crate::render::prepare::Prepared;
@@ -39,6 +39,30 @@ pub struct Point {
     pub rel_mse: Vec<f64>,
     pub error: Vec<f64>,
     pub estimate: Vec<f64>,
+}
+
+impl Point {
+    /// Of all channels.
+    pub fn mean_rel_mse(&self) -> f64 {
+        mean(&self.rel_mse)
+    }
+
+    /// The errors and the estimates, root mean square over channels.
+    pub fn rms_error(&self) -> f64 {
+        root_mean_square(&self.error)
+    }
+
+    pub fn rms_estimate(&self) -> f64 {
+        root_mean_square(&self.estimate)
+    }
+}
+
+pub(super) fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+pub(super) fn root_mean_square(values: &[f64]) -> f64 {
+    (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
 }
 
 /// What is true, as far as is known. Values are [pixel][channel].
@@ -181,21 +205,20 @@ pub struct Limit {
     pub samples: u32,
 }
 
-/// Renders `scene` on the first of `devices` until `limit`, and tells `after` of every epoch: the picture and the seconds of
+/// Renders `scene` on `gpu` until `limit`, and tells `after` of every epoch: the picture and the seconds of
 /// rendering so far, without set-up.
 pub fn render(
     scene: &Scene,
     seed: u64,
-    devices: &Selection,
+    gpu: &Arc<Gpu>,
     limit: Limit,
     interrupt: &Arc<Interrupt>,
     mut after: impl FnMut(&Image, f64) -> Result<()>,
 ) -> Result<Image> {
-    let gpu = Gpu::open_all(devices)?.remove(0);
     let prepared = Arc::new(Prepared::new(scene, seed)?);
     let integration = prepared.integration.clone();
     let tile = plan::tile_size(scene, None);
-    let mut worker = Worker::new(gpu, prepared, tile, Budget { memory: None, paths: None })?;
+    let mut worker = Worker::new(Arc::clone(gpu), prepared, tile, Budget { memory: None, paths: None })?;
     worker.watch(interrupt);
     let [x0, y0, x1, y1] = scene.film.crop;
     let units: Vec<UnitRect> = (y0..y1)
@@ -255,13 +278,13 @@ pub fn render(
 pub fn measure(
     scene: &Scene,
     seed: u64,
-    devices: &Selection,
+    gpu: &Arc<Gpu>,
     limit: Limit,
     interrupt: &Arc<Interrupt>,
     reference: &Reference,
     mut after: impl FnMut(Point) -> Result<()>,
 ) -> Result<()> {
-    render(scene, seed, devices, limit, interrupt, |image, seconds| after(reference.point(image, seconds))).map(|_| ())
+    render(scene, seed, gpu, limit, interrupt, |image, seconds| after(reference.point(image, seconds))).map(|_| ())
 }
 
 #[cfg(test)]

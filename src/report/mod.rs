@@ -10,6 +10,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde_json::{Value, json};
 
+use crate::gpu::adapter::Gpu;
+
 use crate::{Error, Result, files};
 
 /// On what, when and how something was measured.
@@ -22,14 +24,14 @@ pub struct Circumstances {
 }
 
 impl Circumstances {
-    pub fn now(adapter: &str) -> Circumstances {
+    pub fn now(gpu: &Gpu) -> Circumstances {
         let mut command: Vec<String> = std::env::args().collect();
         if let Some(program) = command.first_mut() {
             *program = "spectile".into();
         }
         Circumstances {
             command: shlex::try_join(command.iter().map(String::as_str)).unwrap_or_else(|_| command.join(" ")),
-            adapter: adapter.to_owned(),
+            adapter: gpu.name.clone(),
             cores: std::thread::available_parallelism().map_or(1, usize::from),
             date: date(SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs())),
         }
@@ -70,7 +72,7 @@ fn date(seconds: u64) -> String {
 
 /// Makes the folder of a report where there is none.
 pub fn make_folder(folder: &Path) -> Result<()> {
-    std::fs::create_dir_all(folder).map_err(|error| Error::storage(folder, format!("cannot be made: {error}")))
+    files::make_folder_durably(folder).map_err(|error| Error::storage(folder, format!("cannot be made: {error}")))
 }
 
 /// Writes `name.csv`, `.json` and `.html`, each in one step.

@@ -1,4 +1,4 @@
-//! Which shapes have an inside, and the box around them.
+//! Which shapes have an inside.
 
 use std::collections::HashMap;
 
@@ -47,18 +47,6 @@ fn open_edges(mesh: &Mesh) -> Vec<[DVec3; 2]> {
     let mut open: Vec<[u32; 2]> = balance.into_values().filter(|(n, _)| *n != 0).map(|(_, edge)| edge).collect();
     open.sort_unstable();
     open.into_iter().map(|edge| edge.map(|corner| mesh.positions[corner as usize])).collect()
-}
-
-/// The least and the greatest coordinates of a closed shape.
-pub fn bounds(shape: &Shape) -> [DVec3; 2] {
-    match shape {
-        Shape::Sphere { center, radius } => [*center - *radius, *center + *radius],
-        Shape::Mesh(mesh) => {
-            let used = || mesh.triangles.iter().flatten().map(|&corner| mesh.positions[corner as usize]);
-            [used().fold(DVec3::INFINITY, DVec3::min), used().fold(DVec3::NEG_INFINITY, DVec3::max)]
-        }
-        Shape::Disk { .. } | Shape::Cylinder { .. } => unreachable!("has no inside"),
-    }
 }
 
 #[cfg(test)]

@@ -388,6 +388,22 @@ pub enum Shape {
     },
 }
 
+impl Shape {
+    /// The least and the greatest coordinates; a mesh without triangles has infinite ones, the least above the greatest.
+    pub fn bounds(&self) -> [DVec3; 2] {
+        match self {
+            Shape::Sphere { center, radius } | Shape::Disk { center, radius, .. } => {
+                [*center - *radius, *center + *radius]
+            }
+            Shape::Cylinder { from, to, radius } => [from.min(*to) - *radius, from.max(*to) + *radius],
+            Shape::Mesh(mesh) => {
+                let used = || mesh.triangles.iter().flatten().map(|&corner| mesh.positions[corner as usize]);
+                [used().fold(DVec3::INFINITY, DVec3::min), used().fold(DVec3::NEG_INFINITY, DVec3::max)]
+            }
+        }
+    }
+}
+
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Mesh {
     pub positions: Vec<DVec3>,

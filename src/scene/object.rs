@@ -171,7 +171,7 @@ impl<'s, 'a> Objects<'s, 'a> {
             return None;
         }
         self.bodies += 1;
-        Some(Some(Filling { body: self.bodies - 1, medium: medium?, bounds: closed::bounds(local) }))
+        Some(Some(Filling { body: self.bodies - 1, medium: medium?, bounds: local.bounds() }))
     }
 
     /// A null boundary leaves usemtl names alone that may have been meant.

@@ -106,6 +106,17 @@ pub fn largest(rgb: &[f32]) -> f32 {
     rgb.iter().copied().fold(f32::NAN, f32::max)
 }
 
+/// The exposure in EV that brings the 99th percentile of the largest of each pixel's `planes` values, over the pixels with any
+/// light, to 1; 0 without light.
+pub fn auto_exposure(values: &[f32], planes: usize) -> f64 {
+    let each = |take: &mut dyn FnMut(f32)| -> Result<(), Infallible> {
+        values.chunks_exact(planes).for_each(|pixel| take(largest(pixel)));
+        Ok(())
+    };
+    let Ok(found) = percentiles_of([99], each);
+    exposure_of(found.map(|[percentile]| percentile))
+}
+
 /// A linear picture: rows from the top, R, G, B interleaved; NaN where nothing is rendered yet.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
@@ -118,12 +129,7 @@ impl Picture {
     /// The exposure in EV (a factor of 2^EV) that brings the 99th percentile of the largest component, over the
     /// pixels with any light, to 1. A picture without light has exposure 0.
     pub fn auto_exposure(&self) -> f64 {
-        let each = |take: &mut dyn FnMut(f32)| -> Result<(), Infallible> {
-            self.rgb.chunks_exact(3).for_each(|pixel| take(largest(pixel)));
-            Ok(())
-        };
-        let Ok(found) = percentiles_of([99], each);
-        exposure_of(found.map(|[percentile]| percentile))
+        auto_exposure(&self.rgb, 3)
     }
 
     /// 8-bit sRGB at an exposure of `ev`. What is brighter than 1 or outside the gamut is cut to 0…255, what is not

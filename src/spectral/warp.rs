@@ -71,18 +71,18 @@ impl Warp {
     ) -> Warp {
         let most_bits = most_bits.min(MAX_BITS);
         let density = |k: usize| density(channels.bounds[k], emitters, responses.map(|responses| &responses[k]));
+        let densities: Vec<Vec<Piece>> = (0..channels.len()).map(density).collect();
         // What satisfied the channels so far is where the next channel starts.
-        let bits = (0..channels.len()).fold(0, |least, k| {
-            let pieces = density(k);
-            let worth = most_useful(&pieces) + WORTH_MORE_STRATA;
+        let bits = densities.iter().fold(0, |least, pieces| {
+            let worth = most_useful(pieces) + WORTH_MORE_STRATA;
             (least..most_bits)
-                .find(|&bits| variance(&pieces, &quantiles(&pieces, 1 << bits)) <= worth)
+                .find(|&bits| variance(pieces, &quantiles(pieces, 1 << bits)) <= worth)
                 .unwrap_or(most_bits)
         });
         if bits == 0 {
             return Warp::uniform(channels);
         }
-        Warp { bits, knots: (0..channels.len()).flat_map(|k| quantiles(&density(k), 1 << bits)).collect() }
+        Warp { bits, knots: densities.iter().flat_map(|pieces| quantiles(pieces, 1 << bits)).collect() }
     }
 
     /// log2 of the number of strata.

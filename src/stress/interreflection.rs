@@ -12,14 +12,12 @@ pub const CASES: &[Case] = &[
         group: GROUP,
         name: "cavity",
         what: "inside a glowing sphere that reflects 0.5 to 0.999999, 8 to 256 bounces: (1 - ρ^(n+1)) / (1 - ρ)",
-        long: false,
         run: cavity,
     },
     Case {
         group: GROUP,
         name: "mirrors",
         what: "between two hot mirrors, 1 to 256 bounces: (1 - R^(n+1)) B",
-        long: false,
         run: mirrors,
     },
 ];

@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 pub use bench::Bench;
 
 use crate::Result;
-use crate::gpu::adapter::Selection;
+use crate::gpu::adapter::Gpu;
 use crate::render::worker::Interrupt;
 use crate::report::Circumstances;
 use crate::report::page::Page;
@@ -28,8 +28,6 @@ pub struct Case {
     pub name: &'static str,
     /// What is stressed, the answer, and where it comes from.
     pub what: &'static str,
-    /// Left out of the quick set.
-    pub long: bool,
     run: fn(&mut Bench) -> Result<()>,
 }
 
@@ -45,7 +43,7 @@ pub struct Check {
 }
 
 /// What became of a case.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Outcome {
     pub checks: Vec<Check>,
     pub non_finite: u64,
@@ -62,6 +60,10 @@ impl Check {
         (self.got - self.expected).abs() <= self.bound
     }
 
+    pub fn verdict(&self) -> &'static str {
+        verdict(self.passes())
+    }
+
     /// The error over its bound: 1 and more fails.
     fn share(&self) -> f64 {
         let off = (self.got - self.expected).abs();
@@ -71,12 +73,19 @@ impl Check {
 
 impl Outcome {
     pub fn passes(&self) -> bool {
-        let clean = self.non_finite == 0 && self.negative == 0 && self.overflow == 0;
-        clean && self.error.is_none() && !self.checks.is_empty() && self.checks.iter().all(Check::passes)
+        self.bad_samples() == 0
+            && self.error.is_none()
+            && !self.checks.is_empty()
+            && self.checks.iter().all(Check::passes)
     }
 
     pub fn verdict(&self) -> &'static str {
-        if self.passes() { "pass" } else { "fail" }
+        verdict(self.passes())
+    }
+
+    /// Not finite, negative, or of a path that found no end in a structure.
+    pub fn bad_samples(&self) -> u64 {
+        self.non_finite + self.negative + self.overflow
     }
 
     /// The check that is nearest to its bound, or furthest beyond.
@@ -86,18 +95,22 @@ impl Outcome {
     }
 }
 
+fn verdict(passes: bool) -> &'static str {
+    if passes { "pass" } else { "fail" }
+}
+
 /// All cases, in the order of VALIDATION section 3.
 pub fn cases() -> Vec<Case> {
     [spectra::CASES, range::CASES, interreflection::CASES, surfaces::CASES, geometry::CASES].concat()
 }
 
-/// Runs a case. Errors: an interrupt, or no device; what else goes wrong is the case's outcome.
-pub fn run(case: &Case, devices: &Selection, interrupt: &Arc<Interrupt>) -> Result<Outcome> {
+/// Runs a case. Errors: an interrupt; what else goes wrong is the case's outcome.
+pub fn run(case: &Case, gpu: &Arc<Gpu>, interrupt: &Arc<Interrupt>) -> Result<Outcome> {
     let began = std::time::Instant::now();
-    let mut bench = Bench::new(case.name, devices, interrupt);
+    let mut bench = Bench::new(case.name, gpu, interrupt);
     let error = match (case.run)(&mut bench) {
         Ok(()) => None,
-        Err(error @ (crate::Error::Interrupted { .. } | crate::Error::NoDevice(_))) => return Err(error),
+        Err(error @ crate::Error::Interrupted { .. }) => return Err(error),
         Err(error) => Some(error.to_string()),
     };
     Ok(Outcome { error, seconds: began.elapsed().as_secs_f64(), ..bench.outcome })
@@ -108,7 +121,7 @@ pub fn facts(case: &Case, outcome: &Outcome) -> Value {
     let check = |c: &Check| {
         json!({
             "what": c.what, "expected": c.expected, "got": c.got, "error": c.got - c.expected, "bound": c.bound,
-            "standard_error": c.standard_error, "verdict": if c.passes() { "pass" } else { "fail" },
+            "standard_error": c.standard_error, "verdict": c.verdict(),
         })
     };
     json!({
@@ -124,9 +137,8 @@ pub fn csv(outcomes: &[(Case, Outcome)]) -> String {
     let mut text = String::from("group,case,check,expected,got,error,bound,standard_error,verdict\n");
     for (case, outcome) in outcomes {
         for c in &outcome.checks {
-            let verdict = if c.passes() { "pass" } else { "fail" };
             text += &format!(
-                "{},{},\"{}\",{:e},{:e},{:e},{:e},{:e},{verdict}\n",
+                "{},{},\"{}\",{:e},{:e},{:e},{:e},{:e},{}\n",
                 case.group,
                 case.name,
                 c.what.replace('"', "\"\""),
@@ -134,7 +146,8 @@ pub fn csv(outcomes: &[(Case, Outcome)]) -> String {
                 c.got,
                 c.got - c.expected,
                 c.bound,
-                c.standard_error
+                c.standard_error,
+                c.verdict()
             );
         }
     }
@@ -175,8 +188,7 @@ pub fn html(outcomes: &[(Case, Outcome)], circumstances: &Circumstances) -> Stri
             ]),
             (None, None) => row.extend(std::iter::repeat_n(String::new(), 4)),
         }
-        let bad = outcome.non_finite + outcome.negative + outcome.overflow;
-        row.extend([outcome.checks.len().to_string(), bad.to_string(), outcome.verdict().to_owned()]);
+        row.extend([outcome.checks.len().to_string(), outcome.bad_samples().to_string(), outcome.verdict().to_owned()]);
         rows.push(row);
     }
     if !rows.is_empty() {
@@ -191,7 +203,7 @@ mod tests {
 
     fn outcome(got: f64) -> Outcome {
         let check = Check { what: "x".into(), expected: 1.0, got, bound: 0.1, standard_error: 0.0 };
-        Outcome { checks: vec![check], non_finite: 0, negative: 0, overflow: 0, error: None, seconds: 0.0 }
+        Outcome { checks: vec![check], ..Outcome::default() }
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Dynamic range, optical depth and accumulation.
 
-use super::bench::{F32, TABLES};
+use super::bench::{F32, TABLES, WALL, lamp};
 use super::{Bench, Case};
 use crate::Result;
 use crate::spectral::planck;
@@ -10,54 +10,46 @@ pub const CASES: &[Case] = &[
         group: "dynamic range",
         name: "planck",
         what: "a black wall from 3 K to 50,000 K, 380 to 20,000 nm: Planck's law at every wavelength, 0 where f32 has nothing smaller",
-        long: false,
         run: black_walls,
     },
     Case {
         group: "dynamic range",
         name: "sun-and-night",
         what: "6e7 beside 1e-12 in one picture: both to the last bits",
-        long: false,
         run: sun_and_night,
     },
     Case {
         group: "dynamic range",
         name: "units",
         what: "radiance of 1e-30 and 1e30, seen and reflected: as it is, and half of it",
-        long: false,
         run: units,
     },
     Case {
         group: "optical depth",
         name: "depths",
         what: "1e-9 to 1e6 in one spectrum of one hot medium: (1 - exp(-τ)) B",
-        long: false,
         run: depths,
     },
     Case {
         group: "optical depth",
         name: "shadow",
         what: "a lamp behind a cold medium of depth 1e-9 to 1e6: exp(-τ)",
-        long: false,
         run: shadow,
     },
     Case {
         group: "optical depth",
         name: "plume-and-mirror",
         what: "hot gas of depth 1e-6 in front of a mirror: (1 - exp(-τ)) (1 + R exp(-τ)) B",
-        long: false,
         run: plume_and_mirror,
     },
     Case {
         group: "accumulation",
         name: "constant",
         what: "a visible constant after 1 to 1,600 samples: exact to the last bit",
-        long: false,
         run: constant,
     },
 ];
 
-const WALL: &str = "quad = { corner = [-1, -1, 0], edge_u = [2, 0, 0], edge_v = [0, 2, 0] }\n";
 const NM: [f64; 12] =
     [380.0, 450.0, 550.0, 700.0, 1000.0, 1500.0, 2500.0, 4000.0, 6000.0, 10_000.0, 15_000.0, 19_999.0];
 
@@ -168,11 +160,8 @@ fn plume_and_mirror(bench: &mut Bench) -> Result<()> {
 }
 
 fn constant(bench: &mut Bench) -> Result<()> {
-    let text = format!(
-        "[integrator]\nmax_bounces = 0\n[materials.b.black]\n[[objects]]\n{WALL}material = \"b\"\nemission = 0.1\n"
-    );
     for samples in [1, 2, 32, 64, 128, 1600] {
-        let seen = bench.render(&text, samples)?;
+        let seen = bench.render(&lamp("0.1"), samples)?;
         let wrong = seen.image.mean.iter().filter(|v| **v != f64::from(0.1f32)).count();
         bench.check_within(format!("pixels that are not 0.1 after {samples}"), 0.0, (wrong as f64, 0.0), 0.0);
     }

@@ -1,6 +1,6 @@
 //! Spectra and channels that are hard to hold: lines, long and short tables, channels of any width and number.
 
-use super::bench::{F32, TABLES};
+use super::bench::{F32, TABLES, WALL, lamp};
 use super::{Bench, Case};
 use crate::Result;
 use crate::render::rng::hash;
@@ -13,60 +13,40 @@ pub const CASES: &[Case] = &[
         group: GROUP,
         name: "line",
         what: "a line of 0.01 nm in a channel of 10 nm, seen directly and by light from a white wall: its area over the width",
-        long: false,
         run: line,
     },
     Case {
         group: GROUP,
         name: "long-table",
         what: "10,001 nodes in 8 channels: trapezia between the nodes",
-        long: false,
         run: long_table,
     },
-    Case {
-        group: GROUP,
-        name: "two-nodes",
-        what: "a table of two nodes: the value at each centre",
-        long: false,
-        run: two_nodes,
-    },
+    Case { group: GROUP, name: "two-nodes", what: "a table of two nodes: the value at each centre", run: two_nodes },
     Case {
         group: GROUP,
         name: "widths",
         what: "channels 0.001 nm and 10,000 nm wide in one cube: Planck's law at 1000 K, and its mean by Simpson's rule",
-        long: false,
         run: widths,
     },
     Case {
         group: GROUP,
         name: "overlaps",
         what: "disjoint, overlapping and equal channels: linear radiance at each centre, equal bits in equal channels",
-        long: false,
         run: overlaps,
     },
     Case {
         group: GROUP,
         name: "counts",
         what: "1, 2, 3, 2,000 and 5,000 channels: a visible constant to the last bit",
-        long: false,
         run: counts,
     },
     Case {
         group: GROUP,
         name: "outside",
         what: "channels partly and wholly outside the data: zero there",
-        long: false,
         run: outside,
     },
 ];
-
-/// A lamp that fills the view.
-fn lamp(radiance: &str) -> String {
-    format!(
-        "[integrator]\nmax_bounces = 0\n[materials.black.black]\n[[objects]]\n\
-         quad = {{ corner = [-1, -1, 0], edge_u = [2, 0, 0], edge_v = [0, 2, 0] }}\nmaterial = \"black\"\nemission = {radiance}\n"
-    )
-}
 
 fn line(bench: &mut Bench) -> Result<()> {
     const LINE: &str = "{ samples = [[549.995, 0], [550, 1000], [550.005, 0]] }";
@@ -78,7 +58,7 @@ fn line(bench: &mut Bench) -> Result<()> {
     // A wall of reflectance 0.5 under a sky of the line.
     let wall = format!(
         "[channels]\nintervals = [[545, 555]]\n[integrator]\nmax_bounces = 1\n[materials.grey.diffuse]\nreflectance = 0.5\n\
-         [environment]\nradiance = {LINE}\n[[objects]]\nquad = {{ corner = [-1, -1, 0], edge_u = [2, 0, 0], edge_v = [0, 2, 0] }}\n\
+         [environment]\nradiance = {LINE}\n[[objects]]\n{WALL}\
          material = \"grey\"\n"
     );
     let reflected = bench.render(&wall, 1024)?;

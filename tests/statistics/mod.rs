@@ -56,6 +56,17 @@ impl Estimate {
     }
 }
 
+/// Means over the pixels of an image, per channel, from values and their standard errors, [pixel][channel].
+pub fn image_estimates(mean: &[f64], error: &[f64], channels: usize, freedom: f64) -> Vec<Estimate> {
+    let pixels = (mean.len() / channels) as f64;
+    let of = |values: &'_ [f64], k: usize, power: i32| {
+        values.iter().skip(k).step_by(channels).map(|v| v.powi(power)).sum::<f64>()
+    };
+    let estimate =
+        |k: usize| Estimate { mean: of(mean, k, 1) / pixels, error: of(error, k, 2).sqrt() / pixels, freedom };
+    (0..channels).map(estimate).collect()
+}
+
 /// What a test allows: the standard error at most `resolution`, and a systematic error of at most `allowance`, both
 /// relative to the expected value.
 #[derive(Debug, Clone, Copy)]

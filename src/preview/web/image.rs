@@ -17,7 +17,7 @@ use crate::cube::{BLOCK, Look, Rect, Window};
 use crate::format::png;
 use crate::spectral::Channels;
 use crate::spectral::temperature::{BandTemperature, THERMAL_NM, is_thermal, shown_range};
-use crate::spectral::tone::{Tone, percentiles};
+use crate::spectral::tone::{Tone, auto_exposure, percentiles};
 use crate::{Error, Result};
 
 /// Pixels of an answer.
@@ -90,7 +90,7 @@ pub async fn image(
         .read(move |look| {
             let window = asked.window(look, &thermometers.thermometers)?;
             let tone = asked.tone(&window);
-            let png = (asked.format == Format::Png).then(|| asked.png(window.clone(), tone)).transpose()?;
+            let png = (asked.format == Format::Png).then(|| asked.png(&window, tone)).transpose()?;
             Ok((window, tone, png))
         })
         .await?;
@@ -162,18 +162,16 @@ impl Asked {
                 let [low, high] = shown_range(percentiles(&window.values));
                 Tone::Range([self.low.unwrap_or(low), self.high.unwrap_or(high)])
             }
-            _ => Tone::Exposure(self.ev.unwrap_or_else(|| window.clone().into_picture().auto_exposure())),
+            _ => Tone::Exposure(self.ev.unwrap_or_else(|| auto_exposure(&window.values, window.planes))),
         }
     }
 
-    fn png(&self, window: Window, tone: Tone) -> Result<Vec<u8>> {
-        let size = window.size;
-        let values = match tone {
-            Tone::Exposure(_) => window.into_picture().rgb,
-            Tone::Range(_) => window.values,
+    fn png(&self, window: &Window, tone: Tone) -> Result<Vec<u8>> {
+        let made = match tone {
+            Tone::Exposure(_) if window.planes != 3 => tone.srgb8(&window.clone().into_picture().rgb),
+            _ => tone.srgb8(&window.values),
         };
-        let made = png::encode(size, &tone.srgb8(&values));
-        made.map_err(|error| Error::Internal(format!("PNG: {error}")))
+        png::encode(window.size, &made).map_err(|error| Error::Internal(format!("PNG: {error}")))
     }
 }
 
