@@ -67,7 +67,12 @@ fn generate_bounce(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     let ray = Ray(state0.xyz, bitcast<vec3<f32>>(state1.xyz));
     // Density of `direction`, for MIS; the camera's own rays compete with nothing.
     let density = state0.w;
+#if BOUNCE_BY_BOUNCE
+    // Evaluated before the next bounce.
+    var list = RecordList(path, 0u, 0u);
+#else
     var list = RecordList(path, packed & 0xffffu, packed >> 16u);
+#endif
     var overflow = false;
 #if ROULETTE
     var scale = throughputs[path];
@@ -184,7 +189,11 @@ fn generate_bounce(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     if (overflow) {
         atomicAdd(&counters[COUNTER_OVERFLOW], 1u);
     }
+#if BOUNCE_BY_BOUNCE
+    heads[path].y = list.count;
+#else
     heads[path].y = list.used;
+#endif
     states[2u * path] = bitcast<vec4<u32>>(vec4<f32>(origin, dot(normal, direction) * INV_PI));
     states[2u * path + 1u] = vec4<u32>(bitcast<vec3<u32>>(direction), list.count | (list.used << 16u));
     let next = atomicAdd(&queue_lengths[step.bounce], 1u);

@@ -58,7 +58,12 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 #else
     let live = NONE;
 #endif
+#if BOUNCE_BY_BOUNCE
+    // Evaluated before the next bounce.
+    var list = RecordList(path, 0u, 0u, 0u);
+#else
     var list = RecordList(path, packed & 0xffffu, packed >> 16u, 0u);
+#endif
     var overflow = false;
 #if ROULETTE
     var scale = throughputs[path];
@@ -420,7 +425,11 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     }
     let direction = to_world(v, i);
     let origin = offset_origin(surface.position, select(-face, face, i.z > 0.0));
+#if BOUNCE_BY_BOUNCE
+    heads[path].y = list.count;
+#else
     heads[path].y = list.used;
+#endif
     states[STATE_WORDS * path] = bitcast<vec4<u32>>(vec4<f32>(origin, next_density));
     states[STATE_WORDS * path + 1u] = vec4<u32>(bitcast<vec3<u32>>(direction), list.count | (list.used << 16u));
 #if MEDIA

@@ -7,10 +7,12 @@ use glam::{DMat3, DVec2, DVec3};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use scene_builder::*;
 use spectile::gpu::adapter::STORAGE_BUFFERS;
-use spectile::gpu::shader::{Module, Source, compose};
+use spectile::gpu::shader::{Source, compose};
 use spectile::render::compose::{EvaluateShape, WindowList, Windows};
 use spectile::render::prepare::{Features, Prepared};
-use spectile::scene::{Attributes, Field, Filter, Projection, Sampler, Scene, Shape, Sides, Texels, TextureKind};
+use spectile::scene::{
+    Attributes, Evaluator, Field, Filter, Projection, Sampler, Scene, Shape, Sides, Texels, TextureKind,
+};
 use spectile::spectral::{Channels, Curve};
 
 /// Bytes of a kernel's code, comments and indentation apart: of a plain scene's, and of one that needs everything and spreads its
@@ -19,6 +21,9 @@ const MAX_PLAIN_BYTES: usize = 18 << 10;
 const MAX_BYTES: usize = 32 << 10;
 /// Of general scenes, by what their materials need.
 const MAX_GENERAL_BYTES: usize = 64 << 10;
+
+const EVALUATORS: [Evaluator; 4] =
+    [Evaluator::DpeptPixel, Evaluator::DpeptPath, Evaluator::DpeptSpectral, Evaluator::Pt];
 
 fn plain_scene() -> Scene {
     Builder::new()
@@ -32,15 +37,14 @@ fn windows(nodes: u32, primitives: u32) -> Windows {
     Windows { nodes: WindowList { count: nodes, size: 1000 }, primitives: WindowList { count: primitives, size: 2000 } }
 }
 
-/// The three passes of `prepared`, as the worker composes them.
-fn passes(prepared: &Prepared, windows: &Windows, shape: EvaluateShape) -> [Source; 3] {
+/// The passes of `prepared`, as the worker composes them.
+fn passes(prepared: &Prepared, windows: &Windows, shape: EvaluateShape) -> Vec<Source> {
     let defines = prepared.defines(windows);
-    let generate = |modules: &[Module]| compose(modules, &defines);
-    [
-        generate(&prepared.camera_modules()),
-        generate(&prepared.bounce_modules()),
-        compose(&prepared.evaluate_modules(), &prepared.evaluate_defines(shape)),
-    ]
+    let generate = [prepared.camera_modules(), prepared.bounce_modules()];
+    let evaluate = [Some(prepared.evaluate_modules()), prepared.update_modules()];
+    let generate = generate.iter().map(|modules| compose(modules, &defines));
+    let evaluate = evaluate.iter().flatten().map(|modules| compose(modules, &prepared.evaluate_defines(shape)));
+    generate.chain(evaluate).collect()
 }
 
 /// All combinations of the features that change a pass's text; combinations that no scene has are left out.
@@ -72,10 +76,13 @@ fn all_sources() -> Vec<(String, Source)> {
         .map(|(quads, software)| EvaluateShape::new(quads, software));
     let mut found = std::collections::HashMap::new();
     for (i, features) in combinations().into_iter().enumerate() {
+        // So do the evaluators; only one has spectra in registers.
+        prepared.evaluator = if features.registers { Evaluator::DpeptPixel } else { EVALUATORS[i % EVALUATORS.len()] };
         prepared.features = features;
         // Windows and workgroups take turns among the combinations, and all are seen with all features off and on.
         let windows = windows(1 + i as u32 % 4, 1 + i as u32 / 4 % 4);
-        for source in passes(&prepared, &windows, shapes[i % shapes.len()]) {
+        let shape = EvaluateShape { batches: Some(2), ..shapes[i % shapes.len()] };
+        for source in passes(&prepared, &windows, shape) {
             found
                 .entry(source.text.clone())
                 .or_insert_with(|| (format!("{} for {features:?}, {windows:?}", source.label), source));
@@ -310,7 +317,7 @@ fn disk() -> Shape {
 fn general_sources() -> Vec<(String, Source)> {
     let mut found = std::collections::HashMap::new();
     for (i, (what, scene)) in general_scenes().into_iter().enumerate() {
-        let prepared = Prepared::new(&scene, 0).unwrap();
+        let prepared = Prepared::for_evaluator(&scene, 0, EVALUATORS[i % EVALUATORS.len()]).unwrap();
         let windows = windows(1 + i as u32 % 4, 1 + i as u32 / 4 % 4);
         for source in passes(&prepared, &windows, prepared.evaluate_shape(i % 2 == 0)) {
             found.entry(source.text.clone()).or_insert_with(|| (format!("{} for {what}", source.label), source));
@@ -321,9 +328,9 @@ fn general_sources() -> Vec<(String, Source)> {
 
 // ---- What a scene does not need
 
-fn texts(scene: &Scene) -> [String; 3] {
+fn texts(scene: &Scene) -> Vec<String> {
     let prepared = Prepared::new(scene, 0).unwrap();
-    passes(&prepared, &windows(1, 1), EvaluateShape::new(3, true)).map(|s| s.text)
+    passes(&prepared, &windows(1, 1), EvaluateShape::new(3, true)).into_iter().map(|s| s.text).collect()
 }
 
 /// Identifiers of the code, comments apart.

@@ -52,9 +52,10 @@ struct Wave {
     sequence: u32,
 }
 
-// One dispatch of a wave.
+// One dispatch of a wave: a bounce of all paths, or a sample of all pixels.
 struct Step {
     bounce: u32,
+    sample: u32,
 }
 
 struct Ray {

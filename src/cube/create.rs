@@ -35,12 +35,15 @@ enum Way {
 }
 
 /// Whether [`super::Writer::open`] may work on `tiles` of a cube at `path`, as far as can be told without changing
-/// anything.
-pub fn check_target(path: &Path, header: &Header, existing: Existing, tiles: &Range<u32>) -> Result<()> {
+/// anything; the header of the cube that is gone on with, if one is.
+pub fn check_target(path: &Path, header: &Header, existing: Existing, tiles: &Range<u32>) -> Result<Option<Header>> {
     match find_way(path, header, existing, tiles)? {
-        Way::Create(_) => Ok(()),
-        Way::Replace(target) => refuse_in_use(TileLock::held(&target.join(PRIVATE), ALL_TILES), &target),
-        Way::GoOn(cube) => refuse_in_use(TileLock::held(&cube.private(), tiles.clone()), cube.path()),
+        Way::Create(_) => Ok(None),
+        Way::Replace(target) => refuse_in_use(TileLock::held(&target.join(PRIVATE), ALL_TILES), &target).map(|()| None),
+        Way::GoOn(cube) => {
+            refuse_in_use(TileLock::held(&cube.private(), tiles.clone()), cube.path())?;
+            Ok(Some(cube.header().clone()))
+        }
     }
 }
 

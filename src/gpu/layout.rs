@@ -43,11 +43,12 @@ pub struct Wave {
     pub sequence: u32,
 }
 
-/// `Step` in WGSL: one dispatch of a wave.
+/// `Step` in WGSL: one dispatch of a wave, a bounce of all paths or a sample of all pixels.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
 pub struct Step {
     pub bounce: u32,
+    pub sample: u32,
 }
 
 /// `Emitter` in WGSL: one emitting primitive.
@@ -289,7 +290,7 @@ mod tests {
             epoch_mask,
             sequence
         });
-        same_layout!(Step { bounce });
+        same_layout!(Step { bounce, sample });
         same_layout!(Emitter { primitive, spectrum, pick, area });
         same_layout!(Material { factor, two_sided, albedo, unused });
         same_layout!(SurfaceMaterial { first_part, part_count, flags, survival });

@@ -1,9 +1,10 @@
 //! Shaders composed per scene from the modules it needs.
 //!
-//! A pass is the ordered concatenation of plain WGSL files. Four line directives leave out what a scene does not need,
+//! A pass is the ordered concatenation of plain WGSL files. Line directives leave out what a scene does not need,
 //! so that its text is the same as if the feature did not exist:
 //! `#if NAME`, `#else`, `#endif` (NAME defined and not 0) and `#repeat NAME i` … `#end` (as many times as NAME says, with
-//! `$i` and `$(4+i)` counting; loops nest). `$NAME` stands for a value; constants are declared on top.
+//! `$i` and `$(4+i)` counting; loops nest). `$NAME` stands for a value; constants are declared on top. `#include PATH` stands for
+//! the text of a file that several passes have inside of a function.
 
 use std::collections::BTreeMap;
 
@@ -21,6 +22,9 @@ macro_rules! modules {
         $(pub const $ident: Module = Module { name: $path, text: include_str!(concat!("../../shaders/", $path)) };)*
     };
 }
+
+/// Files that passes include.
+const INCLUDED: [Module; 1] = [RECORDS];
 
 modules! {
     TYPES = "common/types.wgsl";
@@ -57,7 +61,16 @@ modules! {
     GENERATE_CAMERA = "generate_camera.wgsl";
     GENERATE_BOUNCE = "generate_bounce.wgsl";
     GENERATE_VERTEX = "generate_vertex.wgsl";
+    SAVED_PATHS = "common/saved_paths.wgsl";
+    SPECTRA = "common/spectra.wgsl";
+    RECORDS = "common/records.wgsl";
+    FOLD = "common/fold.wgsl";
+    SPECTRAL_STATE = "common/spectral_state.wgsl";
     EVALUATE_PIXEL = "evaluate_pixel.wgsl";
+    EVALUATE_PATH = "evaluate_path.wgsl";
+    EVALUATE_SPECTRAL = "evaluate_spectral.wgsl";
+    UPDATE_PATH = "update_path.wgsl";
+    FOLD_PATHS = "fold_paths.wgsl";
     SELF_TEST = "self_test.wgsl";
 }
 
@@ -102,10 +115,15 @@ pub fn compose(modules: &[Module], defines: &Defines) -> Source {
         source.push(format!("const {name}: u32 = {value}u;"), ("constants", 0));
     }
     for module in modules {
-        let lines: Vec<(usize, &str)> = module.text.lines().enumerate().map(|(i, l)| (i + 1, l)).collect();
-        emit(&lines, module, defines, &[], &mut source);
+        emit(&module.lines(), module, defines, &[], &mut source);
     }
     source
+}
+
+impl Module {
+    fn lines(&self) -> Vec<(usize, &'static str)> {
+        self.text.lines().enumerate().map(|(i, line)| (i + 1, line)).collect()
+    }
 }
 
 impl Source {
@@ -169,6 +187,11 @@ fn emit(lines: &[(usize, &str)], module: &Module, defines: &Defines, counts: &Co
                 emit(&lines[at + 1..end], module, defines, &[counts, &[(counter, i)]].concat(), out);
             }
             at = end + 1;
+        } else if let Some(path) = directive.strip_prefix("#include ") {
+            let included = INCLUDED.iter().find(|module| module.name == path);
+            let included = included.unwrap_or_else(|| panic!("shaders/{}:{number}: no file {path}", module.name));
+            emit(&included.lines(), included, defines, counts, out);
+            at += 1;
         } else {
             out.push(substitute(line, defines, counts), (module.name, number));
             at += 1;

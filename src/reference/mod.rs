@@ -147,7 +147,7 @@ mod tests {
 
     use super::*;
     use crate::scene::{
-        Camera, Environment, Film, Filter, Integrator, Projection, Sampler, Shape, Spectrum, Wavelengths,
+        Camera, Environment, Evaluator, Film, Filter, Integrator, Projection, Sampler, Shape, Spectrum, Wavelengths,
     };
     use crate::spectral::{Channels, Curve, Outside};
 
@@ -171,7 +171,7 @@ mod tests {
                 russian_roulette_start: 1,
                 sampler: Sampler::Independent,
                 wavelengths: Wavelengths::Uniform,
-                evaluator: "auto".into(),
+                evaluator: Evaluator::Auto,
                 epoch: 64,
             },
             spectra: spectra.into(),

@@ -1,9 +1,11 @@
 //! Shaders as a scene composes them: the modules of each pass, its switches and constants, and the shape of its workgroups.
 
+use crate::gpu::self_test::LOOP_LIMIT;
 use crate::gpu::shader::{self, Defines, Module};
 use crate::render::heat;
 use crate::render::prepare::{General, Prepared};
 use crate::render::surfaces::Kind;
+use crate::scene::Evaluator;
 
 impl Prepared {
     /// Switches and constants of every pass. `windows`: primitives and nodes per binding, see `gpu::upload`.
@@ -12,6 +14,7 @@ impl Prepared {
         let mut d = Defines::default();
         d.constant("STACK_SIZE", self.accel.depth);
         d.set("CAMERA_THIN_LENS", f.thin_lens).set("CAMERA_ORTHOGRAPHIC", f.orthographic).set("GAUSSIAN", f.gaussian);
+        d.set("BOUNCE_BY_BOUNCE", self.evaluator == Evaluator::Pt);
         d.set("INDEPENDENT", f.independent).set("ROULETTE", f.roulette).set("SHAPES", f.shapes);
         if let Some(general) = &f.general {
             self.general_defines(general, &mut d);
@@ -88,8 +91,27 @@ impl Prepared {
         modules
     }
 
+    /// The pass that leaves the means of a wave's pixels: it evaluates all saved paths, or folds what [`Self::update_modules`]
+    /// made of them.
     pub fn evaluate_modules(&self) -> Vec<Module> {
-        let mut modules = vec![shader::TYPES, shader::FRAME];
+        match self.evaluator {
+            Evaluator::Auto | Evaluator::DpeptPixel => self.evaluating(&[shader::FOLD, shader::EVALUATE_PIXEL]),
+            Evaluator::DpeptPath => self.evaluating(&[shader::FOLD, shader::EVALUATE_PATH]),
+            Evaluator::DpeptSpectral => self.evaluating(&[shader::FOLD, shader::EVALUATE_SPECTRAL]),
+            Evaluator::Pt => {
+                vec![shader::TYPES, shader::SAVED_PATHS, shader::SPECTRAL_STATE, shader::FOLD, shader::FOLD_PATHS]
+            }
+        }
+    }
+
+    /// The pass after every bounce of the conventional path tracer.
+    pub fn update_modules(&self) -> Option<Vec<Module>> {
+        (self.evaluator == Evaluator::Pt).then(|| self.evaluating(&[shader::SPECTRAL_STATE, shader::UPDATE_PATH]))
+    }
+
+    /// What takes spectra along records, and then `last`.
+    fn evaluating(&self, last: &[Module]) -> Vec<Module> {
+        let mut modules = vec![shader::TYPES, shader::FRAME, shader::SAVED_PATHS, shader::SPECTRA];
         if self.features.knots {
             modules.push(shader::KNOTS);
         }
@@ -112,7 +134,7 @@ impl Prepared {
             }
             modules.push(shader::PROGRAM);
         }
-        modules.push(shader::EVALUATE_PIXEL);
+        modules.extend(last);
         modules
     }
 
@@ -196,20 +218,24 @@ impl Prepared {
         d.constant("QUADS", self.tables.channels_padded as u32 / 4);
     }
 
-    /// Workgroups of `evaluate_pixel` on a software device or a GPU.
+    /// Workgroups of what evaluates, on a software device or a GPU.
     pub fn evaluate_shape(&self, software: bool) -> EvaluateShape {
         let quads = self.tables.channels_padded as u32 / 4;
-        match self.features.general {
+        let shape = match self.features.general {
             None => EvaluateShape::new(quads, software),
             // A march through voxels is long, and compiled for each quad.
             Some(general) if general.media.is_some_and(|m| m.grids.is_some()) => {
                 EvaluateShape::among(quads, software, &[1])
             }
             Some(_) => EvaluateShape::general(quads, software),
+        };
+        match self.evaluator {
+            Evaluator::DpeptPath => shape.path_by_path(quads, self.path_iterations()),
+            _ => shape,
         }
     }
 
-    /// Switches and constants of `evaluate_pixel`, for workgroups as `shape` says.
+    /// Switches and constants of what evaluates, for workgroups as `shape` says.
     pub fn evaluate_defines(&self, shape: EvaluateShape) -> Defines {
         let mut d = Defines::default();
         d.set("STRATA", self.features.strata).set("KNOTS", self.features.knots);
@@ -227,6 +253,9 @@ impl Prepared {
         d.constant("LANES", shape.lanes);
         d.constant("VECTORS", shape.vectors);
         d.constant("PIXELS_PER_GROUP", shape.pixels);
+        if let Some(batches) = shape.batches {
+            d.constant("BATCHES", batches);
+        }
         d
     }
 }
@@ -245,7 +274,7 @@ pub struct WindowList {
     pub size: u32,
 }
 
-/// Threads of one workgroup of `evaluate_pixel`: `lanes` threads for each of `pixels` pixels, `vectors` quads of channels
+/// Threads of one workgroup of what evaluates: `lanes` threads for each of `pixels` pixels, `vectors` quads of channels
 /// a thread.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct EvaluateShape {
@@ -254,6 +283,8 @@ pub struct EvaluateShape {
     pub pixels: u32,
     /// Workgroups that share a pixel's channels.
     pub blocks: u32,
+    /// How often a thread takes `vectors` quads, one batch after the other (`dpept-path`); else once.
+    pub batches: Option<u32>,
 }
 
 impl EvaluateShape {
@@ -276,15 +307,23 @@ impl EvaluateShape {
             let threads = quads.div_ceil(vectors);
             if threads < width {
                 let lanes = threads.next_power_of_two();
-                return EvaluateShape { vectors, lanes, pixels: (64 / lanes).max(1), blocks: 1 };
+                return EvaluateShape { vectors, lanes, pixels: (64 / lanes).max(1), blocks: 1, batches: None };
             }
             let blocks = threads.div_ceil(256);
-            EvaluateShape { vectors, lanes: threads.div_ceil(blocks).next_multiple_of(width), pixels: 1, blocks }
+            let lanes = threads.div_ceil(blocks).next_multiple_of(width);
+            EvaluateShape { vectors, lanes, pixels: 1, blocks, batches: None }
         };
         let cost = |s: &EvaluateShape| f64::from(s.lanes * s.blocks) * (2.2 + f64::from(s.vectors));
         let candidates = if software { candidates } else { &[1] };
         let shapes = candidates.iter().map(|&v| of(v));
         shapes.min_by(|a, b| cost(a).total_cmp(&cost(b))).expect("at least one candidate")
+    }
+
+    /// A thread for all of a path's channels, or as many as its loops can take.
+    fn path_by_path(self, quads: u32, path_iterations: u32) -> EvaluateShape {
+        let batches = quads.div_ceil(self.vectors);
+        let at_once = (LOOP_LIMIT / path_iterations).clamp(1, batches);
+        EvaluateShape { lanes: 1, pixels: 64, blocks: batches.div_ceil(at_once), batches: Some(at_once), ..self }
     }
 }
 
@@ -305,8 +344,17 @@ mod tests {
                 assert!(threads < 2 * needed || threads < needed + width * s.blocks, "{quads}: {s:?}");
             }
         }
-        assert_eq!(EvaluateShape::new(100, false), EvaluateShape { vectors: 1, lanes: 128, pixels: 1, blocks: 1 });
-        assert_eq!(EvaluateShape::new(100, true), EvaluateShape { vectors: 4, lanes: 32, pixels: 1, blocks: 1 });
-        assert_eq!(EvaluateShape::new(2, true), EvaluateShape { vectors: 2, lanes: 1, pixels: 64, blocks: 1 });
+        assert_eq!(
+            EvaluateShape::new(100, false),
+            EvaluateShape { vectors: 1, lanes: 128, pixels: 1, blocks: 1, batches: None }
+        );
+        assert_eq!(
+            EvaluateShape::new(100, true),
+            EvaluateShape { vectors: 4, lanes: 32, pixels: 1, blocks: 1, batches: None }
+        );
+        assert_eq!(
+            EvaluateShape::new(2, true),
+            EvaluateShape { vectors: 2, lanes: 1, pixels: 64, blocks: 1, batches: None }
+        );
     }
 }

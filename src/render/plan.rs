@@ -7,16 +7,13 @@ use crate::files::format_bytes;
 use crate::gpu::upload;
 use crate::render::prepare::{Features, Prepared};
 use crate::render::wave::{Budget, DeviceLimits, WavePlan};
-use crate::scene::Scene;
+use crate::scene::{Evaluator, Scene};
 use crate::{Error, Result};
 
 /// Side of a tile where nothing says otherwise, in pixels.
 const DEFAULT_TILE: u32 = 64;
 /// A tile with all its channels stays below this, so that a few fit into any device and any host.
 const MAX_DEFAULT_TILE_BYTES: u64 = 64 << 20;
-
-/// The evaluator that `auto` stands for; the only one so far.
-pub const EVALUATOR: &str = "dpept-pixel";
 
 /// Width and height of the tiles: from the number of channels, the film and `--tile` alone, never from the device.
 pub fn tile_size(scene: &Scene, asked: Option<u32>) -> [u32; 2] {
@@ -35,7 +32,7 @@ pub fn header(scene: &Scene, tile: [u32; 2], seed: u64) -> Header {
     let mut attributes = Map::new();
     attributes.insert("scene_digest".into(), json!(scene.digest));
     attributes.insert("seed".into(), json!(seed));
-    attributes.insert("evaluator".into(), json!(EVALUATOR));
+    attributes.insert("evaluator".into(), json!(scene.integrator.evaluator.resolved().name()));
     attributes.insert(
         "settings".into(),
         json!({
@@ -51,6 +48,18 @@ pub fn header(scene: &Scene, tile: [u32; 2], seed: u64) -> Header {
         epoch: scene.integrator.epoch,
         attributes,
     }
+}
+
+/// The evaluator for `scene`, or the one that the cube was begun with which `there` describes: what `auto` stands for may have
+/// changed since.
+pub fn evaluator(scene: &Scene, there: Option<&Header>) -> Result<Evaluator> {
+    let Some(recorded) = there.and_then(|header| header.attributes.get("evaluator")) else {
+        return Ok(scene.integrator.evaluator.resolved());
+    };
+    let known = Evaluator::ALL.into_iter().find(|evaluator| recorded == evaluator.name());
+    known.map(Evaluator::resolved).ok_or_else(|| {
+        Error::Usage(format!("the cube was begun with the evaluator {recorded}, which this version does not have"))
+    })
 }
 
 /// One part of the renderer, and whether this scene needs it.

@@ -15,7 +15,8 @@ use crate::render::radiators::{self, Radiators};
 use crate::render::sky::SkyMap;
 use crate::render::surfaces::{Kind, Needed, Surfaces};
 use crate::scene::{
-    Attributes, Bsdf, Environment, Filter, Light, Projection, Reflectance, Sampler, Scene, Sides, Texels, Wavelengths,
+    Attributes, Bsdf, Environment, Evaluator, Filter, Light, Projection, Reflectance, Sampler, Scene, Sides, Texels,
+    Wavelengths,
 };
 use crate::spectral::Curve;
 use crate::spectral::table::{Exactness, SpectralTables, Tabulated, Wanted};
@@ -138,6 +139,8 @@ impl General {
 
 /// A scene as every device gets it.
 pub struct Prepared {
+    /// Never [`Evaluator::Auto`].
+    pub evaluator: Evaluator,
     pub features: Features,
     pub frame: Frame,
     pub materials: Vec<Material>,
@@ -174,17 +177,22 @@ impl Prepared {
     /// Flattens `scene`. Errors: materials that no shader knows; more materials, spectra or bounces than ids and
     /// counters have bits for.
     pub fn new(scene: &Scene, seed: u64) -> Result<Prepared> {
+        Prepared::for_evaluator(scene, seed, scene.integrator.evaluator.resolved())
+    }
+
+    /// As [`Prepared::new`], for an evaluator other than the scene's.
+    pub fn for_evaluator(scene: &Scene, seed: u64, evaluator: Evaluator) -> Result<Prepared> {
         match Integration::of(&scene.channels) {
-            None => Prepared::flatten(scene, seed, None),
+            None => Prepared::flatten(scene, seed, evaluator, None),
             Some(integration) => {
                 let inner = Scene { channels: integration.inner.clone(), ..scene.clone() };
-                Prepared::flatten(&inner, seed, Some(integration))
+                Prepared::flatten(&inner, seed, evaluator, Some(integration))
             }
         }
     }
 
     /// `scene` in the channels that the device renders.
-    fn flatten(scene: &Scene, seed: u64, integration: Option<Integration>) -> Result<Prepared> {
+    fn flatten(scene: &Scene, seed: u64, evaluator: Evaluator, integration: Option<Integration>) -> Result<Prepared> {
         let heat = heat::as_emission(scene);
         let scene = &*heat.scene;
         let accel = Accel::build(scene);
@@ -290,9 +298,10 @@ impl Prepared {
             ..General::of(surfaces, scene)
         };
         features.general = surfaces.as_ref().map(of);
-        features.registers &= !general && integration.is_none();
+        // A pixel's paths share them; who takes a path at a time would fill them for each.
+        features.registers &= !general && integration.is_none() && evaluator == Evaluator::DpeptPixel;
         let frame = frame(scene, seed, &accel, &picks, environment_spectrum, tables.stratum_bits);
-        let max_records = max_records(&frame, features, surfaces.as_ref(), media.as_ref());
+        let max_records = max_records(vertices_at_once(evaluator, &frame), features, surfaces.as_ref(), media.as_ref());
         if max_records >= MAX_RECORDS {
             let message = format!(
                 "a path of {} bounces may take {max_records} records in this scene, at most {MAX_RECORDS} are supported: \
@@ -302,6 +311,7 @@ impl Prepared {
             return Err(Error::input(&scene.file, message));
         }
         let prepared = Prepared {
+            evaluator,
             features,
             frame: Frame { max_records, ..frame },
             materials,
@@ -337,13 +347,18 @@ impl Prepared {
     /// Iterations that evaluation may take for one path: its records, and the voxels on its ways with the absorbers in each.
     pub fn path_iterations(&self) -> u32 {
         let cells = self.media.as_ref().map_or(0, |media| media.cells.saturating_mul(1 + media.most_absorbers));
-        let ways = self.frame.max_bounces.saturating_mul(2) + 1;
+        let ways = vertices_at_once(self.evaluator, &self.frame).saturating_mul(2) + 1;
         (self.frame.max_records + 1).saturating_add(ways.saturating_mul(cells))
     }
 
-    /// Most records that one path can have: at each vertex what it emits and what next-event estimation found.
+    /// Most records of a path that are kept at once: at each vertex what it emits and what next-event estimation found.
     pub fn max_records(&self) -> u32 {
         self.frame.max_records
+    }
+
+    /// Bytes of the state that all channels of a path have between two bounces: none where they are evaluated at its end.
+    pub fn spectral_state_bytes(&self) -> u32 {
+        if self.evaluator == Evaluator::Pt { 16 * self.tables.channels_padded as u32 } else { 0 }
     }
 
     /// Bytes of a record.
@@ -505,9 +520,14 @@ fn features(scene: &Scene, accel: &Accel, tables: &SpectralTables, spectra: usiz
     }
 }
 
-/// Most records of a path: at every scattering event what materials take, and emission where a surface or the sky emits.
-fn max_records(frame: &Frame, features: Features, surfaces: Option<&Surfaces>, media: Option<&Media>) -> u32 {
-    let bounces = frame.max_bounces;
+/// Scattering events that are saved before they are evaluated: a path's, or one.
+fn vertices_at_once(evaluator: Evaluator, frame: &Frame) -> u32 {
+    if evaluator == Evaluator::Pt { 1 } else { frame.max_bounces }
+}
+
+/// Most records of `bounces` scattering events of a path and of what it meets after them: at every one what materials take, and
+/// emission where a surface or the sky emits.
+fn max_records(bounces: u32, features: Features, surfaces: Option<&Surfaces>, media: Option<&Media>) -> u32 {
     let general = features.general.unwrap_or_default();
     // Where a path leaves the scene: the environment, and suns that may cover one another.
     let hot = general.radiators.map_or(0, |radiators| radiators.records);

@@ -91,7 +91,8 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
     let tile = plan::tile_size(&job.scene, job.tile);
     let header = job.header(tile);
     let tiles = job.tiles(&header)?;
-    check_target(&job.output, &header, job.existing, &tiles)?;
+    let there = check_target(&job.output, &header, job.existing, &tiles)?;
+    let evaluator = plan::evaluator(&job.scene, there.as_ref())?;
     if let Some(preview) = &job.preview {
         files::check_target(&preview.file)?;
     }
@@ -104,7 +105,7 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
             "the devices are of different kinds: the cube is right, but its last bits depend on which rendered what";
         observe(Event::Warning(what.into()))?;
     }
-    let prepared = Arc::new(Prepared::new(&job.scene, job.seed)?);
+    let prepared = Arc::new(Prepared::for_evaluator(&job.scene, job.seed, evaluator)?);
     if prepared.accel.degenerate > 0 {
         let what =
             format!("{} triangles without area in f32 were left out: no ray can meet them", prepared.accel.degenerate);

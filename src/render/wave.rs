@@ -19,6 +19,9 @@ const UNIT_BYTES: u64 = 16;
 /// Paths of the smallest waves: a few workgroups. With fewer, dispatches cost more than what they do.
 const LEAST_PATHS: u64 = 256;
 
+/// Most samples per pixel of a wave: those of the longest epoch that is usual.
+const MOST_SAMPLES: u32 = 64;
+
 /// What a device allows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DeviceLimits {
@@ -58,6 +61,10 @@ pub struct WavePlan {
     /// Loop iterations that evaluating a path may take.
     pub path_iterations: u32,
     pub record_size: u32,
+    /// Bytes of the state of all channels of a path (`pt`), or 0.
+    pub spectral_state_size: u32,
+    /// Whether evaluation has a dispatch a sample.
+    pub sample_by_sample: bool,
     pub roulette: bool,
     pub limits: DeviceLimits,
     /// The scene on the device, bytes.
@@ -81,8 +88,9 @@ impl WavePlan {
                 limits.binding >> 20
             )));
         }
-        let bindable =
-            limits.binding / (u64::from(prepared.record_bytes()) * records).max(u64::from(prepared.state_bytes()));
+        let of_a_path =
+            [prepared.record_bytes() * prepared.max_records(), prepared.state_bytes(), prepared.spectral_state_bytes()];
+        let bindable = limits.binding / u64::from(of_a_path.into_iter().max().unwrap_or(1));
         let most = bindable.min(budget.paths.map_or(u64::MAX, u64::from));
         if most == 0 {
             return Err(Error::Usage(
@@ -101,6 +109,8 @@ impl WavePlan {
             state_size: prepared.state_bytes(),
             path_iterations: prepared.path_iterations(),
             record_size: prepared.record_bytes(),
+            spectral_state_size: prepared.spectral_state_bytes(),
+            sample_by_sample: prepared.evaluator.takes_one_sample(),
             roulette: prepared.features.roulette,
             limits,
             scene_bytes: upload::scene_bytes(prepared, &windows),
@@ -137,9 +147,9 @@ impl WavePlan {
         ((half.paths, half.units) != (self.paths, self.units)).then_some(half)
     }
 
-    /// Samples per pixel of a wave: one invocation of `evaluate` walks all of them.
+    /// Samples per pixel of a wave: one invocation of `evaluate_pixel` walks all of them.
     fn most_samples(&self) -> u32 {
-        let samples = (LOOP_LIMIT / self.path_iterations).clamp(1, 64).min(self.paths);
+        let samples = (LOOP_LIMIT / self.path_iterations).clamp(1, MOST_SAMPLES).min(self.paths);
         1 << samples.ilog2()
     }
 
@@ -181,6 +191,10 @@ impl WavePlan {
         if self.roulette { u64::from(self.paths) * THROUGHPUT_BYTES } else { 0 }
     }
 
+    pub fn spectral_state_bytes(&self) -> u64 {
+        u64::from(self.paths) * u64::from(self.spectral_state_size)
+    }
+
     pub fn record_bytes(&self) -> u64 {
         u64::from(self.paths) * u64::from(self.max_records) * u64::from(self.record_size)
     }
@@ -204,8 +218,14 @@ impl WavePlan {
         self.limits.uniform_alignment.max(16)
     }
 
+    /// Dispatches that are numbered: bounces and what the last direction meets, or samples.
+    pub fn steps(&self) -> Vec<Step> {
+        let samples = if self.sample_by_sample { MOST_SAMPLES } else { 0 };
+        (0..samples.max(self.max_bounces + 1)).map(|i| Step { bounce: i, sample: i }).collect()
+    }
+
     pub fn step_bytes(&self) -> u64 {
-        (u64::from(self.max_bounces) + 1) * u64::from(self.step_stride())
+        self.steps().len() as u64 * u64::from(self.step_stride())
     }
 
     /// How long each list of paths under way became.
@@ -220,8 +240,9 @@ impl WavePlan {
         let by_paths = [self.state_bytes(), self.head_bytes(), self.record_bytes(), self.queue_bytes()];
         let by_units = [self.unit_list_bytes(), self.mean_bytes(), self.staging_bytes(), self.staging_bytes()];
         let throughputs = self.roulette.then(|| self.throughput_bytes());
+        let spectral = (self.spectral_state_size > 0).then(|| self.spectral_state_bytes());
         let sizes = [fixed, by_paths, by_units];
-        sizes.iter().flatten().copied().chain(throughputs).map(buffer::allocated).sum()
+        sizes.iter().flatten().copied().chain(throughputs).chain(spectral).map(buffer::allocated).sum()
     }
 
     /// The most that a device holds at any moment: the scene, and then the waves' buffers; before those are there, what
@@ -237,6 +258,7 @@ impl WavePlan {
             + QUEUE_BYTES
             + u64::from(self.record_size) * u64::from(self.max_records)
             + self.throughput_bytes().min(THROUGHPUT_BYTES)
+            + u64::from(self.spectral_state_size)
     }
 
     /// How many units to submit together in an epoch of `samples` samples per pixel.
@@ -287,11 +309,6 @@ fn wanted_paths(software: bool, channels: u64, records: u64) -> u64 {
     (evaluations / (channels * records)).clamp(LEAST_PATHS, most)
 }
 
-/// The dispatches of a wave, one a bounce, and the one that sees what the last direction meets.
-pub fn steps(max_bounces: u32) -> Vec<Step> {
-    (0..=max_bounces).map(|bounce| Step { bounce }).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -314,6 +331,8 @@ mod tests {
             state_size: 32,
             path_iterations: 12,
             record_size: 8,
+            spectral_state_size: 0,
+            sample_by_sample: false,
             roulette: false,
             limits: LIMITS,
             scene_bytes: 0,

@@ -16,7 +16,7 @@ use crate::gpu::upload::{self, SceneBuffers};
 use crate::render::compose::EvaluateShape;
 use crate::render::patience::Patience;
 use crate::render::prepare::Prepared;
-use crate::render::wave::{self, Budget, DeviceLimits, WavePlan};
+use crate::render::wave::{Budget, DeviceLimits, WavePlan};
 use crate::{Error, Result};
 
 /// A rectangle x0, y0, x1, y1 of the full film: one tile in one epoch.
@@ -62,6 +62,8 @@ pub struct Worker {
     prepared: Arc<Prepared>,
     camera: Stage,
     bounce: Stage,
+    /// After every bounce, in the conventional path tracer.
+    update: Option<Stage>,
     evaluate: Stage,
     shape: EvaluateShape,
     path_buffers: PathBuffers,
@@ -103,6 +105,7 @@ struct PathBuffers {
     steps: wgpu::Buffer,
     step_stride: u32,
     states: wgpu::Buffer,
+    spectral_states: Option<wgpu::Buffer>,
     heads: wgpu::Buffer,
     records: wgpu::Buffer,
     throughputs: Option<wgpu::Buffer>,
@@ -174,7 +177,9 @@ impl Worker {
         };
         let camera = stage(&prepared.camera_modules(), &defines)?;
         let bounce = stage(&prepared.bounce_modules(), &defines)?;
-        let evaluate = stage(&prepared.evaluate_modules(), &prepared.evaluate_defines(shape))?;
+        let defines = prepared.evaluate_defines(shape);
+        let update = prepared.update_modules().map(|modules| stage(&modules, &defines)).transpose()?;
+        let evaluate = stage(&prepared.evaluate_modules(), &defines)?;
         gpu.check()?;
         let profile = Profile::default();
         let timestamps = None;
@@ -185,6 +190,7 @@ impl Worker {
             prepared,
             camera,
             bounce,
+            update,
             evaluate,
             shape,
             path_buffers,
@@ -203,7 +209,8 @@ impl Worker {
 
     /// Measures the passes from now on, at the price of waiting for every wave.
     pub fn enable_profile(&mut self) {
-        self.timestamps = self.gpu.timestamps.then(|| Timestamps::new(&self.gpu));
+        let passes = if self.update.is_some() { 2 * self.bounces() } else { 2 };
+        self.timestamps = self.gpu.timestamps.then(|| Timestamps::new(&self.gpu, passes));
     }
 
     /// Ends the work of [`Worker::submit`] with an error as soon as `interrupt` is set.
@@ -372,22 +379,34 @@ impl Worker {
         self.gpu.queue.write_buffer(&self.path_buffers.wave, 0, bytemuck::bytes_of(&wave));
         let mut encoder = self.encoder("wave");
         encoder.clear_buffer(&self.path_buffers.queue_lengths, 0, None);
-        {
-            let mut pass = self.begin(&mut encoder, "generate", 0);
-            let [x, y] = fold(groups);
-            self.camera.set(&mut pass, &[]);
-            pass.dispatch_workgroups(x, y, 1);
-            for step in wave::steps(self.prepared.frame.max_bounces) {
-                self.bounce.set(&mut pass, &[step.bounce * self.path_buffers.step_stride]);
-                pass.dispatch_workgroups(x, y, 1);
+        let step = |number: u32| [number * self.path_buffers.step_stride];
+        let (all, pixels) = (fold(groups), fold(pixel_groups));
+        let mut pass = self.begin(&mut encoder, "generate", 0);
+        self.camera.dispatch(&mut pass, &[], all, 1);
+        for bounce in 0..self.bounces() {
+            if bounce > 0 && self.update.is_some() {
+                drop(pass);
+                pass = self.begin(&mut encoder, "generate", 2 * bounce);
+            }
+            self.bounce.dispatch(&mut pass, &step(bounce), all, 1);
+            if let Some(update) = &self.update {
+                drop(pass);
+                pass = self.begin(&mut encoder, "evaluate", 2 * bounce + 1);
+                update.dispatch(&mut pass, &step(bounce), fold(paths.div_ceil(self.shape.pixels)), self.shape.blocks);
             }
         }
-        {
-            let mut pass = self.begin(&mut encoder, "evaluate", 1);
-            let [x, y] = fold(pixel_groups);
-            self.evaluate.set(&mut pass, &[]);
-            pass.dispatch_workgroups(x, y, self.shape.blocks);
+        if self.update.is_none() {
+            drop(pass);
+            pass = self.begin(&mut encoder, "evaluate", 1);
         }
+        if self.plan.sample_by_sample {
+            for sample in 0..wave.samples {
+                self.evaluate.dispatch(&mut pass, &step(sample), pixels, self.shape.blocks);
+            }
+        } else {
+            self.evaluate.dispatch(&mut pass, &[], pixels, self.shape.blocks);
+        }
+        drop(pass);
         if let Some(timestamps) = &self.timestamps {
             timestamps.resolve(&mut encoder);
         }
@@ -399,6 +418,11 @@ impl Worker {
             self.profile.evaluate_s += evaluate;
         }
         Ok(())
+    }
+
+    /// Bounces, and what the last direction meets.
+    fn bounces(&self) -> u32 {
+        self.prepared.frame.max_bounces + 1
     }
 
     fn begin<'e>(
@@ -442,10 +466,11 @@ fn fold(groups: u32) -> [u32; 2] {
 
 impl Stage {
     /// `offsets`: one per dynamic binding of the pass.
-    fn set(&self, pass: &mut wgpu::ComputePass<'_>, offsets: &[u32]) {
+    fn dispatch(&self, pass: &mut wgpu::ComputePass<'_>, offsets: &[u32], [x, y]: [u32; 2], z: u32) {
         pass.set_pipeline(&self.pass.pipeline);
         pass.set_bind_group(0, &self.groups[0], &[]);
         pass.set_bind_group(1, &self.groups[1], offsets);
+        pass.dispatch_workgroups(x, y, z);
     }
 }
 
@@ -455,7 +480,7 @@ impl PathBuffers {
         let storage = U::STORAGE | U::COPY_SRC | U::COPY_DST;
         let step_stride = plan.step_stride();
         let mut step_bytes = vec![0u8; plan.step_bytes() as usize];
-        for (step, bytes) in wave::steps(plan.max_bounces).iter().zip(step_bytes.chunks_mut(step_stride as usize)) {
+        for (step, bytes) in plan.steps().iter().zip(step_bytes.chunks_mut(step_stride as usize)) {
             bytes[..size_of_val(step)].copy_from_slice(bytemuck::bytes_of(step));
         }
         let steps = buffer::empty(gpu, "steps", plan.step_bytes(), U::UNIFORM | U::COPY_DST);
@@ -466,6 +491,8 @@ impl PathBuffers {
             steps,
             step_stride,
             states: buffer::empty(gpu, "states", plan.state_bytes(), storage),
+            spectral_states: (plan.spectral_state_size > 0)
+                .then(|| buffer::empty(gpu, "spectral_states", plan.spectral_state_bytes(), storage)),
             heads: buffer::empty(gpu, "heads", plan.head_bytes(), storage),
             records: buffer::empty(gpu, "records", plan.record_bytes(), storage),
             throughputs: plan.roulette.then(|| buffer::empty(gpu, "throughputs", plan.throughput_bytes(), storage)),
@@ -485,6 +512,7 @@ impl PathBuffers {
                 return Some(wgpu::BufferBinding { buffer: &self.steps, offset: 0, size });
             }
             "states" => &self.states,
+            "spectral_states" => self.spectral_states.as_ref()?,
             "heads" => &self.heads,
             "records" => &self.records,
             "throughputs" => self.throughputs.as_ref()?,
@@ -498,32 +526,37 @@ impl PathBuffers {
     }
 }
 
-/// Begin and end of the generate and evaluate passes of a wave.
+/// Begin and end of the passes of a wave, which generate and evaluate by turns.
 struct Timestamps {
+    passes: u32,
     queries: wgpu::QuerySet,
     resolved: wgpu::Buffer,
 }
 
 impl Timestamps {
-    fn new(gpu: &Gpu) -> Timestamps {
+    fn new(gpu: &Gpu, passes: u32) -> Timestamps {
         let queries = gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
             label: Some("timestamps"),
             ty: wgpu::QueryType::Timestamp,
-            count: 4,
+            count: 2 * passes,
         });
         let usage = wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC;
-        Timestamps { queries, resolved: buffer::empty(gpu, "timestamps", 32, usage) }
+        Timestamps { passes, queries, resolved: buffer::empty(gpu, "timestamps", 16 * u64::from(passes), usage) }
     }
 
     fn resolve(&self, encoder: &mut wgpu::CommandEncoder) {
-        encoder.resolve_query_set(&self.queries, 0..4, &self.resolved, 0);
+        encoder.resolve_query_set(&self.queries, 0..2 * self.passes, &self.resolved, 0);
     }
 
     /// Seconds of generate and evaluate, when they are done.
     fn read(&self, gpu: &Gpu, limit: Duration) -> Result<[f64; 2]> {
-        let ticks: Vec<u64> = buffer::read(gpu, &self.resolved, 32, limit)?;
+        let ticks: Vec<[u64; 2]> = buffer::read(gpu, &self.resolved, 16 * u64::from(self.passes), limit)?;
         let period = f64::from(gpu.queue.get_timestamp_period()) * 1e-9;
-        Ok([0, 2].map(|i| ticks[i + 1].saturating_sub(ticks[i]) as f64 * period))
+        let mut seconds = [0.0; 2];
+        for (pass, [begin, end]) in ticks.into_iter().enumerate() {
+            seconds[pass % 2] += end.saturating_sub(begin) as f64 * period;
+        }
+        Ok(seconds)
     }
 }
 

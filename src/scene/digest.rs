@@ -239,7 +239,7 @@ impl Hash {
             Wavelengths::Uniform => 0,
             Wavelengths::Emission => 1,
         });
-        self.text(&integrator.evaluator);
+        self.text(integrator.evaluator.name());
         self.count(integrator.epoch as usize);
     }
 

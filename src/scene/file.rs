@@ -15,7 +15,7 @@ use super::object::Objects;
 use super::overrides;
 use super::spectrum::Spectra;
 use super::tree::{self, Entry, Origin};
-use super::{Integrator, Sampler, Scene, Wavelengths};
+use super::{Evaluator, Integrator, Sampler, Scene, Wavelengths};
 use crate::error::{Error, Problem, Result};
 
 const TOP: Keys = Keys::new(&[
@@ -158,7 +158,7 @@ impl Default for Integrator {
             russian_roulette_start: 0,
             sampler: Sampler::Sobol,
             wavelengths: Wavelengths::Emission,
-            evaluator: "auto".to_owned(),
+            evaluator: Evaluator::Auto,
             epoch: 64,
         }
     }
@@ -182,12 +182,8 @@ fn decode_integrator(item: &Item) -> Option<Integrator> {
         None => Some(default.wavelengths),
     };
     let evaluator = match fields.get("evaluator") {
-        Some(item) => choice_or_later(
-            &item,
-            &[("auto", "auto"), ("dpept-pixel", "dpept-pixel")],
-            &["dpept-path", "dpept-spectral", "pt"],
-        ),
-        None => Some("auto"),
+        Some(item) => item.choice(&Evaluator::ALL.map(|evaluator| (evaluator.name(), evaluator))),
+        None => Some(default.evaluator),
     };
     let epoch = match fields.get("epoch") {
         Some(item) => item.whole(1..=MAX_EPOCH).filter(|epoch| {
@@ -206,18 +202,7 @@ fn decode_integrator(item: &Item) -> Option<Integrator> {
         russian_roulette_start: russian_roulette_start?,
         sampler: sampler?,
         wavelengths: wavelengths?,
-        evaluator: evaluator?.to_owned(),
+        evaluator: evaluator?,
         epoch: epoch?,
     })
-}
-
-/// One of `now`; a value of `later` is refused by name.
-fn choice_or_later<T: Copy>(item: &Item, now: &[(&str, T)], later: &[&str]) -> Option<T> {
-    let written = item.text()?;
-    if later.contains(&written) {
-        let help = format!("use {}", super::decode::quoted(now.iter().map(|(name, _)| name)));
-        item.error_help(format!("`{written}` is not supported yet"), help);
-        return None;
-    }
-    item.choice(now)
 }

@@ -138,10 +138,51 @@ pub struct Integrator {
     pub russian_roulette_start: u32,
     pub sampler: Sampler,
     pub wavelengths: Wavelengths,
-    /// As written in the scene: `auto`, `dpept-pixel`, …
-    pub evaluator: String,
+    pub evaluator: Evaluator,
     /// Samples per pixel of a full epoch, a power of two up to 1,024.
     pub epoch: u32,
+}
+
+/// How channels are evaluated along paths. All trace the same paths and differ in rounding only.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Evaluator {
+    /// What is fastest on the device, by a fixed rule of its kind and the number of channels.
+    Auto,
+    /// Deferred: a thread takes some channels of a pixel along all its saved paths.
+    DpeptPixel,
+    /// Deferred: a thread takes all channels of a saved path, batch by batch (the method, section 5.1).
+    DpeptPath,
+    /// Deferred: the threads of a workgroup take different channels of the same saved path (the method, section 5.2).
+    DpeptSpectral,
+    /// The conventional path tracer: all channels of all paths in memory, updated at every bounce (the method, section 4).
+    Pt,
+}
+
+impl Evaluator {
+    pub const ALL: [Evaluator; 5] =
+        [Evaluator::Auto, Evaluator::DpeptPixel, Evaluator::DpeptPath, Evaluator::DpeptSpectral, Evaluator::Pt];
+
+    /// What to use: `auto` is `dpept-pixel`, which was the fastest with any number of channels on each kind of device.
+    pub fn resolved(self) -> Evaluator {
+        if self == Evaluator::Auto { Evaluator::DpeptPixel } else { self }
+    }
+
+    /// Whether a dispatch takes one sample of every pixel, instead of all that are there.
+    pub fn takes_one_sample(self) -> bool {
+        matches!(self, Evaluator::DpeptPath | Evaluator::DpeptSpectral)
+    }
+
+    /// As scenes write it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Evaluator::Auto => "auto",
+            Evaluator::DpeptPixel => "dpept-pixel",
+            Evaluator::DpeptPath => "dpept-path",
+            Evaluator::DpeptSpectral => "dpept-spectral",
+            Evaluator::Pt => "pt",
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use glam::{DVec2, DVec3};
-use spectile::scene::{self, Bsdf, Filter, Projection, Reflectance, Sampler, Shape, Sides, Wavelengths};
+use spectile::scene::{self, Bsdf, Evaluator, Filter, Projection, Reflectance, Sampler, Shape, Sides, Wavelengths};
 use spectile::spectral::{Curve, Outside};
 
 use super::{BASE, changed, good};
@@ -64,7 +64,7 @@ fn settings_resolve_with_their_defaults() {
     let integrator = &scene.integrator;
     assert_eq!((integrator.max_bounces, integrator.russian_roulette_start, integrator.epoch), (5, 0, 64));
     assert_eq!((integrator.sampler, integrator.wavelengths), (Sampler::Sobol, Wavelengths::Emission));
-    assert_eq!(integrator.evaluator, "auto");
+    assert_eq!(integrator.evaluator, Evaluator::Auto);
     assert!(scene.file.is_absolute());
     let scene = good(
         BASE,
@@ -81,7 +81,7 @@ fn settings_resolve_with_their_defaults() {
     assert_eq!((scene.film.filter, scene.film.cube_size()), (Filter::Gaussian, [7, 16]));
     let integrator = &scene.integrator;
     assert_eq!((integrator.max_bounces, integrator.russian_roulette_start, integrator.epoch), (0, 3, 1024));
-    assert_eq!((integrator.sampler, integrator.evaluator.as_str()), (Sampler::Independent, "dpept-pixel"));
+    assert_eq!((integrator.sampler, integrator.evaluator), (Sampler::Independent, Evaluator::DpeptPixel));
 }
 
 #[test]

@@ -186,7 +186,6 @@ fn integrator() {
         ("roulette", KEY, "russian_roulette_start = 0.5 #!", "integrator.russian_roulette_start", &["whole number"]),
         ("sampler", KEY, "sampler = \"sobel\" #!", "integrator.sampler", &["\"sobol\", \"independent\"", "did you mean `sobol`?"]),
         ("wavelengths", KEY, "wavelengths = \"random\" #!", "integrator.wavelengths", &["must be one of \"emission\", \"uniform\""]),
-        ("evaluator later", KEY, "evaluator = \"pt\" #!", "integrator.evaluator", &["`pt` is not supported yet"]),
         ("evaluator", KEY, "evaluator = \"dpept\" #!", "integrator.evaluator", &["\"auto\", \"dpept-pixel\""]),
         ("epoch", KEY, "epoch = 48 #!", "integrator.epoch", &["power of two up to 1024", "use 32 or 64"]),
         ("epoch too large", KEY, "epoch = 2048 #!", "integrator.epoch", &["from 1 to 1024"]),

@@ -8,9 +8,9 @@ pub mod surfaces;
 
 use glam::{DMat3, DVec2, DVec3};
 use spectile::scene::{
-    Attributes, Bsdf, Camera, Emission, Environment, EnvironmentMap, Film, Filter, Integrator, Light, Material, Mesh,
-    Object, Projection, Reflectance, Sampler, Scene, Shape, Sides, Spectrum, Texels, Texture, TextureKind, Wavelengths,
-    Weight,
+    Attributes, Bsdf, Camera, Emission, Environment, EnvironmentMap, Evaluator, Film, Filter, Integrator, Light,
+    Material, Mesh, Object, Projection, Reflectance, Sampler, Scene, Shape, Sides, Spectrum, Texels, Texture,
+    TextureKind, Wavelengths, Weight,
 };
 use spectile::spectral::{Channels, Curve, upsample};
 
@@ -30,7 +30,7 @@ impl Builder {
                 russian_roulette_start: 0,
                 sampler: Sampler::Independent,
                 wavelengths: Wavelengths::Emission,
-                evaluator: "auto".into(),
+                evaluator: Evaluator::Auto,
                 epoch: 64,
             },
             spectra: Vec::new(),

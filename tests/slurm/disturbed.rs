@@ -73,6 +73,16 @@ fn a_requeued_array_goes_on() {
 fn a_restarted_controller_changes_nothing() {
     let Some(mut place) = Place::new(2, 2) else { return };
     under_way(&place, "8");
+    place.cluster.stop_controller();
+    place.cluster.start_controller(false);
+    place.ends_with_the_same_bytes(SPP);
+}
+
+#[test]
+#[ignore = "a minute on a real cluster"]
+fn a_killed_controller_changes_nothing() {
+    let Some(mut place) = Place::new(2, 2) else { return };
+    under_way(&place, "8");
     place.cluster.kill_controller();
     thread::sleep(Duration::from_secs(4));
     place.cluster.start_controller(false);

@@ -130,7 +130,8 @@ impl Place {
     }
 
     fn summary(&self) -> String {
-        fs::read_to_string(self.at("cube.zarr.summary.txt")).expect("a summary")
+        let summary = fs::read_to_string(self.at("cube.zarr.summary.txt"));
+        summary.unwrap_or_else(|e| panic!("a summary: {e}\n{}", self.logs()))
     }
 
     /// Waits for the end of everything; then the cube must be whole, and every byte that of the one-machine render.

@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::{Place, folder_with_scene, is_there, turn};
 
-const SPP: &str = "2048";
+const SPP: &str = "16384";
 const TASKS: u32 = 8;
 
 /// What one run says of itself.

@@ -9,7 +9,7 @@ use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use tempfile::TempDir;
 
@@ -183,8 +183,20 @@ impl Cluster {
         wait_for("slurmctld", || self.command("scontrol", &["ping"]).status.success().then_some(()));
     }
 
-    /// SIGKILL, as when its machine fails.
+    /// SIGTERM, as when its service is restarted: it saves what it knows.
+    pub fn stop_controller(&mut self) {
+        let mut controller = self.controller.take().expect("running");
+        signal(controller.id(), "TERM");
+        controller.wait().expect("ended");
+    }
+
+    /// SIGKILL, as when its machine fails. It saves what it knows five seconds after a change; what is not saved yet would be lost
+    /// to Slurm itself, so this waits until all of now is.
     pub fn kill_controller(&mut self) {
+        let (now, state) = (SystemTime::now(), self.folder.path().join("state/job_state"));
+        wait_for("the controller to save", || {
+            fs::metadata(&state).and_then(|file| file.modified()).is_ok_and(|saved| saved > now).then_some(())
+        });
         let mut controller = self.controller.take().expect("running");
         controller.kill().expect("killed");
         controller.wait().expect("ended");
