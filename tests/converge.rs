@@ -31,6 +31,7 @@ fn a_report_of_two_samplers_and_two_numbers_of_channels() {
         "sampler independent, count 8",
     ];
     assert_eq!(names, expected);
+    let (mut estimated, mut real) = (0.0, 0.0);
     for curve in curves {
         let points = curve["points"].as_array().expect("points");
         // 1, 1, 2, … 32 samples, then 64 at a time to 1,024.
@@ -39,14 +40,17 @@ fn a_report_of_two_samplers_and_two_numbers_of_channels() {
         assert_eq!((number(0, "samples"), number(21, "samples")), (1.0, 1024.0));
         assert!((1..22).all(|i| number(i, "seconds") > number(i - 1, "seconds")));
         assert!(points[6]["error_estimate"].is_null() && number(21, "error_estimate") > 0.0);
-        // The few pixels at the lamp's edge carry most of it, so neither is known well; tests/render/accuracy.rs calibrates.
-        let ratio = number(21, "error_estimate") / number(21, "error");
-        assert!((0.5..2.0).contains(&ratio), "{ratio}");
+        estimated += number(21, "error_estimate").powi(2);
+        real += number(21, "error").powi(2);
         let slope = curve["slope_samples"].as_f64().expect("a slope");
         // Of one realisation in which the few pixels at the lamp's edge count most, by Sobol points or without:
         // tests/convergence.rs measures slopes.
         assert!((-1.5..-0.3).contains(&slope), "{curve}");
     }
+    // The few pixels at the lamp's edge carry most of it, so that of one curve neither is known to a factor of two;
+    // tests/render/accuracy.rs calibrates.
+    let ratio = (estimated / real).sqrt();
+    assert!((0.5..2.0).contains(&ratio), "{ratio}");
     let csv = read("converge.csv");
     assert_eq!(csv.lines().count(), 1 + 4 * 4 * 22);
     let html = read("converge.html");

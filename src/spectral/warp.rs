@@ -3,7 +3,8 @@
 //! Eq. 4 of the method spreads wavelengths evenly over a channel. Where what emits is spiky within channels, most paths then
 //! miss the lines, and the few that meet one carry all of the channel's radiance. DESIGN section 6 draws them from the emitters' own
 //! spectral density instead: Λ_k is piecewise linear over M equal strata of μ with its knots at quantiles of that density,
-//! and what a path brings is weighted by dΛ_k/dμ over the channel's width. This is unbiased for any knots.
+//! and what a path brings is weighted by dΛ_k/dμ over the channel's width. This is unbiased for any knots. So some are moved to the
+//! nodes of the scene's spectra, where they fit: every spectrum is then a line in each stratum, and small tables hold it exactly.
 
 use super::{Channels, Curve};
 
@@ -55,6 +56,55 @@ impl Piece {
     }
 }
 
+/// A channel: what emits in it, and where its spectra have nodes.
+struct Part {
+    pieces: Vec<Piece>,
+    nodes: Vec<f64>,
+}
+
+impl Part {
+    fn ends(&self) -> [f64; 2] {
+        [self.pieces[0].from, self.pieces[self.pieces.len() - 1].to]
+    }
+
+    fn variance(&self, knots: &[f64]) -> f64 {
+        variance(&self.pieces, knots)
+    }
+
+    /// Knots of so many strata: quantiles, and all the nodes where there are strata enough.
+    fn knots(&self, strata: usize) -> Vec<f64> {
+        let flat = self.pieces.iter().flat_map(|piece| piece.value).all(|value| value == self.pieces[0].value[0]);
+        let emits = mean(&self.pieces).is_normal();
+        let even: Vec<f64> = (1..strata).map(|j| j as f64 / strata as f64).collect();
+        // Even wavelengths where emission is even: what is seen directly is exact then.
+        if self.nodes.is_empty() || self.nodes.len() >= strata || (flat && emits) {
+            return quantiles(&self.pieces, &even);
+        }
+        // Every cell between two nodes has a stratum, and each further one goes where it lowers the variance most, which n strata
+        // of equal probability in a cell of probability p leave at p²/n.
+        let cells = cumulative(&self.pieces, &self.nodes);
+        let probability = |i: usize| cells[i + 1] - cells[i];
+        let mut counts = vec![1usize; cells.len() - 1];
+        for _ in counts.len()..strata {
+            let use_of = |i: usize| probability(i).powi(2) / (counts[i] * (counts[i] + 1)) as f64;
+            let best = (0..counts.len()).max_by(|&a, &b| use_of(a).total_cmp(&use_of(b)));
+            counts[best.expect("a channel has a cell")] += 1;
+        }
+        let shares = counts.iter().enumerate().flat_map(|(i, &count)| {
+            let cells = &cells;
+            (0..count).map(move |j| cells[i] + (cells[i + 1] - cells[i]) * j as f64 / count as f64)
+        });
+        let mut knots = quantiles(&self.pieces, &shares.skip(1).collect::<Vec<_>>());
+        // The nodes themselves, to the last bit.
+        let mut first = 0;
+        for (count, &node) in counts.iter().zip(&self.nodes) {
+            first += count;
+            knots[first] = node;
+        }
+        knots
+    }
+}
+
 impl Warp {
     /// Eq. 4: one stratum.
     pub fn uniform(channels: &Channels) -> Warp {
@@ -62,27 +112,52 @@ impl Warp {
     }
 
     /// Quantiles of 0.9 x `emitters`, a sum of curves times factors, + 0.1 x uniform; of their product with the channels'
-    /// `responses`, where there are any. At most 2^`most_bits` strata, and no more than lower the noise.
+    /// `responses`, where there are any. At most 2^`most_bits` strata, and no more than lower the noise or let strata end at the
+    /// nodes of `tabulated`, the curves that there will be tables of.
     pub fn of_emission(
         channels: &Channels,
         emitters: &[(&Curve, f64)],
         responses: Option<&[Curve]>,
+        tabulated: &[&Curve],
         most_bits: u32,
     ) -> Warp {
         let most_bits = most_bits.min(MAX_BITS);
-        let density = |k: usize| density(channels.bounds[k], emitters, responses.map(|responses| &responses[k]));
-        let densities: Vec<Vec<Piece>> = (0..channels.len()).map(density).collect();
+        let parts: Vec<Part> = (0..channels.len())
+            .map(|k| {
+                let response = responses.map(|responses| &responses[k]);
+                let pieces = density(channels.bounds[k], emitters, response);
+                let nodes = nodes(channels.bounds[k], tabulated.iter().copied().chain(response));
+                // A channel that no affordable number of strata aligns is not worth more strata in the others.
+                let nodes = if nodes.len() < 1 << most_bits { nodes } else { Vec::new() };
+                Part { pieces, nodes }
+            })
+            .collect();
+        // Without spikes there is nothing to gain by other wavelengths.
+        if parts.iter().all(|part| part.variance(&part.ends()) <= most_useful(&part.pieces) + WORTH_MORE_STRATA) {
+            return Warp::uniform(channels);
+        }
         // What satisfied the channels so far is where the next channel starts.
-        let bits = densities.iter().fold(0, |least, pieces| {
-            let worth = most_useful(pieces) + WORTH_MORE_STRATA;
-            (least..most_bits)
-                .find(|&bits| variance(pieces, &quantiles(pieces, 1 << bits)) <= worth)
-                .unwrap_or(most_bits)
+        let bits = parts.iter().fold(1.min(most_bits), |least, part| {
+            let worth = most_useful(&part.pieces) + WORTH_MORE_STRATA;
+            let is_enough = |bits: &u32| part.nodes.len() < 1 << bits && part.variance(&part.knots(1 << bits)) <= worth;
+            (least..most_bits).find(is_enough).unwrap_or(most_bits)
         });
         if bits == 0 {
             return Warp::uniform(channels);
         }
-        Warp { bits, knots: densities.iter().flat_map(|pieces| quantiles(pieces, 1 << bits)).collect() }
+        Warp { bits, knots: parts.iter().flat_map(|part| part.knots(1 << bits)).collect() }
+    }
+
+    /// How many times as many paths wavelengths of Eq. 4 need to the same noise, at least: means over channels of what a path's
+    /// radiance squared is to the square of its mean, by the emission alone.
+    pub fn gain(&self, channels: &Channels, emitters: &[(&Curve, f64)], responses: Option<&[Curve]>) -> f64 {
+        let (mut even, mut own) = (0.0, 0.0);
+        for k in 0..channels.len() {
+            let pieces = density(channels.bounds[k], emitters, responses.map(|responses| &responses[k]));
+            even += 1.0 + variance(&pieces, &channels.bounds[k]);
+            own += 1.0 + variance(&pieces, self.of_channel(k));
+        }
+        even / own
     }
 
     /// log2 of the number of strata.
@@ -164,22 +239,57 @@ fn extent(pieces: &[Piece]) -> f64 {
     pieces[pieces.len() - 1].to - pieces[0].from
 }
 
-/// Ends of `strata` strata of equal probability under the density with its even share.
-fn quantiles(pieces: &[Piece], strata: usize) -> Vec<f64> {
-    let (first, last) = (pieces[0].from, pieces[pieces.len() - 1].to);
+/// Where the exactly piecewise linear ones of `curves` have nodes inside a channel, ascending.
+fn nodes<'a>([from, to]: [f64; 2], curves: impl Iterator<Item = &'a Curve>) -> Vec<f64> {
+    let mut nodes: Vec<f64> =
+        curves.filter_map(|curve| curve.linear_pieces(from, to)).flatten().map(|(nm, _)| nm).collect();
+    nodes.sort_by(f64::total_cmp);
+    // Roundings of what is the same number do not make a cell.
+    let least = 1e-9 * (to - from);
+    nodes.retain(|nm| *nm > from + least && *nm < to - least);
+    nodes.dedup_by(|next, last| *next - *last < least);
+    nodes
+}
+
+/// The density of wavelengths, relative to an even one, as a function of that of emission. Even where nothing emits.
+fn share(pieces: &[Piece]) -> impl Fn(f64) -> f64 {
     let mean = mean(pieces);
-    let flat = pieces.iter().flat_map(|piece| piece.value).all(|value| value == pieces[0].value[0]);
-    if flat || !mean.is_normal() {
-        return (0..=strata).map(|j| first + (last - first) * (j as f64 / strata as f64)).collect();
+    move |value: f64| if mean.is_normal() { (1.0 - EVEN) * value / mean + EVEN } else { 1.0 }
+}
+
+/// The probability of wavelengths below the channel's start, each of `nodes`, and its end.
+fn cumulative(pieces: &[Piece], nodes: &[f64]) -> Vec<f64> {
+    let density = share(pieces);
+    let (mut sums, mut below, mut next) = (vec![0.0], 0.0, nodes.iter().peekable());
+    for piece in pieces {
+        let area = |to: f64| 0.5 * (to - piece.from) * (density(piece.value[0]) + density(piece.at(to)));
+        while let Some(&node) = next.next_if(|node| **node < piece.to) {
+            sums.push((below + area(node)) / extent(pieces));
+        }
+        below += area(piece.to);
     }
-    let density = |value: f64| (1.0 - EVEN) * value / mean + EVEN;
+    sums.resize(nodes.len() + 1, 1.0);
+    sums.push(1.0);
+    sums
+}
+
+/// The channel's start, where the probability of wavelengths below is each of `shares`, ascending, and the channel's end.
+fn quantiles(pieces: &[Piece], shares: &[f64]) -> Vec<f64> {
+    let (first, last) = (pieces[0].from, pieces[pieces.len() - 1].to);
+    let flat = pieces.iter().flat_map(|piece| piece.value).all(|value| value == pieces[0].value[0]);
     let mut knots = vec![first];
+    if flat || !mean(pieces).is_normal() {
+        knots.extend(shares.iter().map(|share| first + (last - first) * share));
+        knots.push(last);
+        return knots;
+    }
+    let density = share(pieces);
     let mut below = 0.0;
     for piece in pieces {
-        let [a, b] = piece.value.map(density);
+        let [a, b] = piece.value.map(&density);
         let area = 0.5 * piece.width() * (a + b);
-        while knots.len() < strata {
-            let wanted = extent(pieces) * knots.len() as f64 / strata as f64 - below;
+        while let Some(share) = shares.get(knots.len() - 1) {
+            let wanted = extent(pieces) * share - below;
             if wanted > area {
                 break;
             }
@@ -190,8 +300,9 @@ fn quantiles(pieces: &[Piece], strata: usize) -> Vec<f64> {
         }
         below += area;
     }
+    // Roundings may leave the last ones beyond the end.
+    knots.resize(shares.len() + 1, last);
     knots.push(last);
-    debug_assert_eq!(knots.len(), strata + 1);
     knots
 }
 
@@ -254,7 +365,7 @@ mod tests {
     fn weights_make_up_for_the_knots() {
         let channels = Channels::from_bounds(vec![[400.0, 500.0], [500.0, 700.0], [450.0, 550.0]], None);
         let (sharp, broad) = (line(453.3, 0.5, 100.0), line(600.0, 150.0, 1.0));
-        let warp = Warp::of_emission(&channels, &[(&sharp, 1.0), (&broad, 2.0)], None, 8);
+        let warp = Warp::of_emission(&channels, &[(&sharp, 1.0), (&broad, 2.0)], None, &[], 8);
         assert!(warp.bits() >= 3, "{} bits", warp.bits());
         for k in 0..3 {
             let strata = 1usize << warp.bits();
@@ -279,7 +390,7 @@ mod tests {
         let channels = Channels::from_bounds(vec![[400.0, 500.0]], None);
         let sharp = line(453.3, 0.05, 1.0);
         let pieces = density(channels.bounds[0], &[(&sharp, 3.0)], None);
-        let warp = Warp::of_emission(&channels, &[(&sharp, 3.0)], None, 8);
+        let warp = Warp::of_emission(&channels, &[(&sharp, 3.0)], None, &[], 8);
         // Evenly: the line fills a thousandth of the channel.
         let even = variance(&pieces, &channels.bounds[0]);
         assert!((even / (1000.0 * 4.0 / 3.0) - 1.0).abs() < 0.01, "{even}");
@@ -298,20 +409,49 @@ mod tests {
         let flat = Curve::Constant(3.0);
         let smooth = Curve::Blackbody { kelvin: 3000.0, scale: 1.0 };
         for emitters in [&[][..], &[(&flat, 1.0)], &[(&flat, 0.0)], &[(&flat, 1.0), (&smooth, 1e-3)]] {
-            assert_eq!(Warp::of_emission(&channels, emitters, None, 8), Warp::uniform(&channels));
+            assert_eq!(Warp::of_emission(&channels, emitters, None, &[], 8), Warp::uniform(&channels));
         }
         // A channel without emission beside one with a line, and a flat one: weights are exactly 1.
         let channels = Channels::from_bounds(vec![[400.0, 500.0], [500.0, 600.0]], None);
-        let warp = Warp::of_emission(&channels, &[(&line(450.0, 1.0, 1.0), 1.0)], None, 8);
+        let warp = Warp::of_emission(&channels, &[(&line(450.0, 1.0, 1.0), 1.0)], None, &[], 8);
         assert!((0..1 << warp.bits()).all(|j| warp.weight(1, j) == 1.0));
+    }
+
+    /// Strata end at all nodes of a lamp's table and of a wall's, and the lamp's peak has most of them: what is linear in every
+    /// stratum needs no finer tables, and the noise is that of quantiles but for a tenth of the mean's square.
+    #[test]
+    fn strata_end_at_nodes() {
+        let channels = Channels::from_bounds(vec![[400.0, 450.0], [450.0, 500.0]], None);
+        let steps = |step: f64, of: &dyn Fn(f64) -> f64| {
+            let nm: Vec<f64> = (0..).map(|i| 400.0 + step * f64::from(i)).take_while(|nm| *nm <= 500.0).collect();
+            Curve::Linear { value: nm.iter().map(|nm| of(*nm)).collect(), nm, outside: Outside::Hold }
+        };
+        let lamp = steps(5.0, &|nm| if nm == 435.0 { 9.0 } else { 0.1 + 1e-3 * (nm - 400.0) });
+        let wall = steps(4.0, &|nm| 0.5 + 0.2 * (0.1 * nm).sin());
+        let emitters = [(&lamp, 1.0)];
+        let warp = Warp::of_emission(&channels, &emitters, None, &[&lamp, &wall], 8);
+        for (k, [from, to]) in channels.bounds.iter().copied().enumerate() {
+            let knots = warp.of_channel(k);
+            for nm in (400..=500).filter(|nm| nm % 4 == 0 || nm % 5 == 0).map(f64::from) {
+                assert!(nm < from || nm > to || knots.contains(&nm), "{nm} nm in {knots:?}");
+            }
+            let pieces = density([from, to], &emitters, None);
+            assert!(variance(&pieces, knots) <= most_useful(&pieces) + WORTH_MORE_STRATA);
+        }
+        assert!(warp.gain(&channels, &emitters, None) > 1.0);
+        let uniform = Warp::uniform(&channels);
+        assert_eq!(uniform.gain(&channels, &emitters, None), 1.0);
     }
 
     /// Responses say which part of a channel matters.
     #[test]
     fn responses_draw_wavelengths_too() {
         let channels = Channels::from_bounds(vec![[400.0, 500.0]], None);
-        let warp = Warp::of_emission(&channels, &[(&Curve::Constant(1.0), 1.0)], Some(&[line(480.0, 2.0, 1.0)]), 8);
-        let inside = (0..=1 << warp.bits()).filter(|&j| (warp.edge(0, j, warp.bits()) - 480.0).abs() < 2.0).count();
+        let warp =
+            Warp::of_emission(&channels, &[(&Curve::Constant(1.0), 1.0)], Some(&[line(480.0, 2.0, 1.0)]), &[], 8);
+        // Strata wholly within the response: the others are its share of 0.1 that is even.
+        let edges: Vec<f64> = (0..=1 << warp.bits()).map(|j| warp.edge(0, j, warp.bits())).collect();
+        let inside = edges.windows(2).filter(|edges| edges[0] >= 478.0 && edges[1] <= 482.0).count();
         assert!(inside as f64 > 0.85 * f64::from(1 << warp.bits()), "{inside}");
     }
 }
