@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use super::bench::{F32, TABLES};
 use super::{Bench, Case};
-use crate::Result;
+use crate::{Error, Result};
 
 const GROUP: &str = "geometry";
 
@@ -20,6 +20,12 @@ pub const CASES: &[Case] = &[
         name: "slivers",
         what: "lamps in one place and slivers of 1e-9 before a lamp: its radiance, once",
         run: slivers,
+    },
+    Case {
+        group: GROUP,
+        name: "pile",
+        what: "a million triangles in one point before a lamp, and ten thousand of 1e-30 m: its radiance; a thousand in one place: theirs; more than a ray can test: each ray says so",
+        run: pile,
     },
     Case { group: GROUP, name: "nothing", what: "no object at all: the sky, exactly", run: nothing },
     Case {
@@ -91,6 +97,45 @@ fn slivers(bench: &mut Bench) -> Result<()> {
     let slivers: String = (-50..50).map(sliver).collect();
     let seen = bench.render(&format!("{head}{lamp}{slivers}"), 1024)?;
     bench.check("behind slivers of 1e-13", 1.0, seen.of(0), F32);
+    Ok(())
+}
+
+/// A lamp that fills the view, in the same OBJ file as `count` equal triangles before it: what is seen, and rays that found no end.
+fn piled(bench: &mut Bench, corners: [[f64; 3]; 3], count: usize, samples: u32) -> Result<(f64, u64)> {
+    let file = std::env::temp_dir().join(format!("spectile-stress-pile-{}.obj", std::process::id()));
+    let lamp = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]];
+    let mut text: String = lamp.iter().chain(&corners).map(|[x, y, z]| format!("v {x:e} {y:e} {z:e}\n")).collect();
+    text += "f 1 2 3\nf 1 3 4\n";
+    text += &"f 5 6 7\n".repeat(count);
+    std::fs::write(&file, text).map_err(|error| Error::storage(&file, error))?;
+    let scene = format!(
+        "[integrator]\nmax_bounces = 0\n[materials.b.black]\n[[objects]]\nmesh = {:?}\nmaterial = \"b\"\nemission = 1\n",
+        file.display().to_string()
+    );
+    let before = bench.outcome.overflow;
+    let seen = bench.render(&scene, samples);
+    // Nothing depends on it once it is read.
+    let _ = std::fs::remove_file(&file);
+    let unended = std::mem::replace(&mut bench.outcome.overflow, before) - before;
+    Ok((seen?.mean[0], unended))
+}
+
+fn pile(bench: &mut Bench) -> Result<()> {
+    let point = [[0.0, 0.0, 0.5]; 3];
+    let speck = [[0.0, 0.0, 0.5], [1e-30, 0.0, 0.5], [0.0, 1e-30, 0.5]];
+    let wall = [[-1.0, -1.0, 0.5], [1.0, -1.0, 0.5], [1.0, 2.0, 0.5]];
+    for (what, corners, count) in [
+        ("a million in a point", point, 1_000_000),
+        ("1e-30 m", speck, 10_000),
+        ("a thousand in one place", wall, 1000),
+    ] {
+        let (mean, unended) = piled(bench, corners, count, 4)?;
+        bench.check_within(format!("{what}: radiance"), 1.0, (mean, 0.0), 0.0);
+        bench.check_within(format!("{what}: rays that did not end"), 0.0, (unended as f64, 0.0), 0.0);
+    }
+    // Beyond what one invocation may loop (DESIGN section 7): no answer, and every one of 64 rays says that there is none.
+    let (_, unended) = piled(bench, wall, 40_000, 1)?;
+    bench.check_within("40,000 in one place: rays that say so", 64.0, (unended as f64, 0.0), 0.0);
     Ok(())
 }
 

@@ -3,6 +3,8 @@
 use super::bench::{F32, TABLES, WALL, lamp};
 use super::{Bench, Case};
 use crate::Result;
+use crate::cube::{epoch_samples, merge_means};
+use crate::render::rng::hash;
 use crate::spectral::planck;
 
 pub const CASES: &[Case] = &[
@@ -47,6 +49,12 @@ pub const CASES: &[Case] = &[
         name: "constant",
         what: "a visible constant after 1 to 1,600 samples: exact to the last bit",
         run: constant,
+    },
+    Case {
+        group: "accumulation",
+        name: "million",
+        what: "1e6 samples merged in epochs of 64 into means of f32: a constant to the last bit, a sequence whose mean is known but for the roundings",
+        run: million,
     },
 ];
 
@@ -165,5 +173,37 @@ fn constant(bench: &mut Bench) -> Result<()> {
         let wrong = seen.image.mean.iter().filter(|v| **v != f64::from(0.1f32)).count();
         bench.check_within(format!("pixels that are not 0.1 after {samples}"), 0.0, (wrong as f64, 0.0), 0.0);
     }
+    Ok(())
+}
+
+fn million(bench: &mut Bench) -> Result<()> {
+    const EPOCH: u32 = 64;
+    // The first value is 0.1 for ever, the others are anything in [1/2, 1).
+    const VALUES: u32 = 256;
+    let unit = |epoch: u32| -> Vec<f32> {
+        let random = |i: u32| 0.5 + (hash(VALUES * epoch + i) >> 9) as f32 / 16_777_216.0;
+        (0..VALUES).map(|i| if i == 0 { 0.1 } else { random(i) }).collect()
+    };
+    let (mut mean, mut sums) = (unit(0), vec![0.0; VALUES as usize]);
+    let (mut samples, mut merges) = (0, 0u32);
+    while samples < 1_000_000 {
+        let (new, count) = (unit(merges), epoch_samples(merges, EPOCH));
+        for (sum, value) in sums.iter_mut().zip(&new) {
+            *sum += f64::from(count) * f64::from(*value);
+        }
+        merge_means(&mut mean, samples, &new, count);
+        (samples, merges) = (samples + count, merges + 1);
+    }
+    bench.check_within("a constant", f64::from(0.1f32), (f64::from(mean[0]), 0.0), 0.0);
+    let error = |i: usize| f64::from(mean[i]) - sums[i] / f64::from(samples);
+    // Merge j of n rounds to 2^-24, evenly, and its rounding is worth j / n at the end: in all sqrt(n / 3) times 2^-24 / sqrt(12).
+    let rounding = 2f64.powi(-24) / 12f64.sqrt() * (f64::from(merges) / 3.0).sqrt();
+    let others = f64::from(VALUES - 1);
+    let square = (1..VALUES as usize).map(|i| error(i).powi(2)).sum::<f64>() / others;
+    let mean_error = (1..VALUES as usize).map(error).sum::<f64>() / others;
+    bench.check_within("roundings of a sequence, mean", 0.0, (mean_error, rounding / others.sqrt()), 0.0);
+    // The square of a normal number scatters by sqrt(2) of its mean.
+    let relative = square / (rounding * rounding);
+    bench.check_within("their square over what it should be", 1.0, (relative, (2.0 / others).sqrt()), 0.1);
     Ok(())
 }
