@@ -180,6 +180,7 @@ impl Prepared {
         d.set("HOT_VARNISH", radiators.varnish).set("HOT_COATS", radiators.coats);
         d.set("HOT_TEXTURED", radiators.textured).set("HOT_NUMBERS", radiators.numbers);
         d.set("HOT_RANDOM", general.hot || radiators.facets);
+        d.set("HOT_VERTICES", general.radiators.is_some() || (general.hot && general.smooth));
         d.set("OP_ONLY", general.dispersion);
         d.set("TEXTURES", general.textures).set("TEXTURED", general.textured || radiators.textured);
         d.set("KEPT", general.textured_base || radiators.textured);

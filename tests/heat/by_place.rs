@@ -7,7 +7,7 @@ use spectile::render::prepare::Prepared;
 use spectile::scene::{Attributes, Camera, Filter, Projection, Scene, Shape, Sides, TextureKind};
 use spectile::spectral::{Channels, Curve, Outside, planck as law};
 
-use crate::device::{Settings, measure, render};
+use crate::device::{Settings, assert_as_reference, measure, render};
 use crate::reference::shown;
 use crate::scene_builder::heat::*;
 use crate::scene_builder::*;
@@ -235,23 +235,9 @@ fn textured_heat_agrees_with_the_reference() {
         .heated_by(warm)
         .attributes(upright())
         .build();
-    let rendered = render(&scene, 32, 128, Settings { seed: 7, ..Settings::default() });
-    rendered.assert_clean();
-    let (device, truth) = (rendered.values(), shown(&scene, 20_000, 8));
-    let mean = |k: usize| truth.iter().skip(k).step_by(3).map(|e| e.mean).sum::<f64>() / 25.0;
-    let scale: Vec<f64> = (0..truth.len()).map(|i| truth[i].mean.max(mean(i % 3))).collect();
     // The tables of `scattering` are within 1e-3: over four events, and in the mean.
     let bound = Bound { resolution: 0.06, allowance: 10.0 * ORIGIN_OFFSET + 1e-3 };
-    assert_agreement("textured heat", &device, &truth, &scale, bound);
-    let of_image = |k: usize| {
-        let of_channel: Vec<&Estimate> = truth.iter().skip(k).step_by(3).collect();
-        let error = of_channel.iter().map(|e| e.error * e.error).sum::<f64>().sqrt() / 25.0;
-        Estimate { mean: mean(k), error, freedom: 1e5 }
-    };
-    let truth: Vec<Estimate> = (0..3).map(of_image).collect();
-    let scale: Vec<f64> = (0..3).map(mean).collect();
-    let bound = Bound { resolution: 0.012, ..bound };
-    assert_agreement("textured heat, image", &rendered.image_means(), &truth, &scale, bound);
+    assert_as_reference("textured heat", &scene, [32, 128], 20_000, bound);
 }
 
 /// Scenes without such surfaces have none of it: not in their shaders' switches, nor in their records.
