@@ -77,6 +77,11 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     if (step.bounce > 0u) {
         nested = states[STATE_WORDS * path + 2u].yz;
     }
+#if CAMERA_CUT
+    else {
+        nested = volumes_at(ray.origin, &overflow);
+    }
+#endif
     var way: Way;
     let walked = walk(ray, INFINITE, &nested, &way, &overflow);
     let hit = walked.hit;

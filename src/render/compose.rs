@@ -167,6 +167,7 @@ impl Prepared {
         d.set("ROUGH_BASE", general.rough_base).set("OP_ETA_TABLE", rough_glass || general.rough_base);
         if let Some(media) = &general.media {
             d.set("MEDIA", true).constant("OUTER_VOLUME", media.outer).constant("MOST_STRETCHES", media.stretches);
+            d.set("CAMERA_CUT", media.camera_is_cut);
             if let Some(columns) = media.grids {
                 d.set("GRIDS", true).set("MOST_COLUMNS", columns);
             }

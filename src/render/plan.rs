@@ -152,6 +152,11 @@ pub fn feature_lines(prepared: &Prepared, waves: &WavePlan) -> Vec<FeatureLine> 
             format!("{}, 16 bytes a path, a record for each stretch of a way", module(s::MEDIUM)),
         ),
         line(
+            "camera rays that start in different media",
+            f.general.is_some_and(|g| g.media.is_some_and(|m| m.camera_is_cut)),
+            "a way through the lens or window for each path".into(),
+        ),
+        line(
             "media of voxels",
             f.general.is_some_and(|g| g.media.is_some_and(|m| m.grids.is_some())),
             "a march through its cells for each stretch and channel".into(),

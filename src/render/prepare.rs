@@ -94,6 +94,8 @@ pub struct General {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MediaShape {
     pub outer: u32,
+    /// Whether camera rays start in different ones.
+    pub camera_is_cut: bool,
     pub stretches: u32,
     /// The most columns of an absorber, where there are grids.
     pub grids: Option<u32>,
@@ -244,6 +246,7 @@ impl Prepared {
         }
         let media_shape = media.as_ref().map(|m| MediaShape {
             outer: m.outer,
+            camera_is_cut: m.camera_is_cut,
             stretches: m.stretches,
             grids: m.wavelength.map(|_| m.most_columns),
         });

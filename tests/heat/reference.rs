@@ -268,6 +268,19 @@ fn cameras_and_nested_media() {
     assert_exact(&sky(Builder::new().gas(0.25).null_box(cube(2.0).0, cube(2.0).1)).build(), &[(-1f64).exp()], 1e-10);
 }
 
+/// Camera rays of one camera that start in different media: a window and a lens that boundaries cut.
+#[test]
+fn cameras_cut_by_media() {
+    for inner_first in [true, false] {
+        let (scene, expected) = window_in_gases(inner_first);
+        assert_exact(&scene, &expected, 1e-10);
+    }
+    let Case { scene, expected, seed } = lens_in_gas();
+    // A thousand steps of the midpoint rule, across a kink.
+    let bound = Bound { resolution: 2e-3, allowance: 1e-5 };
+    assert_estimates("lens", &shown(&scene, 100_000, seed), &expected, bound);
+}
+
 /// Light that is aimed at goes through gas on its way too: a patch under a point light and a sun.
 #[test]
 fn shadow_rays_through_gas() {
