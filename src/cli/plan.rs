@@ -14,6 +14,7 @@ use crate::files::format_bytes;
 use crate::gpu::adapter::{Gpu, Selection};
 use crate::render::job::StopRule;
 use crate::render::plan;
+use crate::render::pool::MERGE_THREADS;
 use crate::render::prepare::Prepared;
 use crate::render::wave::{Budget, WavePlan};
 use crate::render::worker::Worker;
@@ -272,9 +273,10 @@ impl Plan<'_> {
         }
         let host = plan::host_memory(p, header);
         text += &format!(
-            "host      {} for the scene, {} a device to merge; units are merged from the devices' transfers\n",
+            "host      {} for the scene, {} a thread that merges (a GPU has up to {}); units are merged from the devices' transfers\n",
             format_bytes(host.scene),
-            format_bytes(host.merge)
+            format_bytes(host.merge),
+            MERGE_THREADS
         );
         text += &format!("disk      {}\n", format_bytes(header.store_bytes()));
         match (self.paths_per_s(), self.predicted_s()) {

@@ -170,8 +170,8 @@ pub fn feature_lines(prepared: &Prepared, waves: &WavePlan) -> Vec<FeatureLine> 
 pub struct HostMemory {
     /// The flattened scene: BVH, primitives, materials, lights, spectra.
     pub scene: u64,
-    /// What each device's thread holds while it merges. The units themselves are merged from where the device put them,
-    /// in its two transfers.
+    /// What a thread holds while it merges: one a software device, up to `pool::MERGE_THREADS` a GPU. The units themselves
+    /// are merged from where the device put them, in its two transfers.
     pub merge: u64,
 }
 
