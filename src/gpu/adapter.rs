@@ -1,6 +1,6 @@
 //! Adapters and devices: which there are, what they can do, and one opened for work.
 
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
 use std::time::Duration;
 
 use serde::Serialize;
@@ -116,7 +116,10 @@ fn facts(adapter: &wgpu::Adapter) -> AdapterFacts {
 
 /// Every adapter of this machine, GPUs first.
 pub fn list() -> Vec<AdapterFacts> {
-    sorted_adapters(&instance()).iter().map(facts).collect()
+    // Kept, and with it the drivers in this process: NVIDIA's lists no adapter any more after it has been loaded and unloaded some
+    // twenty times.
+    static KEPT: OnceLock<wgpu::Instance> = OnceLock::new();
+    sorted_adapters(KEPT.get_or_init(instance)).iter().map(facts).collect()
 }
 
 /// GPUs first, each through as many backends as list it.
