@@ -304,6 +304,13 @@ impl Gpu {
         self.trouble.lock().unwrap_or_else(|e| e.into_inner())
     }
 
+    /// Bytes that its buffers take; `None` where the backend does not tell.
+    pub fn allocated_bytes(&self) -> Option<u64> {
+        // What is dropped is freed when the device is looked at.
+        let _ = self.device.poll(wgpu::PollType::Poll);
+        self.device.generate_allocator_report().map(|report| report.total_allocated_bytes)
+    }
+
     /// Whether the device still works; errors that nobody waited for end up here.
     pub fn check(&self) -> Result<()> {
         let name = &self.name;

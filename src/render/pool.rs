@@ -195,7 +195,7 @@ impl Pool {
                     )));
                 }
                 let result = self.pull(&mut worker, post);
-                if worker.gpu.timestamps && self.profile {
+                if self.profile {
                     let sum = post.profile.get_or_insert_default();
                     sum.generate_s += worker.profile.generate_s;
                     sum.evaluate_s += worker.profile.evaluate_s;

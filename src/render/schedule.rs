@@ -71,7 +71,7 @@ pub enum Event<'a> {
 /// What a render did.
 pub struct Summary {
     pub status: Status,
-    /// Sums over the devices that have timestamps, if asked for.
+    /// Sums over the devices, if asked for.
     pub profile: Option<Profile>,
     /// Seconds until the first device was ready, and seconds that the devices' threads spent merging.
     pub setup_s: f64,

@@ -87,7 +87,7 @@ impl Report {
         );
         for row in &self.rows {
             let [slowest, fastest] = row.rates.range();
-            let micro = |s: Option<f64>| s.map_or(String::new(), |s| format!("{:.5}", 1e6 * s));
+            let micro = |s: f64| format!("{:.5}", 1e6 * s);
             let _ = writeln!(
                 text,
                 "{},\"{}\",{},{},{},{},{:.1},{slowest:.1},{fastest:.1},{:.4},{},{},{},{},{}",
@@ -206,7 +206,7 @@ impl Report {
         page.paragraph(&self.circumstances.sentence());
         page.paragraph(&format!(
             "Medians of {} rounds in which all evaluators take turns on the same tiles, 64 samples per pixel; slowest and fastest in \
-             brackets. Device times are of one more round with timestamps, which waits for every wave.",
+             brackets. Times of the passes are of one more round, which waits for every wave: the device's own where it has timestamps.",
             self.rounds
         ));
         for what in &self.missing {
@@ -260,7 +260,7 @@ impl Report {
             "generate, us a path",
             "evaluate, us a path",
         ];
-        let micro = |s: Option<f64>| s.map_or("-".into(), |s| format!("{:.4}", 1e6 * s));
+        let micro = |s: f64| format!("{:.4}", 1e6 * s);
         let rows = self.rows.iter().filter(|row| row.part == part && row.scene == scene).map(|row| {
             vec![
                 row.evaluator.name().into(),
@@ -383,11 +383,7 @@ mod tests {
             everything,
             channels,
             pool: 1 << 15,
-            rates: Rates {
-                paths_per_s: vec![rate, 0.9 * rate, 1.2 * rate],
-                generate_s: Some(1e-6),
-                evaluate_s: Some(2e-6),
-            },
+            rates: Rates { paths_per_s: vec![rate, 0.9 * rate, 1.2 * rate], generate_s: 1e-6, evaluate_s: 2e-6 },
             path_bytes: 136 + per_channel * channels as u64,
             channel_bytes: per_channel,
             planned_bytes: 1 << 20,

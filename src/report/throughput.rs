@@ -32,9 +32,9 @@ pub struct Trial {
 pub struct Rates {
     /// Of each turn.
     pub paths_per_s: Vec<f64>,
-    /// Device time of a path in the passes, seconds, where there are timestamps.
-    pub generate_s: Option<f64>,
-    pub evaluate_s: Option<f64>,
+    /// Of a path in the passes, seconds ([`crate::render::worker::Profile`]).
+    pub generate_s: f64,
+    pub evaluate_s: f64,
 }
 
 impl Rates {
@@ -55,15 +55,14 @@ impl Trial {
     /// Compiles `scene`'s kernels for `gpu`, with waves of `pool` paths, or as large as is worth it; or as large as fits.
     pub fn new(scene: &Scene, gpu: &Arc<Gpu>, pool: Option<u32>, interrupt: &Arc<Interrupt>) -> Result<Trial> {
         let prepared = Arc::new(Prepared::new(scene, 0)?);
-        let allocated = || gpu.device.generate_allocator_report().map(|report| report.total_allocated_bytes);
-        let before = allocated();
+        let before = gpu.allocated_bytes();
         let budget = Budget { memory: None, paths: pool };
         let mut worker = Worker::new(Arc::clone(gpu), prepared, [TILE, TILE], budget)?;
-        let allocated_bytes = allocated().zip(before).map(|(now, before)| now.saturating_sub(before));
         worker.watch(interrupt);
         let tiles = spread(scene.film.crop);
         worker.submit(&tiles[..1], 0, 1, &mut |_| Ok(()))?;
         worker.collect(&mut |_| Ok(()))?;
+        let allocated_bytes = gpu.allocated_bytes().zip(before).map(|(now, before)| now.saturating_sub(before));
         Ok(Trial { worker, tiles, epoch: 0, allocated_bytes })
     }
 
@@ -89,7 +88,7 @@ impl Trial {
     }
 }
 
-/// Measures all `trials` by turns, so that what else the machine does concerns all alike, then once more with timestamps.
+/// Measures all `trials` by turns, so that what else the machine does concerns all alike, then the passes of each once more.
 pub fn measure(trials: &mut [Trial], rounds: u32) -> Result<Vec<Rates>> {
     let Some(first) = trials.first_mut() else { return Ok(Vec::new()) };
     // As many tiles as fill the largest waves, and then as many as take long enough.
@@ -97,21 +96,18 @@ pub fn measure(trials: &mut [Trial], rounds: u32) -> Result<Vec<Rates>> {
     let seconds = first.turn(count)?;
     count *= (TURN_S / seconds).ceil().max(1.0) as usize;
     let paths = (count as u32 * TILE * TILE * SAMPLES) as f64;
-    let mut rates = vec![Rates { paths_per_s: Vec::new(), generate_s: None, evaluate_s: None }; trials.len()];
+    let mut rates = vec![Rates { paths_per_s: Vec::new(), generate_s: 0.0, evaluate_s: 0.0 }; trials.len()];
     for _ in 0..rounds {
         for (trial, rates) in trials.iter_mut().zip(&mut rates) {
             rates.paths_per_s.push(paths / trial.turn(count)?);
         }
     }
     for (trial, rates) in trials.iter_mut().zip(&mut rates) {
-        if !trial.worker.gpu.timestamps {
-            continue;
-        }
         trial.worker.enable_profile();
         trial.turn(count)?;
         let profile = trial.worker.profile;
-        rates.generate_s = Some(profile.generate_s / paths);
-        rates.evaluate_s = Some(profile.evaluate_s / paths);
+        rates.generate_s = profile.generate_s / paths;
+        rates.evaluate_s = profile.evaluate_s / paths;
     }
     Ok(rates)
 }
@@ -145,7 +141,7 @@ mod tests {
 
     #[test]
     fn medians_are_in_the_middle() {
-        let rates = |values: &[f64]| Rates { paths_per_s: values.to_vec(), generate_s: None, evaluate_s: None };
+        let rates = |values: &[f64]| Rates { paths_per_s: values.to_vec(), generate_s: 0.0, evaluate_s: 0.0 };
         assert_eq!(rates(&[3.0, 1.0, 2.0]).median(), 2.0);
         assert_eq!(rates(&[4.0, 1.0, 2.0, 3.0]).median(), 2.5);
         assert_eq!(rates(&[4.0, 1.0, 2.0]).range(), [1.0, 4.0]);
