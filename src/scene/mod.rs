@@ -164,7 +164,7 @@ impl Evaluator {
         [Evaluator::Auto, Evaluator::DpeptPixel, Evaluator::DpeptPath, Evaluator::DpeptSpectral, Evaluator::Pt];
 
     /// Channels up to which `auto` is the conventional path tracer on GPUs. Measured with `spectile bench` on an H200 (docs/reports):
-    /// its paths per second over those of `dpept-pixel`, geometric mean of four scenes, were 1.43 at 8 channels, 0.86 at 32 and 0.42 at
+    /// its paths per second over those of `dpept-pixel`, geometric mean of four scenes, were 1.43 at 8 channels, 0.86 at 32 and 0.36 at
     /// 128. On software devices `dpept-pixel` is the fastest with any number.
     pub const MOST_PT_CHANNELS: usize = 16;
 
