@@ -179,10 +179,10 @@ impl Prepared {
     /// Flattens `scene`. Errors: materials that no shader knows; more materials, spectra or bounces than ids and
     /// counters have bits for.
     pub fn new(scene: &Scene, seed: u64) -> Result<Prepared> {
-        Prepared::for_evaluator(scene, seed, scene.integrator.evaluator.resolved())
+        Prepared::for_evaluator(scene, seed, scene.integrator.evaluator.on(true, scene.channels.len()))
     }
 
-    /// As [`Prepared::new`], for an evaluator other than the scene's.
+    /// As [`Prepared::new`], for the evaluator chosen ([`plan::evaluator`](super::plan::evaluator)).
     pub fn for_evaluator(scene: &Scene, seed: u64, evaluator: Evaluator) -> Result<Prepared> {
         match Integration::of(&scene.channels) {
             None => Prepared::flatten(scene, seed, evaluator, None),
