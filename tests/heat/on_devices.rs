@@ -7,6 +7,7 @@ use spectile::scene::{Attributes, Filter, Projection, Scene, Sides, Temperature}
 use spectile::spectral::{Channels, Curve, Outside, planck as law};
 
 use crate::device::{Settings, assert_as_reference, measure, render};
+use crate::reference::BOUNCES;
 use crate::scene_builder::closed_forms::{self, Case};
 use crate::scene_builder::heat::*;
 use crate::scene_builder::*;
@@ -138,12 +139,12 @@ fn hot_metals_and_plastics_in_a_cavity() {
             let base = Builder::new()
                 .camera(look(DVec3::new(0.1, 0.2, 1.2), DVec3::new(off, 0.5 * off, 0.0), DVec3::Y, narrow()))
                 .channels(infrared())
-                .bounces(60)
-                .diffuse(room(DVec3::splat(-1.5), DVec3::splat(1.5)), 0.5)
+                .bounces(BOUNCES)
+                .diffuse(room(DVec3::splat(-1.5), DVec3::splat(1.5)), 0.2)
                 .at_kelvin(300.0);
             let scene = ball(base).at_kelvin(300.0).build();
             let bound = Bound { resolution: 0.01, allowance: 10.0 * ORIGIN_OFFSET + 4e-4 };
-            assert_estimates(name, &measure(scene, 2, 410 + i as u64), &expected, bound);
+            assert_estimates(name, &measure(scene, 1, 410 + i as u64), &expected, bound);
         }
     }
 }
