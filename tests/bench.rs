@@ -31,7 +31,8 @@ fn bench(folder: &Path, arguments: &[&str]) -> Output {
 fn a_report_of_all_evaluators() {
     let folder = tempfile::tempdir().expect("a folder");
     let scene = cornell();
-    let options = ["-o", "report", "--channels", "4,64", "--pools", "1024", "--rounds", "1", "--json"];
+    let options =
+        ["-o", "report", "--channels", "4,64", "--pools", "1024", "--frames", "32,64", "--rounds", "1", "--json"];
     let output = bench(folder.path(), &[&[scene.to_str().expect("UTF-8")], &options[..]].concat());
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let read = |name: &str| std::fs::read_to_string(folder.path().join("report").join(name)).expect("written");
@@ -60,6 +61,9 @@ fn a_report_of_all_evaluators() {
             assert_eq!((number("pool"), channels), (1024.0, 128.0));
         }
     }
+    let frames = report["frames"].as_array().expect("frames");
+    assert_eq!(frames.iter().map(|f| f["side"].as_u64()).collect::<Vec<_>>(), [Some(32), Some(64)]);
+    assert!(frames.iter().all(|f| f["seconds"][0].as_f64().expect("a number") > 0.0), "{frames:?}");
     assert_eq!(read("bench.csv").lines().count(), 1 + rows.len());
     let html = read("bench.html");
     for part in ["<svg", "dpept-spectral", "What is left out", "any number"] {

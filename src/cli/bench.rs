@@ -11,9 +11,9 @@ use super::output::say;
 use super::render::parse_time;
 use crate::gpu::adapter::{Gpu, Selection};
 use crate::render::worker::{Interrupt, check_interrupt};
-use crate::report::bench::{Part, Report, Row};
+use crate::report::bench::{Frames, Part, Report, Row};
 use crate::report::everything::with_everything;
-use crate::report::throughput::{Trial, measure};
+use crate::report::throughput::{Trial, frames, measure};
 use crate::report::{Circumstances, make_folder, write};
 use crate::scene::{self, Evaluator, Scene};
 use crate::{Error, Result};
@@ -30,7 +30,7 @@ const SCENES: [&str; 4] = [
 ///
 /// Renders each SCENE (the repository's four, if none is given) with every evaluator by turns: the conventional path tracer (pt)
 /// and three ways to evaluate saved paths (dpept-path, dpept-spectral, dpept-pixel), against the number of channels and of paths at
-/// a time; generate and evaluate apart; memory as planned and as allocated. Then each scene with its own kernels against one set of
+/// a time, and of pixels; generate and evaluate apart; memory as planned and as allocated. Then each scene with its own kernels against one set of
 /// kernels for all scenes. Writes DIR/bench.csv, .json and .html, anew after every step; Ctrl-C leaves what has been measured.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = "\
@@ -54,6 +54,10 @@ pub struct Args {
     #[arg(long, value_name = "N,…", value_delimiter = ',', default_value = "4096,32768,262144,1048576")]
     pub pools: Vec<u32>,
 
+    /// Widths and heights of frames, at 128 channels
+    #[arg(long, value_name = "N,…", value_delimiter = ',', default_value = "128,256,512,1024")]
+    pub frames: Vec<u32>,
+
     /// Evaluators to compare
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "pt,dpept-path,dpept-spectral,dpept-pixel", value_parser = parse_evaluator)]
     pub evaluators: Vec<Evaluator>,
@@ -75,8 +79,9 @@ pub struct Args {
     pub json: bool,
 }
 
-/// Channels of the parts that do not vary them.
+/// Channels of the parts that do not vary them, and width and height of the picture.
 const CHANNELS: u32 = 128;
+const SIDE: u32 = 512;
 
 /// Something to measure by turns: evaluators of a scene, or its kernels.
 struct Step<'a> {
@@ -97,12 +102,17 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     }
     make_folder(&args.output)?;
     let gpu = Arc::new(Gpu::open_all(&args.devices)?.remove(0));
-    let mut report =
-        Report { circumstances: Circumstances::now(&gpu), rounds: args.rounds, rows: Vec::new(), missing: Vec::new() };
+    let mut report = Report {
+        circumstances: Circumstances::now(&gpu),
+        rounds: args.rounds,
+        rows: Vec::new(),
+        frames: Vec::new(),
+        missing: Vec::new(),
+    };
     output.event("start", json!({ "scenes": files, "device": gpu.name }))?;
     let began = Instant::now();
     for step in steps(args, &files) {
-        let name = step.file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let name = name_of(step.file);
         let what = match (step.part, step.pool) {
             (Part::Pool, Some(pool)) => format!("{name}, {} channels, {pool} paths at a time", step.channels),
             (Part::LeftOut, _) => format!("{name}, its own kernels and all of them"),
@@ -117,8 +127,33 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         }
         write(&args.output, "bench", &report.csv(), &report.json(), &report.html()?)?;
     }
+    for (file, side) in files.iter().flat_map(|file| args.frames.iter().map(move |&side| (file, side))) {
+        let name = name_of(file);
+        let what = format!("{name}, frames of {side} x {side} pixels");
+        check_interrupt(&interrupt)?;
+        if began.elapsed() > args.budget {
+            report.missing.push(format!("{what}: the time of --budget was over"));
+        } else {
+            say(&what);
+            let scene = load(file, side, CHANNELS)?;
+            let seconds = frames(&mut Trial::new(&scene, &gpu, None, &interrupt)?, args.rounds)?;
+            report.frames.push(Frames { scene: name, channels: CHANNELS as usize, side, seconds });
+        }
+        write(&args.output, "bench", &report.csv(), &report.json(), &report.html()?)?;
+    }
     output.event("done", json!({ "report": report.json(), "folder": args.output }))?;
     output.text(&format!("{}{}\n", report.summary(), args.output.join("bench.html").display()))
+}
+
+fn name_of(file: &Path) -> String {
+    file.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// The scene of `file` with so many pixels a side and channels.
+fn load(file: &Path, side: u32, channels: u32) -> Result<Scene> {
+    let of = |(key, value): (&str, u32)| (key.to_owned(), value.to_string());
+    let overrides = [("film.width", side), ("film.height", side), ("channels.equal.count", channels)];
+    scene::load(file, &overrides.map(of))
 }
 
 /// What is measured, in an order that has something of every scene early.
@@ -137,9 +172,7 @@ fn measure_step(
     interrupt: &Arc<Interrupt>,
     report: &mut Report,
 ) -> Result<()> {
-    let of = |(key, value): (&str, u32)| (key.to_owned(), value.to_string());
-    let overrides = [("film.width", 512), ("film.height", 512), ("channels.equal.count", step.channels)].map(of);
-    let scene = scene::load(step.file, &overrides)?;
+    let scene = load(step.file, SIDE, step.channels)?;
     let with = |evaluator: Evaluator, everything: bool| -> (Evaluator, bool, Scene) {
         let mut scene = if everything { with_everything(&scene) } else { scene.clone() };
         scene.integrator.evaluator = evaluator;

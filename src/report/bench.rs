@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::Circumstances;
 use super::chart::{Line, log_log};
 use super::page::Page;
-use super::throughput::Rates;
+use super::throughput::{Rates, median};
 use crate::Result;
 use crate::files::format_bytes;
 use crate::scene::Evaluator;
@@ -64,11 +64,23 @@ pub struct Row {
     pub allocated_bytes: Option<u64>,
 }
 
+/// Frames of one size.
+#[derive(Debug, Clone)]
+pub struct Frames {
+    pub scene: String,
+    pub channels: usize,
+    /// Width and height, pixels.
+    pub side: u32,
+    /// Of a sample of every pixel, each.
+    pub seconds: Vec<f64>,
+}
+
 /// What a report is made of.
 pub struct Report {
     pub circumstances: Circumstances,
     pub rounds: u32,
     pub rows: Vec<Row>,
+    pub frames: Vec<Frames>,
     /// What was not measured, and why.
     pub missing: Vec<String>,
 }
@@ -119,7 +131,15 @@ impl Report {
                 "path_bytes": row.path_bytes, "planned_bytes": row.planned_bytes, "allocated_bytes": row.allocated_bytes,
             })
         });
-        json!({ "measured": self.circumstances.facts(), "rows": rows.collect::<Vec<_>>(), "missing": self.missing })
+        let frames = self.frames.iter().map(|frames| {
+            json!({
+                "scene": frames.scene, "channels": frames.channels, "side": frames.side, "seconds": frames.seconds,
+            })
+        });
+        json!({
+            "measured": self.circumstances.facts(), "rows": rows.collect::<Vec<_>>(),
+            "frames": frames.collect::<Vec<_>>(), "missing": self.missing,
+        })
     }
 
     /// Geometric means over scenes of how many times `pt`'s paths per second each evaluator makes, by channels.
@@ -245,6 +265,7 @@ impl Report {
             page.figure(&log_log(&scene, "paths of a wave", "paths/s", &lines)?, "The same channels for all.");
             self.table(&mut page, Part::Pool, &scene);
         }
+        self.linearity(&mut page)?;
         self.memory(&mut page)?;
         self.left_out(&mut page);
         Ok(page.finish())
@@ -273,6 +294,61 @@ impl Report {
             ]
         });
         page.table(&head.map(str::to_owned), &rows.collect::<Vec<_>>());
+    }
+
+    fn linearity(&self, page: &mut Page) -> Result<()> {
+        page.heading("Cost against channels and pixels");
+        page.paragraph(
+            "How much longer a path takes with more channels, of dpept-pixel: what does not grow with them is its generation.",
+        );
+        let mut rows = Vec::new();
+        for scene in self.scenes() {
+            let of: Vec<&Row> =
+                self.rows.iter().filter(|row| row.is(Part::Channels, &scene, Evaluator::DpeptPixel)).collect();
+            rows.extend(of.windows(2).map(|pair| {
+                let times = pair[0].rates.median() / pair[1].rates.median();
+                let evaluate = pair[1].rates.evaluate_s / pair[0].rates.evaluate_s;
+                let channels = pair[1].channels as f64 / pair[0].channels as f64;
+                vec![
+                    scene.clone(),
+                    format!("{} to {}", pair[0].channels, pair[1].channels),
+                    format!("{channels:.0}"),
+                    format!("{times:.2}"),
+                    format!("{evaluate:.2}"),
+                ]
+            }));
+        }
+        let head = ["scene", "channels", "times the channels", "times the time of a path", "of its evaluation"];
+        page.table(&head.map(str::to_owned), &rows);
+        if self.frames.is_empty() {
+            return Ok(());
+        }
+        let pixels = |frames: &Frames| f64::from(frames.side).powi(2);
+        let line = |scene: String| {
+            let of = self.frames.iter().filter(|frames| frames.scene == scene);
+            Line { points: of.map(|f| (pixels(f), median(&f.seconds))).collect(), name: scene, guide: false }
+        };
+        let mut lines: Vec<Line> = self.scenes().into_iter().map(line).filter(|line| !line.points.is_empty()).collect();
+        if let Some(first) = lines.first().filter(|line| line.points.len() > 1) {
+            let (from, to) = (first.points[0], first.points[first.points.len() - 1].0);
+            let points = vec![from, (to, from.1 * to / from.0)];
+            lines.push(Line { name: "as the pixels".into(), points, guide: true });
+        }
+        let chart = log_log("A frame of one sample per pixel", "pixels", "time (s)", &lines)?;
+        page.figure(&chart, "Medians, dpept-pixel; the dashed line grows as the pixels do.");
+        let rows = self.frames.iter().map(|frames| {
+            let seconds = median(&frames.seconds);
+            vec![
+                frames.scene.clone(),
+                frames.channels.to_string(),
+                format!("{0} x {0}", frames.side),
+                format!("{seconds:.4}"),
+                format!("{:.4}", 1e6 * seconds / pixels(frames)),
+            ]
+        });
+        let head = ["scene", "channels", "frame", "seconds", "us a pixel"];
+        page.table(&head.map(str::to_owned), &rows.collect::<Vec<_>>());
+        Ok(())
     }
 
     fn memory(&self, page: &mut Page) -> Result<()> {
@@ -408,6 +484,9 @@ mod tests {
                 row(Part::LeftOut, pixel, false, 128, 3e5),
                 row(Part::LeftOut, pixel, true, 128, 2e5),
             ],
+            frames: [(128, 0.1), (256, 0.4)]
+                .map(|(side, s)| Frames { scene: "box".into(), channels: 128, side, seconds: vec![s] })
+                .into(),
             missing: vec!["a thing: no time".into()],
         };
         assert_eq!(report.csv().lines().count(), 5);
@@ -417,7 +496,7 @@ mod tests {
         }
         let html = report.html().expect("a page");
         // 4 GiB hold 1,024² paths of 4,096 bytes: 136 and 16 for each of 247 channels.
-        for part in ["a device", ">247<", "any number", "1.50", "3.800e6"] {
+        for part in ["a device", ">247<", "any number", "1.50", "3.800e6", "6.1035"] {
             assert!(html.contains(part), "{part} is missing");
         }
         assert_eq!(report.json()["rows"].as_array().map(Vec::len), Some(4));

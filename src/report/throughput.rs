@@ -39,16 +39,21 @@ pub struct Rates {
 
 impl Rates {
     pub fn median(&self) -> f64 {
-        let mut sorted = self.paths_per_s.clone();
-        sorted.sort_by(f64::total_cmp);
-        let middle = sorted.len() / 2;
-        if sorted.len() % 2 == 1 { sorted[middle] } else { 0.5 * (sorted[middle - 1] + sorted[middle]) }
+        median(&self.paths_per_s)
     }
 
     /// The slowest and the fastest turn.
     pub fn range(&self) -> [f64; 2] {
         self.paths_per_s.iter().fold([f64::INFINITY, 0.0], |[low, high], &rate| [rate.min(low), rate.max(high)])
     }
+}
+
+/// The middle one of some values, or the mean of the two in the middle.
+pub fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let middle = sorted.len() / 2;
+    if sorted.len() % 2 == 1 { sorted[middle] } else { 0.5 * (sorted[middle - 1] + sorted[middle]) }
 }
 
 impl Trial {
@@ -86,6 +91,21 @@ impl Trial {
         self.worker.collect(&mut |_| Ok(()))?;
         Ok(began.elapsed().as_secs_f64())
     }
+}
+
+/// Seconds that each of `rounds` frames takes, a sample of every pixel.
+pub fn frames(trial: &mut Trial, rounds: u32) -> Result<Vec<f64>> {
+    let tiles = trial.tiles.clone();
+    let frame = |_| {
+        let began = Instant::now();
+        trial.epoch += 1;
+        for units in tiles.chunks(trial.worker.plan.units_at_once(1)) {
+            trial.worker.submit(units, trial.epoch, 1, &mut |_| Ok(()))?;
+        }
+        trial.worker.collect(&mut |_| Ok(()))?;
+        Ok(began.elapsed().as_secs_f64())
+    };
+    (0..rounds).map(frame).collect()
 }
 
 /// Measures all `trials` by turns, so that what else the machine does concerns all alike, then the passes of each once more.
