@@ -364,7 +364,7 @@ fn side_by_side<T: Send>(
     let next = || work.lock().unwrap_or_else(PoisonError::into_inner).next();
     let some = || std::iter::from_fn(&next).try_for_each(&each);
     thread::scope(|scope| {
-        let others: Vec<_> = (1..threads).map(|_| scope.spawn(&some)).collect();
+        let others: Vec<_> = (1..threads).map(|_| scope.spawn(some)).collect();
         let own = some();
         let join = |other: thread::ScopedJoinHandle<'_, Result<()>>| {
             other.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
