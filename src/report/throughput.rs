@@ -5,7 +5,6 @@ use std::time::Instant;
 
 use crate::Result;
 use crate::gpu::adapter::Gpu;
-use crate::gpu::buffer::WGPU_BYTES;
 use crate::render::prepare::Prepared;
 use crate::render::wave::{Budget, WavePlan};
 use crate::render::worker::{Interrupt, UnitRect, Worker};
@@ -75,9 +74,9 @@ impl Trial {
         &self.worker.plan
     }
 
-    /// What the plan says that the buffers take, bytes.
+    /// What the plan says that the buffers take, bytes; uploading, which took more for a moment, is over.
     pub fn planned_bytes(&self) -> u64 {
-        self.worker.plan.device_bytes() - WGPU_BYTES
+        self.worker.plan.scene_bytes + self.worker.plan.wave_bytes()
     }
 
     /// Renders an epoch of the first `count` tiles, around again after the last. Seconds.
