@@ -77,6 +77,11 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     if (step.bounce > 0u) {
         nested = states[STATE_WORDS * path + 2u].yz;
     }
+#if CAMERA_CUT
+    else {
+        nested = volumes_at(ray.origin, &overflow);
+    }
+#endif
     var way: Way;
     let walked = walk(ray, INFINITE, &nested, &way, &overflow);
     let hit = walked.hit;
@@ -147,7 +152,11 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 #endif
             append(&list, OP_ONE | MODE_SINGLE, 0u, scale * weight, 0.0);
 #if HOT
+#if SMOOTH
+            let cosine = v.o.z;
+#else
             let cosine = abs(dot(surface.normal, ray.direction));
+#endif
             gather(&list, begin, emitted_spectrum(emitters[surface.emitter], from_front, cosine, hot_numbers(path, SALT_ANGLE).x));
 #else
             gather(&list, begin, spectrum & SPECTRUM_MASK);
@@ -263,7 +272,15 @@ fn generate_vertex(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
                 end = offset_origin(point.position, facing);
 #if HOT
                 let along = dot(point.normal, towards) / max(length(towards), 1.0e-30);
+#if SMOOTH
+                var cosine = abs(along);
+                if ((emitter.spectrum & EMITS_BY_ANGLE) != 0u && light_pdf > 0.0) {
+                    cosine = emitting_vertex(emitter, point, -normalize(towards)).o.z;
+                }
+                source = emitted_spectrum(emitter, along < 0.0, cosine, hot_numbers(path, SALT_ANGLE).y);
+#else
                 source = emitted_spectrum(emitter, along < 0.0, abs(along), hot_numbers(path, SALT_ANGLE).y);
+#endif
 #endif
 #if RADIATORS
                 if ((emitter.spectrum & EMITS_BY_PLACE) != 0u && light_pdf > 0.0) {

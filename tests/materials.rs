@@ -32,7 +32,7 @@ fn shown(scene: &Scene, epochs: u32, samples: u32, seed: u64) -> Vec<Estimate> {
 fn slab_of_all_orders() {
     for Case { scene, expected, seed } in slab(60) {
         let bound = Bound { resolution: 0.01, allowance: 1e-4 };
-        assert_estimates("slab", &shown(&scene, 32, 1024, seed), &expected, bound);
+        assert_estimates("slab", &shown(&scene, 16, 1024, seed), &expected, bound);
     }
 }
 
@@ -127,9 +127,9 @@ fn white_balls_under_a_white_sky() {
     for alpha in [0.1, 1.0] {
         assert_estimates("frosted glass", &shown(&glass(1.5, alpha), 16, 1024, 121), &[1.0; 9], bound(4.0));
         let scene = under_white_sky(|b, ball| white_metal(b, ball, [alpha; 2]), 10);
-        assert_estimates("metal", &shown(&scene, 16, 1024, 122), &[1.0; 9], bound(1.0));
+        assert_estimates("metal", &shown(&scene, 16, 512, 122), &[1.0; 9], bound(1.0));
         let scene = under_white_sky(|b, ball| b.plastic(ball, 1.0, 1.5, alpha), 10);
-        assert_estimates("plastic", &shown(&scene, 16, 1024, 123), &[1.0; 9], bound(1.0));
+        assert_estimates("plastic", &shown(&scene, 16, 512, 123), &[1.0; 9], bound(1.0));
     }
     let scene = under_white_sky(|b, ball| b.plastic(ball, 1.0, 1.5, 0.0), 10);
     assert_estimates("varnish", &shown(&scene, 16, 1024, 124), &[1.0; 9], bound(0.0));
@@ -152,7 +152,7 @@ fn white_balls_in_a_glowing_room() {
         let mut scene = in_glowing_room(|b, ball| b.dielectric(ball, glass_curve(), roughness), 40);
         scene.channels = Channels::equal(400.0, 700.0, 3);
         let bound = Bound { resolution: 0.03, ..bound };
-        assert_estimates("dispersive", &shown(&scene, 32, 1024, 143), &[1.0; 27], bound);
+        assert_estimates("dispersive", &shown(&scene, 32, 512, 143), &[1.0; 27], bound);
     }
     let blended = |b: Builder, ball: Shape| {
         let b = white_metal(b, ball.clone(), [0.3; 2]).dielectric(ball.clone(), 1.5, 0.2);
@@ -169,7 +169,7 @@ fn radiance_inside_glass() {
         let mut scene = under_white_sky(|b, ball| b.dielectric(ball, 1.5, roughness), 40);
         scene.camera = look(DVec3::new(0.1, 0.2, 0.3), DVec3::new(0.4, 0.1, 1.0), DVec3::Y, narrow());
         scene.film.crop = [1, 1, 2, 2];
-        let estimate = shown(&scene, 32, 1024, 150);
+        let estimate = shown(&scene, 32, 512, 150);
         assert_estimates("inside", &estimate, &[2.25], Bound { resolution: 0.01, allowance });
     }
 }
@@ -250,7 +250,7 @@ fn opaque_materials_are_those_of_the_reference() {
     for (what, add) in
         [("metal", metal), ("rough metal", rough), ("varnish", varnish), ("plastic", plastic), ("blend", blend)]
     {
-        against_reference(what, &room_with(add), 128, 8192, [0.35, 0.02]);
+        against_reference(what, &room_with(add), 128, 4096, [0.35, 0.02]);
     }
 }
 
@@ -265,7 +265,7 @@ fn glass_is_that_of_the_reference() {
     for (what, add) in
         [("clear", clear), ("frosted", frosted), ("dispersive", dispersive), ("narrow", narrow), ("wide", wide)]
     {
-        against_reference(what, &room_with(add), 128, 8192, [0.7, 0.04]);
+        against_reference(what, &room_with(add), 128, 4096, [0.7, 0.04]);
     }
 }
 
@@ -277,7 +277,7 @@ fn dispersion_is_unbiased() {
         [(0.0, 512, [0.15, 0.06]), (0.02, 512, [0.15, 0.06]), (0.15, 512, [0.15, 0.06])]
     {
         let scene = dispersive_ball(Channels::equal(400.0, 700.0, 6), roughness);
-        against_reference(&format!("roughness {roughness}"), &scene, samples, 50_000, resolution);
+        against_reference(&format!("roughness {roughness}"), &scene, samples, 20_000, resolution);
     }
 }
 

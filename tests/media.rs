@@ -7,8 +7,9 @@ mod device;
 mod scene_builder;
 mod statistics;
 
-use device::{Settings, measure, render};
+use device::{Settings, assert_as_reference, measure, render};
 use glam::{DVec2, DVec3};
+use scene_builder::closed_forms::Case;
 use scene_builder::heat::*;
 use scene_builder::surfaces::glass_curve;
 use scene_builder::*;
@@ -170,6 +171,21 @@ fn cameras_and_nested_media() {
     assert_exact(&sky(Builder::new()).build(), &[1.0], 1e-6);
     assert_exact(&sky(Builder::new().gas(0.0).null_box(cube(2.0).0, cube(2.0).1)).build(), &[1.0], 1e-6);
     assert_exact(&sky(Builder::new().gas(0.25).null_box(cube(2.0).0, cube(2.0).1)).build(), &[(-1f64).exp()], bound);
+}
+
+/// Camera rays of one camera that start in different media: a window and a lens that boundaries cut, also among bodies of glass.
+#[test]
+fn cameras_cut_by_media() {
+    for inner_first in [true, false] {
+        let (scene, expected) = window_in_gases(inner_first);
+        assert_exact(&scene, &expected, 3.0 * 4.0 * ORIGIN_OFFSET + 1e-6);
+    }
+    let Case { scene, expected, seed } = lens_in_gas();
+    let bound = Bound { resolution: 2e-3, allowance: 4.0 * ORIGIN_OFFSET + 1e-5 };
+    assert_estimates("lens", &measure(scene, 8, seed), &expected, bound);
+    // Tables of Planck's law and of the gas are within 1e-4 of a channel's peak.
+    let bound = Bound { resolution: 0.02, allowance: 20.0 * ORIGIN_OFFSET + 3e-4 };
+    assert_as_reference("lens in glass", &lens_in_glass(), [32, 512], 20_000, bound);
 }
 
 /// Light that is aimed at goes through gas on its way too: a patch under a point light and a directional one.

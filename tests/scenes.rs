@@ -5,13 +5,19 @@
 #[allow(dead_code, reason = "its `main` is the example's")]
 mod make_scene;
 
+mod device;
+mod statistics;
+
 use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
 
+use device::{Settings, render};
 use spectile::cube::Cube;
+use spectile::render::prepare::Prepared;
+use spectile::scene::{self, Evaluator};
 use tempfile::TempDir;
 
 fn committed() -> PathBuf {
@@ -235,5 +241,42 @@ fn every_scene_renders_a_small_picture_cleanly() {
         }
         // Hardly a pixel of these scenes is black in all of its four paths.
         assert!(lit > 900, "{name}: {lit} of 1000 pixels are lit");
+    }
+}
+
+/// All evaluators on all scenes: with one seed the same means up to rounding (tests/evaluators.rs says how much), with seeds of
+/// their own means of the picture that differ by their noise.
+#[test]
+#[ignore = "minutes: the kernels of five scenes, four times"]
+fn every_evaluator_renders_every_scene_alike() {
+    let others = [Evaluator::DpeptPath, Evaluator::DpeptSpectral, Evaluator::Pt];
+    for (folder, name) in scenes() {
+        let file = made().join(&folder).join(format!("{name}.toml"));
+        let overrides = [("film.width", 8), ("film.height", 5), ("channels.equal.count", 24)];
+        let overrides = overrides.map(|(key, value)| (key.to_owned(), value.to_string()));
+        let mut scene = scene::load(&file, &overrides).expect("a scene");
+        let records = Prepared::new(&scene, 0).expect("a scene that fits").max_records();
+        let bound = (6.0 * f64::from(records) + 200.0) * f64::from(f32::EPSILON) / 2.0;
+        let mut rendered = |evaluator, seed| {
+            scene.integrator.evaluator = evaluator;
+            let rendered = render(&scene, 8, 64, Settings { seed, ..Settings::default() });
+            rendered.assert_clean();
+            rendered
+        };
+        let expected = rendered(Evaluator::DpeptPixel, 1);
+        for (seed, evaluator) in (2..).zip(others) {
+            let same = rendered(evaluator, 1);
+            for (a, b) in expected.means.iter().flatten().zip(same.means.iter().flatten()) {
+                let (a, b) = (f64::from(*a), f64::from(*b));
+                assert!((a - b).abs() <= bound * a.abs(), "{name}, {}: {a} and {b}", evaluator.name());
+            }
+            let other = rendered(evaluator, seed);
+            for (k, (a, b)) in expected.image_means().iter().zip(other.image_means()).enumerate() {
+                let z = (a.mean - b.mean) / a.error.hypot(b.error);
+                // Of 8 epochs each: Student's distribution of about 14 degrees of freedom, 24 channels, 15 pairs.
+                assert!(z.abs() < 7.5, "{name}, {}, channel {k}: {a:?} {b:?}, z = {z:.2}", evaluator.name());
+            }
+        }
+        println!("{name}: all evaluators agree");
     }
 }

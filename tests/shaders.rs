@@ -254,6 +254,7 @@ fn media_scenes() -> Vec<(String, Scene)> {
     let one = |add: &dyn Fn(Builder) -> Builder| add(Builder(plain_scene())).build();
     vec![
         ("gas".into(), one(&|b| b.gas(0.5).null(disk()))),
+        ("gas that cuts a window".into(), window_in_gas(0.0)),
         ("gas around everything".into(), one(&|b| b.gas(0.5).outer().sky(1.0).directional(DVec3::X, 1.0))),
         (
             "voxels".into(),
@@ -267,6 +268,14 @@ fn media_scenes() -> Vec<(String, Scene)> {
             }),
         ),
     ]
+}
+
+/// A box of gas behind x, before a window between x = ±1.
+fn window_in_gas(x: f64) -> Scene {
+    let window = Projection::Orthographic { half_size: DVec2::ONE };
+    let low = DVec3::new(x - 6.0, -3.0, -3.0);
+    let b = Builder(plain_scene()).camera(look(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, window));
+    b.gas(0.5).null_box(low, low + 6.0).build()
 }
 
 /// Every kind of texture by itself and with others, what surfaces carry by itself, and all at once.
@@ -373,6 +382,19 @@ fn a_plain_scene_pays_for_nothing_else() {
     }
     let bounce = words(&texts[1]);
     assert!(!bounce.contains("switch") && !bounce.contains("throughputs") && !bounce.contains("environment_spectrum_"));
+}
+
+/// Volumes of each camera ray are looked for where a boundary cuts the window, and nowhere else.
+#[test]
+fn windows_within_one_medium_pay_for_no_other() {
+    let mut point = window_in_gas(0.0);
+    point.camera.projection = Projection::Perspective { tan_half: DVec2::ONE };
+    let [point, inside, beside, cut] =
+        [point, window_in_gas(1.5), window_in_gas(-4.5), window_in_gas(0.0)].map(|scene| texts(&scene));
+    // The first pass makes the rays themselves.
+    assert!(inside[1..] == point[1..] && beside[1..] == point[1..]);
+    assert!(cut[1].contains("volumes_at(") && !point[1].contains("volumes_at("));
+    assert!(cut[0] == inside[0] && cut[2] == inside[2]);
 }
 
 /// Switching one feature on changes the passes that it concerns, and no other.

@@ -237,11 +237,10 @@ fn shading_normals_gain_no_energy() {
 /// A mesh of one ball with the ball's own normals, added by `add`, in nothing.
 fn smooth_ball(levels: u32, add: &dyn Fn(Builder, Shape) -> Builder) -> Builder {
     let shape = icosphere(DVec3::ZERO, 1.0, levels);
-    let Shape::Mesh(mesh) = &shape else { unreachable!("an icosphere is a mesh") };
-    let normals = mesh.triangles.iter().map(|t| t.map(|i| mesh.positions[i as usize].normalize())).collect();
+    let normals = round_normals(DVec3::ZERO, &shape);
     let wide = Projection::Perspective { tan_half: DVec2::splat(0.15) };
     let b = Builder::new().camera(look(DVec3::new(1.0, 2.0, 4.0), DVec3::ZERO, DVec3::Y, wide));
-    add(b, shape).attributes(Attributes { normals: Some(normals), ..Attributes::default() })
+    add(b, shape).attributes(normals)
 }
 
 // ---- Device against reference

@@ -19,8 +19,8 @@ fn hot_numbers(path: u32, salt: u32) -> vec2<f32> {
 #if HOT
 const EMITS_BY_ANGLE: u32 = 0x20000000u;
 
-// What an emitter sends out at a cosine: where that depends on the angle, one of the two spectra nearest to it, by chance,
-// so that the mean is linear between them.
+// What an emitter sends out at a cosine to the normal that light sees: where that depends on the angle, one of the two spectra
+// nearest to it, by chance, so that the mean is linear between them.
 fn emitted_spectrum(emitter: Emitter, front: bool, cosine: f32, u: f32) -> u32 {
     if ((emitter.spectrum & EMITS_BY_ANGLE) == 0u) {
         return emitter.spectrum & SPECTRUM_MASK;
@@ -143,7 +143,9 @@ fn append_heat_aimed_at(list: ptr<function, RecordList>, emitted: u32, v: Vertex
     append_heat(list, emitted, v, 1.0, u);
     append(list, OP_HELD | MODE_ON_F, 0u, 1.0, 0.0);
 }
+#endif
 
+#if HOT_VERTICES
 // A point on an emitter, as `towards`, a unit vector from there, sees it.
 fn emitting_vertex(emitter: Emitter, point: LightPoint, towards: vec3<f32>) -> Vertex {
     let p = load_primitive(emitter.primitive);

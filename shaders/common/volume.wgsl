@@ -1,5 +1,6 @@
-// Media in their places, as `render::media` lays them out: metres per device unit, the volumes around the camera (two words), then
-// VOLUME_WORDS words each, then lists of absorbers.
+// Media in their places, as `render::media` lays them out: metres per device unit; the volumes around the camera (two words); where a
+// boundary cuts its lens or window, the word of a place there, whose volumes they are, else 0; then VOLUME_WORDS words each, then lists
+// of absorbers.
 //      0 bits            1 absorption        2 source, or NONE   (spectra, without grids)
 //      3, 4 first voxel of temperature, density, or NONE         5, 6 their values where constant
 //      7 … 9 voxels along x, y, z       10 … 21 device units to voxels, rows and offset       22 first word of its absorbers

@@ -2,6 +2,7 @@
 
 mod array;
 mod bands;
+mod bench;
 mod compare;
 mod converge;
 mod devices;
@@ -49,6 +50,7 @@ Examples:
   spectile view cube.zarr                               a page to look at it
   spectile compare cube.zarr reference.zarr             how it differs from another cube
   spectile converge scene.toml -o report                error against run time, as a report
+  spectile bench -o report                              evaluators side by side, as a report
   spectile stress                                       stiff and extreme cases against their answers
 
 Radiance is in W m-2 sr-1 nm-1, wavelengths are in nm (vacuum), pixels are counted from 0 at the top left.
@@ -76,6 +78,7 @@ enum Command {
     Sensor(sensor::Args),
     View(view::Args),
     Converge(converge::Args),
+    Bench(bench::Args),
     Stress(stress::Args),
     /// A task of an array job (written into the batch script by `submit`)
     #[command(hide = true)]
@@ -101,6 +104,7 @@ impl Cli {
             Command::Sensor(args) => args.json,
             Command::View(args) => args.json,
             Command::Converge(args) => args.json,
+            Command::Bench(args) => args.json,
             Command::Stress(args) => args.json,
             Command::Submit(args) => args.json,
             Command::Spectrum(_) | Command::ArrayTask(_) | Command::ArrayEnd(_) | Command::ArrayProbe(_) => false,
@@ -120,6 +124,7 @@ impl Cli {
             Command::Sensor(args) => sensor::run(args, output),
             Command::View(args) => view::run(args, output),
             Command::Converge(args) => converge::run(args, output),
+            Command::Bench(args) => bench::run(args, output),
             Command::Stress(args) => stress::run(args, output),
             Command::Submit(args) => submit::run(args, output),
             Command::ArrayTask(args) => array::task(args, output),

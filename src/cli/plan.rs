@@ -14,6 +14,7 @@ use crate::files::format_bytes;
 use crate::gpu::adapter::{Gpu, Selection};
 use crate::render::job::StopRule;
 use crate::render::plan;
+use crate::render::pool::MERGE_THREADS;
 use crate::render::prepare::Prepared;
 use crate::render::wave::{Budget, WavePlan};
 use crate::render::worker::Worker;
@@ -57,21 +58,23 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     let scene = args.scene.load()?;
     plan::check(&scene)?;
     scene.warnings.iter().try_for_each(|warning| warn(output, warning))?;
-    let prepared = Arc::new(Prepared::new(&scene, 0)?);
-    let stop = StopRule { samples: Some(args.spp), ..StopRule::default() };
-    let samples = stop.samples_limit(scene.integrator.epoch, false)?.unwrap_or(args.spp);
-    let tile = plan::tile_size(&scene, args.scene.tile);
-    let header = plan::header(&scene, tile, 0);
-    let budget = Budget { memory: args.memory, paths: None };
     // Without a device there is no prediction, but still a plan.
-    let measured = match Gpu::open_all(&args.devices) {
-        Ok(gpus) => measure_all(gpus, &prepared, &scene, tile, budget, output)?,
+    let gpus = match Gpu::open_all(&args.devices) {
+        Ok(gpus) => gpus,
         Err(error @ Error::NoDevice(_)) => {
             say(&format!("warning: {error}"));
             Vec::new()
         }
         Err(error) => return Err(error),
     };
+    let evaluator = plan::evaluator(&scene, None, gpus.first().is_some_and(|gpu| gpu.is_software))?;
+    let prepared = Arc::new(Prepared::for_evaluator(&scene, 0, evaluator)?);
+    let stop = StopRule { samples: Some(args.spp), ..StopRule::default() };
+    let samples = stop.samples_limit(scene.integrator.epoch, false)?.unwrap_or(args.spp);
+    let tile = plan::tile_size(&scene, args.scene.tile);
+    let header = plan::header(&scene, tile, 0);
+    let budget = Budget { memory: args.memory, paths: None };
+    let measured = measure_all(gpus, &prepared, &scene, tile, budget, output)?;
     let waves = match measured.first() {
         Some(m) => m.waves,
         None => plan::waves_without_device(&prepared, tile, budget)?,
@@ -198,6 +201,7 @@ impl Plan<'_> {
             "channels": self.header.channels.len(),
             "tile": self.header.tile,
             "tiles": self.header.grid().count(),
+            "evaluator": self.prepared.evaluator.name(),
             "features": features.collect::<Vec<_>>(),
             "spectra": plan::table_bounds(self.prepared),
             "primitives": self.prepared.accel.primitives.len(),
@@ -236,6 +240,7 @@ impl Plan<'_> {
             p.accel.depth,
             p.emitters.len()
         );
+        text += &format!("evaluator {}\n", p.evaluator.name());
         let lines = plan::feature_lines(p, &self.waves);
         for (title, used) in [("used", true), ("left out", false)] {
             for (i, line) in lines.iter().filter(|l| l.used == used).enumerate() {
@@ -272,9 +277,10 @@ impl Plan<'_> {
         }
         let host = plan::host_memory(p, header);
         text += &format!(
-            "host      {} for the scene, {} a device to merge; units are merged from the devices' transfers\n",
+            "host      {} for the scene, {} a thread that merges (a GPU has up to {}); units are merged from the devices' transfers\n",
             format_bytes(host.scene),
-            format_bytes(host.merge)
+            format_bytes(host.merge),
+            MERGE_THREADS
         );
         text += &format!("disk      {}\n", format_bytes(header.store_bytes()));
         match (self.paths_per_s(), self.predicted_s()) {

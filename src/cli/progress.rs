@@ -272,12 +272,9 @@ fn describe_profile(summary: &Summary) -> String {
     let status = &summary.status;
     let per_path = |seconds: f64| 1e6 * seconds / status.paths.max(1) as f64;
     let mut text = format!("set-up    {:8.3} s  (scene, device, shaders)\n", summary.setup_s);
-    match summary.profile {
-        Some(p) => {
-            text += &format!("generate  {:8.3} s  {:.3} us a path\n", p.generate_s, per_path(p.generate_s));
-            text += &format!("evaluate  {:8.3} s  {:.3} us a path\n", p.evaluate_s, per_path(p.evaluate_s));
-        }
-        None => text += "generate, evaluate: this device has no timestamps\n",
+    if let Some(p) = summary.profile {
+        text += &format!("generate  {:8.3} s  {:.3} us a path\n", p.generate_s, per_path(p.generate_s));
+        text += &format!("evaluate  {:8.3} s  {:.3} us a path\n", p.evaluate_s, per_path(p.evaluate_s));
     }
     text += &format!(
         "merge     {:8.3} s  {:.3} us a path, beside the device's work\n",

@@ -148,6 +148,8 @@ pub struct Args {
     pub tev: Option<String>,
 
     /// Say where the time went, stage by stage
+    ///
+    /// The device's own times of its passes where it has timestamps, else those of waiting for each.
     #[arg(long)]
     pub profile: bool,
 

@@ -1,6 +1,6 @@
 //! Adapters and devices: which there are, what they can do, and one opened for work.
 
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
 use std::time::Duration;
 
 use serde::Serialize;
@@ -116,7 +116,10 @@ fn facts(adapter: &wgpu::Adapter) -> AdapterFacts {
 
 /// Every adapter of this machine, GPUs first.
 pub fn list() -> Vec<AdapterFacts> {
-    sorted_adapters(&instance()).iter().map(facts).collect()
+    // Kept, and with it the drivers in this process: NVIDIA's lists no adapter any more after it has been loaded and unloaded some
+    // twenty times.
+    static KEPT: OnceLock<wgpu::Instance> = OnceLock::new();
+    sorted_adapters(KEPT.get_or_init(instance)).iter().map(facts).collect()
 }
 
 /// GPUs first, each through as many backends as list it.
@@ -299,6 +302,13 @@ impl Gpu {
 
     fn trouble(&self) -> MutexGuard<'_, Option<Trouble>> {
         self.trouble.lock().unwrap_or_else(|e| e.into_inner())
+    }
+
+    /// Bytes that its buffers take; `None` where the backend does not tell.
+    pub fn allocated_bytes(&self) -> Option<u64> {
+        // What is dropped is freed when the device is looked at.
+        let _ = self.device.poll(wgpu::PollType::Poll);
+        self.device.generate_allocator_report().map(|report| report.total_allocated_bytes)
     }
 
     /// Whether the device still works; errors that nobody waited for end up here.

@@ -167,6 +167,7 @@ impl Prepared {
         d.set("ROUGH_BASE", general.rough_base).set("OP_ETA_TABLE", rough_glass || general.rough_base);
         if let Some(media) = &general.media {
             d.set("MEDIA", true).constant("OUTER_VOLUME", media.outer).constant("MOST_STRETCHES", media.stretches);
+            d.set("CAMERA_CUT", media.camera_is_cut);
             if let Some(columns) = media.grids {
                 d.set("GRIDS", true).set("MOST_COLUMNS", columns);
             }
@@ -180,6 +181,7 @@ impl Prepared {
         d.set("HOT_VARNISH", radiators.varnish).set("HOT_COATS", radiators.coats);
         d.set("HOT_TEXTURED", radiators.textured).set("HOT_NUMBERS", radiators.numbers);
         d.set("HOT_RANDOM", general.hot || radiators.facets);
+        d.set("HOT_VERTICES", general.radiators.is_some() || (general.hot && general.smooth));
         d.set("OP_ONLY", general.dispersion);
         d.set("TEXTURES", general.textures).set("TEXTURED", general.textured || radiators.textured);
         d.set("KEPT", general.textured_base || radiators.textured);

@@ -4,10 +4,11 @@ use glam::{DAffine3, DVec3};
 
 use crate::accel::Accel;
 use crate::gpu::layout::{NONE, Primitive};
-use crate::scene::{Bsdf, Field, Interior, MaterialId, Medium, Projection, Scene, SpectrumId};
+use crate::scene::{Bsdf, Field, Interior, MaterialId, Medium, Scene, SpectrumId};
 use crate::spectral::{Curve, planck};
 use crate::{Error, Result};
 
+use super::origins::{Cut, Origins};
 use super::surfaces::{Needed, wavelength};
 
 /// Numbers of volumes have 8 bits in a path's state, of which 0 is none.
@@ -31,6 +32,8 @@ pub struct Media {
     pub spectra: Vec<Needed>,
     /// The number of the medium outside all interiors, or [`NONE`].
     pub outer: u32,
+    /// Whether camera rays start in different media.
+    pub camera_is_cut: bool,
     pub most_absorbers: u32,
     pub most_columns: u32,
     /// Stretches of one way, and voxels that it may go through.
@@ -52,8 +55,7 @@ struct Volume<'a> {
 }
 
 impl Media {
-    /// `None` where the scene has no media. Errors: more volumes than numbers; a camera whose rays do not all start in the
-    /// same media.
+    /// `None` where the scene has no media. Errors: more volumes than numbers, or around the camera than a path can hold.
     pub fn new(scene: &Scene, accel: &Accel) -> Result<Option<Media>> {
         if scene.media.is_empty() {
             return Ok(None);
@@ -89,6 +91,7 @@ impl Media {
             boundaries: accel.objects.iter().map(boundary).collect(),
             spectra: Vec::new(),
             outer,
+            camera_is_cut: false,
             most_absorbers: 0,
             most_columns: 0,
             stretches: (2 * volumes.len() as u32 + 1).clamp(4, MOST_STRETCHES),
@@ -105,8 +108,7 @@ impl Media {
             volume.index = within;
             media.fill(scene, accel, index, volume);
         }
-        let around = media.around_camera(scene, accel)?;
-        media.volumes[1..3].copy_from_slice(&around);
+        media.place_camera(scene, accel)?;
         Ok(Some(media))
     }
 
@@ -210,33 +212,27 @@ impl Media {
         }) as u32
     }
 
-    /// The volumes around the camera, the innermost in the low byte.
-    fn around_camera(&self, scene: &Scene, accel: &Accel) -> Result<[u32; 2]> {
-        let at = |world: DVec3| self.around((world - accel.space.center) * accel.space.scale, &accel.primitives);
-        let camera = &scene.camera;
-        let around = at(camera.position);
-        let [x, y] = match camera.projection {
-            Projection::Perspective { .. } => [0.0; 2],
-            Projection::ThinLens { aperture_radius, .. } => [aperture_radius; 2],
-            Projection::Orthographic { half_size } => half_size.to_array(),
-        };
-        if x > 0.0 {
-            const STEPS: i32 = 8;
-            let places = (-STEPS..=STEPS).flat_map(|i| (-STEPS..=STEPS).map(move |j| (i, j)));
-            let off = |(i, j): (i32, i32)| {
-                let [i, j] = [i, j].map(|n| f64::from(n) / f64::from(STEPS));
-                camera.position + i * x * camera.right + j * y * camera.up
-            };
-            if places.map(off).any(|place| at(place) != around) {
-                let message = "camera rays start in different media, which is not supported: move the camera so that all \
-                               of its lens or window lies in one";
-                return Err(Error::input(&scene.file, message));
+    /// Notes the volumes around the camera, the innermost in the low byte; where boundaries cut its lens or window, those around a
+    /// place there, from which devices find those of each ray.
+    fn place_camera(&mut self, scene: &Scene, accel: &Accel) -> Result<()> {
+        let mut place = (scene.camera.position - accel.space.center) * accel.space.scale;
+        if let Some(origins) = Origins::of(scene, &accel.space) {
+            let boundaries =
+                accel.primitives.iter().zip(&self.boundaries).filter(|(_, boundary)| **boundary & 0xff != 0);
+            let cuts: Vec<Cut> = boundaries.filter_map(|(primitive, _)| origins.cut(primitive)).collect();
+            if !cuts.is_empty() {
+                let on_device = origins.place_apart_from(&cuts).as_vec3();
+                place = on_device.as_dvec3();
+                self.camera_is_cut = true;
+                self.volumes[3] = self.volumes.len() as u32;
+                self.volumes.extend(on_device.to_array().map(f32::to_bits));
             }
         }
-        let Some(around) = around else {
+        let Some(around) = self.around(place, &accel.primitives) else {
             return Err(Error::input(&scene.file, "the camera is inside more than 8 nested media"));
         };
-        Ok([around as u32, (around >> 32) as u32])
+        self.volumes[1..3].copy_from_slice(&[around as u32, (around >> 32) as u32]);
+        Ok(())
     }
 
     /// Volume `number` and those around it, as they are at one place of its surface; the innermost first.

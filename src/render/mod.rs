@@ -9,6 +9,7 @@ pub mod integration;
 pub mod job;
 pub mod lights;
 pub mod media;
+mod origins;
 pub mod patience;
 pub mod plan;
 pub mod pool;

@@ -15,6 +15,9 @@ const DEFAULT_TILE: u32 = 64;
 /// A tile with all its channels stays below this, so that a few fit into any device and any host.
 const MAX_DEFAULT_TILE_BYTES: u64 = 64 << 20;
 
+/// The attribute of a cube that names its evaluator.
+const EVALUATOR: &str = "evaluator";
+
 /// Width and height of the tiles: from the number of channels, the film and `--tile` alone, never from the device.
 pub fn tile_size(scene: &Scene, asked: Option<u32>) -> [u32; 2] {
     let [width, height] = scene.film.cube_size();
@@ -26,13 +29,12 @@ pub fn tile_size(scene: &Scene, asked: Option<u32>) -> [u32; 2] {
     [side.min(width), side.min(height)]
 }
 
-/// The header of the cube that rendering `scene` makes.
+/// The header of the cube that rendering `scene` makes, but for [`record_evaluator`].
 pub fn header(scene: &Scene, tile: [u32; 2], seed: u64) -> Header {
     let integrator = serde_json::to_value(&scene.integrator).expect("plain values");
     let mut attributes = Map::new();
     attributes.insert("scene_digest".into(), json!(scene.digest));
     attributes.insert("seed".into(), json!(seed));
-    attributes.insert("evaluator".into(), json!(scene.integrator.evaluator.resolved().name()));
     attributes.insert(
         "settings".into(),
         json!({
@@ -50,16 +52,21 @@ pub fn header(scene: &Scene, tile: [u32; 2], seed: u64) -> Header {
     }
 }
 
-/// The evaluator for `scene`, or the one that the cube was begun with which `there` describes: what `auto` stands for may have
-/// changed since.
-pub fn evaluator(scene: &Scene, there: Option<&Header>) -> Result<Evaluator> {
-    let Some(recorded) = there.and_then(|header| header.attributes.get("evaluator")) else {
-        return Ok(scene.integrator.evaluator.resolved());
+/// The evaluator for `scene` on a software device or a GPU; or the one with which the cube was begun that `there` describes, since
+/// what `auto` stands for depends on who begins.
+pub fn evaluator(scene: &Scene, there: Option<&Header>, software: bool) -> Result<Evaluator> {
+    let Some(recorded) = there.and_then(|header| header.attributes.get(EVALUATOR)) else {
+        return Ok(scene.integrator.evaluator.on(software, scene.channels.len()));
     };
-    let known = Evaluator::ALL.into_iter().find(|evaluator| recorded == evaluator.name());
-    known.map(Evaluator::resolved).ok_or_else(|| {
+    let known = Evaluator::ALL[1..].iter().copied().find(|evaluator| recorded == evaluator.name());
+    known.ok_or_else(|| {
         Error::Usage(format!("the cube was begun with the evaluator {recorded}, which this version does not have"))
     })
+}
+
+/// Writes down that a cube is begun with `evaluator`.
+pub fn record_evaluator(header: &mut Header, evaluator: Evaluator) {
+    header.attributes.insert(EVALUATOR.into(), json!(evaluator.name()));
 }
 
 /// One part of the renderer, and whether this scene needs it.
@@ -152,6 +159,11 @@ pub fn feature_lines(prepared: &Prepared, waves: &WavePlan) -> Vec<FeatureLine> 
             format!("{}, 16 bytes a path, a record for each stretch of a way", module(s::MEDIUM)),
         ),
         line(
+            "camera rays that start in different media",
+            f.general.is_some_and(|g| g.media.is_some_and(|m| m.camera_is_cut)),
+            "a way through the lens or window for each path".into(),
+        ),
+        line(
             "media of voxels",
             f.general.is_some_and(|g| g.media.is_some_and(|m| m.grids.is_some())),
             "a march through its cells for each stretch and channel".into(),
@@ -170,8 +182,8 @@ pub fn feature_lines(prepared: &Prepared, waves: &WavePlan) -> Vec<FeatureLine> 
 pub struct HostMemory {
     /// The flattened scene: BVH, primitives, materials, lights, spectra.
     pub scene: u64,
-    /// What each device's thread holds while it merges. The units themselves are merged from where the device put them,
-    /// in its two transfers.
+    /// What a thread holds while it merges: one a software device, up to `pool::MERGE_THREADS` a GPU. The units themselves
+    /// are merged from where the device put them, in its two transfers.
     pub merge: u64,
 }
 

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{self, Sender};
-use std::sync::{Arc, OnceLock, Weak};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError, Weak};
 use std::thread;
 use std::time::Instant;
 
@@ -22,6 +22,10 @@ use crate::render::watch::{Device, Reports};
 use crate::render::wave::{Budget, WavePlan};
 use crate::render::worker::{Collected, Interrupt, Profile, UnitRect, Worker, device_limits};
 use crate::{Error, Result};
+
+/// Most threads that merge what one device brings back. A tile of a GPU comes back faster than one core merges it: on an H200 at 400
+/// channels a path took 9 ns on the device, and 106 ns of one core to merge.
+pub const MERGE_THREADS: usize = 8;
 
 /// What all devices of a render share. Nobody borrows it: a thread that is stuck in its driver keeps it for good.
 pub struct Pool {
@@ -110,6 +114,8 @@ pub struct Merged {
 /// A device at work: its number, the groups that it has under way, the oldest first, and to whom it reports.
 struct Post<'a> {
     device: usize,
+    /// Threads that merge its units.
+    merge_threads: usize,
     taken: VecDeque<Taken>,
     reports: &'a Sender<(usize, Report)>,
     /// Whether it was ready once, and what it measured.
@@ -129,11 +135,15 @@ impl Pool {
     pub fn start(self: &Arc<Self>, gpus: Vec<Gpu>) -> Result<Reports> {
         let (sender, receiver) = mpsc::channel();
         let mut devices = Vec::new();
+        let cores = thread::available_parallelism().map_or(1, usize::from);
+        let cores_each = (cores / gpus.len().max(1)).clamp(1, MERGE_THREADS);
         for (device, gpu) in gpus.into_iter().enumerate() {
+            // The cores of a software device have enough to do.
+            let merge_threads = if gpu.is_software { 1 } else { cores_each };
             let (name, deadline) = (gpu.name.clone(), Arc::clone(&gpu.deadline));
             let (pool, sender) = (Arc::clone(self), sender.clone());
             let thread = thread::Builder::new().name(format!("device {}", device + 1));
-            let thread = thread.spawn(move || pool.work(device, gpu, &sender));
+            let thread = thread.spawn(move || pool.work(device, merge_threads, gpu, &sender));
             let thread = thread.map_err(|e| Error::Internal(format!("no thread for device {}: {e}", device + 1)))?;
             devices.push(Device::new(name, deadline, thread));
         }
@@ -141,9 +151,9 @@ impl Pool {
     }
 
     /// The life of device number `device`.
-    fn work(&self, device: usize, gpu: Gpu, reports: &Sender<(usize, Report)>) {
+    fn work(&self, device: usize, merge_threads: usize, gpu: Gpu, reports: &Sender<(usize, Report)>) {
         let gpu = Arc::new(gpu);
-        let mut post = Post { device, taken: VecDeque::new(), reports, ready: false, profile: None };
+        let mut post = Post { device, merge_threads, taken: VecDeque::new(), reports, ready: false, profile: None };
         let result = catch_unwind(AssertUnwindSafe(|| self.serve(&gpu, &mut post)));
         let result =
             result.unwrap_or_else(|_| Err(Error::Internal(format!("the thread of device {} panicked", device + 1))));
@@ -185,7 +195,7 @@ impl Pool {
                     )));
                 }
                 let result = self.pull(&mut worker, post);
-                if worker.gpu.timestamps && self.profile {
+                if self.profile {
                     let sum = post.profile.get_or_insert_default();
                     sum.generate_s += worker.profile.generate_s;
                     sum.evaluate_s += worker.profile.evaluate_s;
@@ -298,13 +308,14 @@ impl Pool {
             if !last {
                 return Ok(());
             }
-            for (&tile, mean) in oldest.group.tiles.iter().zip(&oldest.means) {
-                self.cube().merge_unit(tile, 0, n_before + samples, mean)?;
-            }
+            let means = oldest.group.tiles.iter().zip(&oldest.means);
+            side_by_side(post.merge_threads, means, |(&tile, mean)| {
+                self.cube().merge_unit(tile, 0, n_before + samples, mean)
+            })?;
         } else {
-            for (&tile, unit) in oldest.group.tiles.iter().zip(units) {
-                self.cube().merge_unit(tile, n_before, samples, unit)?;
-            }
+            side_by_side(post.merge_threads, oldest.group.tiles.iter().zip(units), |(&tile, unit)| {
+                self.cube().merge_unit(tile, n_before, samples, unit)
+            })?;
         }
         let Some(Taken { group, tally, bad, .. }) = post.taken.pop_front() else { return Ok(()) };
         self.queue.done(&group);
@@ -335,6 +346,53 @@ impl Taken {
         if counters.bad_sample > 0 && self.bad.is_none() {
             let [x, y, sample] = bad_sample();
             self.bad = Some([x, y, epoch, sample]);
+        }
+    }
+}
+
+/// Does `each` of `work` on so many threads, until one fails.
+fn side_by_side<T: Send>(
+    threads: usize,
+    work: impl ExactSizeIterator<Item = T> + Send,
+    each: impl Fn(T) -> Result<()> + Sync,
+) -> Result<()> {
+    let threads = threads.min(work.len());
+    if threads <= 1 {
+        return work.into_iter().try_for_each(each);
+    }
+    let work = Mutex::new(work);
+    let next = || work.lock().unwrap_or_else(PoisonError::into_inner).next();
+    let some = || std::iter::from_fn(&next).try_for_each(&each);
+    thread::scope(|scope| {
+        let others: Vec<_> = (1..threads).map(|_| scope.spawn(some)).collect();
+        let own = some();
+        let join = |other: thread::ScopedJoinHandle<'_, Result<()>>| {
+            other.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        };
+        others.into_iter().map(join).fold(own, Result::and)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicU32, Ordering};
+
+    use super::*;
+
+    #[test]
+    fn work_side_by_side_is_all_done_or_fails() {
+        for threads in [1, 2, 5, 100] {
+            let sum = AtomicU32::new(0);
+            let add = |x: u32| {
+                sum.fetch_add(x, Ordering::Relaxed);
+                Ok(())
+            };
+            side_by_side(threads, (1..=100u32).collect::<Vec<_>>().into_iter(), add).expect("no error");
+            assert_eq!(sum.into_inner(), 5050);
+            let fail = |x: u32| if x == 57 { Err(Error::Usage("57".into())) } else { Ok(()) };
+            let error = side_by_side(threads, (1..=100u32).collect::<Vec<_>>().into_iter(), fail);
+            assert_eq!(error.expect_err("one fails").to_string(), "57");
+            side_by_side(threads, std::iter::empty::<u32>(), |_| Ok(())).expect("nothing to do");
         }
     }
 }

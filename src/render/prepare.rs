@@ -94,6 +94,8 @@ pub struct General {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MediaShape {
     pub outer: u32,
+    /// Whether camera rays start in different ones.
+    pub camera_is_cut: bool,
     pub stretches: u32,
     /// The most columns of an absorber, where there are grids.
     pub grids: Option<u32>,
@@ -177,10 +179,10 @@ impl Prepared {
     /// Flattens `scene`. Errors: materials that no shader knows; more materials, spectra or bounces than ids and
     /// counters have bits for.
     pub fn new(scene: &Scene, seed: u64) -> Result<Prepared> {
-        Prepared::for_evaluator(scene, seed, scene.integrator.evaluator.resolved())
+        Prepared::for_evaluator(scene, seed, scene.integrator.evaluator.on(true, scene.channels.len()))
     }
 
-    /// As [`Prepared::new`], for an evaluator other than the scene's.
+    /// As [`Prepared::new`], for the evaluator chosen ([`plan::evaluator`](super::plan::evaluator)).
     pub fn for_evaluator(scene: &Scene, seed: u64, evaluator: Evaluator) -> Result<Prepared> {
         match Integration::of(&scene.channels) {
             None => Prepared::flatten(scene, seed, evaluator, None),
@@ -244,6 +246,7 @@ impl Prepared {
         }
         let media_shape = media.as_ref().map(|m| MediaShape {
             outer: m.outer,
+            camera_is_cut: m.camera_is_cut,
             stretches: m.stretches,
             grids: m.wavelength.map(|_| m.most_columns),
         });

@@ -71,7 +71,7 @@ pub enum Event<'a> {
 /// What a render did.
 pub struct Summary {
     pub status: Status,
-    /// Sums over the devices that have timestamps, if asked for.
+    /// Sums over the devices, if asked for.
     pub profile: Option<Profile>,
     /// Seconds until the first device was ready, and seconds that the devices' threads spent merging.
     pub setup_s: f64,
@@ -89,10 +89,9 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
     plan::check(&job.scene)?;
     let samples_limit = job.stop.samples_limit(job.scene.integrator.epoch, job.uncertainty)?;
     let tile = plan::tile_size(&job.scene, job.tile);
-    let header = job.header(tile);
+    let mut header = job.header(tile);
     let tiles = job.tiles(&header)?;
     let there = check_target(&job.output, &header, job.existing, &tiles)?;
-    let evaluator = plan::evaluator(&job.scene, there.as_ref())?;
     if let Some(preview) = &job.preview {
         files::check_target(&preview.file)?;
     }
@@ -105,6 +104,9 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
             "the devices are of different kinds: the cube is right, but its last bits depend on which rendered what";
         observe(Event::Warning(what.into()))?;
     }
+    let software = gpus[0].is_software;
+    let evaluator = plan::evaluator(&job.scene, there.as_ref(), software)?;
+    plan::record_evaluator(&mut header, evaluator);
     let prepared = Arc::new(Prepared::for_evaluator(&job.scene, job.seed, evaluator)?);
     if prepared.accel.degenerate > 0 {
         let what =
@@ -133,6 +135,11 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
         let opened = Writer::open(&job.output, &header, job.existing, tiles, &mut |what| warnings.push(what));
         warnings.into_iter().try_for_each(|what| observe(Event::Warning(what)))?;
         let opened = opened?;
+        // Another process may have made it since, on a device of another kind.
+        if plan::evaluator(&job.scene, Some(opened.cube().header()), software)? != evaluator {
+            let what = "was made by another process with another evaluator a moment ago: run the same command again";
+            return Err(Error::storage(opened.cube().path(), what));
+        }
         run = Some(RunFile::create(opened.cube().path(), Run::begin(&opened.tiles(), samples_limit))?);
         let cube = pool.cube.get_or_init(|| opened);
         if let Some(feed) = &job.feed {

@@ -38,7 +38,7 @@ pub struct DeviceLimits {
 pub struct Budget {
     /// Scene, path buffers, means and transfers together, bytes.
     pub memory: Option<u64>,
-    /// Paths of a wave (tests).
+    /// Paths of a wave, as far as they fit, instead of what is worth it.
     pub paths: Option<u32>,
 }
 
@@ -121,9 +121,8 @@ impl WavePlan {
             Some(memory) if memory < plan.device_bytes() => return Err(plan.too_large_for(memory)),
             Some(memory) => memory - buffer::WGPU_BYTES - plan.scene_bytes - plan.wave_bytes(),
         };
-        let more_paths = (wanted_paths(limits.software, channels, records).min(most))
-            .saturating_sub(u64::from(plan.paths))
-            .min(left / plan.path_bytes());
+        let wanted = budget.paths.map_or_else(|| wanted_paths(limits.software, channels, records), u64::from);
+        let more_paths = (wanted.min(most)).saturating_sub(u64::from(plan.paths)).min(left / plan.path_bytes());
         // In fours, so that every buffer grows by exactly what its paths take, alignment included.
         let more_paths = more_paths - more_paths % 4;
         plan.paths += more_paths as u32;

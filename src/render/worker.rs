@@ -47,7 +47,7 @@ pub fn check_interrupt(interrupt: &Interrupt) -> Result<()> {
     }
 }
 
-/// Device time of the passes, seconds, where the adapter has timestamps.
+/// Time of the passes, seconds: the device's own where it has timestamps, else that of waiting for each.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Profile {
     pub generate_s: f64,
@@ -68,6 +68,8 @@ pub struct Worker {
     shape: EvaluateShape,
     path_buffers: PathBuffers,
     timestamps: Option<Timestamps>,
+    /// Whether passes are measured by waiting for them.
+    clocked: bool,
     slots: Vec<Slot>,
     next_slot: usize,
     /// Waves under way, the oldest first.
@@ -195,6 +197,7 @@ impl Worker {
             shape,
             path_buffers,
             timestamps,
+            clocked: false,
             slots,
             next_slot: 0,
             waves: VecDeque::new(),
@@ -211,6 +214,7 @@ impl Worker {
     pub fn enable_profile(&mut self) {
         let passes = if self.update.is_some() { 2 * self.bounces() } else { 2 };
         self.timestamps = self.gpu.timestamps.then(|| Timestamps::new(&self.gpu, passes));
+        self.clocked = !self.gpu.timestamps;
     }
 
     /// Ends the work of [`Worker::submit`] with an error as soon as `interrupt` is set.
@@ -379,34 +383,41 @@ impl Worker {
         self.gpu.queue.write_buffer(&self.path_buffers.wave, 0, bytemuck::bytes_of(&wave));
         let mut encoder = self.encoder("wave");
         encoder.clear_buffer(&self.path_buffers.queue_lengths, 0, None);
-        let step = |number: u32| [number * self.path_buffers.step_stride];
+        let (stride, blocks, bounces) = (self.path_buffers.step_stride, self.shape.blocks, self.bounces());
+        let step = |number: u32| [number * stride];
         let (all, pixels) = (fold(groups), fold(pixel_groups));
         let mut pass = self.begin(&mut encoder, "generate", 0);
         self.camera.dispatch(&mut pass, &[], all, 1);
-        for bounce in 0..self.bounces() {
+        for bounce in 0..bounces {
             if bounce > 0 && self.update.is_some() {
                 drop(pass);
+                self.lap(&mut encoder, 1)?;
                 pass = self.begin(&mut encoder, "generate", 2 * bounce);
             }
             self.bounce.dispatch(&mut pass, &step(bounce), all, 1);
-            if let Some(update) = &self.update {
+            if self.update.is_some() {
                 drop(pass);
+                self.lap(&mut encoder, 0)?;
                 pass = self.begin(&mut encoder, "evaluate", 2 * bounce + 1);
-                update.dispatch(&mut pass, &step(bounce), fold(paths.div_ceil(self.shape.pixels)), self.shape.blocks);
+            }
+            if let Some(update) = &self.update {
+                update.dispatch(&mut pass, &step(bounce), fold(paths.div_ceil(self.shape.pixels)), blocks);
             }
         }
         if self.update.is_none() {
             drop(pass);
+            self.lap(&mut encoder, 0)?;
             pass = self.begin(&mut encoder, "evaluate", 1);
         }
         if self.plan.sample_by_sample {
             for sample in 0..wave.samples {
-                self.evaluate.dispatch(&mut pass, &step(sample), pixels, self.shape.blocks);
+                self.evaluate.dispatch(&mut pass, &step(sample), pixels, blocks);
             }
         } else {
-            self.evaluate.dispatch(&mut pass, &[], pixels, self.shape.blocks);
+            self.evaluate.dispatch(&mut pass, &[], pixels, blocks);
         }
         drop(pass);
+        self.lap(&mut encoder, 1)?;
         if let Some(timestamps) = &self.timestamps {
             timestamps.resolve(&mut encoder);
         }
@@ -417,6 +428,21 @@ impl Worker {
             self.profile.generate_s += generate;
             self.profile.evaluate_s += evaluate;
         }
+        Ok(())
+    }
+
+    /// Where passes are clocked, does what `encoder` has and adds the time to that of generate (0) or evaluate (1).
+    fn lap(&mut self, encoder: &mut wgpu::CommandEncoder, stage: usize) -> Result<()> {
+        if !self.clocked {
+            return Ok(());
+        }
+        let done = std::mem::replace(encoder, self.encoder("wave"));
+        let began = Instant::now();
+        let submission = self.gpu.queue.submit([done.finish()]);
+        buffer::wait(&self.gpu, submission, self.limit())?;
+        let seconds = began.elapsed().as_secs_f64();
+        let Profile { generate_s, evaluate_s } = &mut self.profile;
+        *[generate_s, evaluate_s][stage] += seconds;
         Ok(())
     }
 
@@ -591,6 +617,22 @@ mod tests {
         worker.submit(&[[0, 0, 3, 2]], 0, 64, &mut note)?;
         worker.collect(&mut note)?;
         Ok(found.expect("collected"))
+    }
+
+    /// Without timestamps passes are clocked, and compute the same.
+    #[test]
+    fn passes_are_measured_with_and_without_timestamps() {
+        let mut worker = worker();
+        let rays = counters(&mut worker).expect("counters").rays();
+        for has_timestamps in [true, false] {
+            let mut again = self::worker();
+            let gpu = Arc::get_mut(&mut again.gpu).expect("the only one");
+            gpu.timestamps &= has_timestamps;
+            again.enable_profile();
+            assert_eq!(counters(&mut again).expect("counters").rays(), rays);
+            let Profile { generate_s, evaluate_s } = again.profile;
+            assert!(generate_s > 0.0 && evaluate_s > 0.0, "{:?}", again.profile);
+        }
     }
 
     /// The count of rays goes on beyond 32 bits, from wherever it crosses them.

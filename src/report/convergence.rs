@@ -215,7 +215,7 @@ pub fn render(
     interrupt: &Arc<Interrupt>,
     mut after: impl FnMut(&Image, f64) -> Result<()>,
 ) -> Result<Image> {
-    let prepared = Arc::new(Prepared::new(scene, seed)?);
+    let prepared = Arc::new(Prepared::for_evaluator(scene, seed, plan::evaluator(scene, None, gpu.is_software)?)?);
     let integration = prepared.integration.clone();
     let tile = plan::tile_size(scene, None);
     let mut worker = Worker::new(Arc::clone(gpu), prepared, tile, Budget { memory: None, paths: None })?;

@@ -1,9 +1,12 @@
 //! Reports (DESIGN section 8): what is measured, as CSV, JSON and one self-contained page of HTML.
 
+pub mod bench;
 pub mod chart;
 pub mod converge;
 pub mod convergence;
+pub mod everything;
 pub mod page;
+pub mod throughput;
 
 use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};

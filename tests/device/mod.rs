@@ -6,12 +6,13 @@ use std::sync::{Arc, Mutex, MutexGuard};
 
 use spectile::gpu::adapter::Gpu;
 use spectile::gpu::layout::Counters;
+use spectile::reference;
 use spectile::render::prepare::Prepared;
 use spectile::render::wave::Budget;
 use spectile::render::worker::{UnitRect, Worker};
 use spectile::scene::Scene;
 
-use crate::statistics::Estimate;
+use crate::statistics::{Bound, Estimate, assert_agreement, image_estimates};
 
 /// How to render in a test.
 #[derive(Debug, Clone, Copy)]
@@ -121,6 +122,24 @@ pub fn measure(mut scene: Scene, epochs: u32, seed: u64) -> Vec<Estimate> {
     let rendered = render(&scene, epochs, 64, Settings { seed, ..Settings::default() });
     rendered.assert_clean();
     rendered.replicas()
+}
+
+/// Every pixel and channel, relative to its value or the channel's mean over the image, whichever is larger; and those means, five
+/// times as sharply. `samples`: epochs and samples of each.
+pub fn assert_as_reference(what: &str, scene: &Scene, samples: [u32; 2], of_reference: u32, bound: Bound) {
+    let rendered = render(scene, samples[0], samples[1], Settings { seed: 5, ..Settings::default() });
+    rendered.assert_clean();
+    let truth = reference::render_image(scene, of_reference, 6);
+    let (channels, freedom) = (scene.channels.len(), f64::from(truth.samples - 1));
+    let of_image = image_estimates(&truth.mean, &truth.standard_error, channels, freedom);
+    let means: Vec<f64> = of_image.iter().map(|e| e.mean).collect();
+    let scale: Vec<f64> = truth.mean.iter().enumerate().map(|(i, value)| value.max(means[i % channels])).collect();
+    let truth: Vec<Estimate> = (truth.mean.iter().zip(&truth.standard_error))
+        .map(|(&mean, &error)| Estimate { mean, error, freedom })
+        .collect();
+    assert_agreement(what, &rendered.values(), &truth, &scale, bound);
+    let bound = Bound { resolution: 0.2 * bound.resolution, ..bound };
+    assert_agreement(&format!("{what}, image"), &rendered.image_means(), &of_image, &means, bound);
 }
 
 impl Epochs {

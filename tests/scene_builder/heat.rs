@@ -2,11 +2,14 @@
 
 use std::sync::Arc;
 
-use glam::{DAffine3, DVec3};
-use spectile::scene::{Absorber, Camera, Field, Grid, Interior, Medium, Mesh, Object, Shape, Temperature};
+use glam::{DAffine3, DVec2, DVec3};
+use spectile::scene::{
+    Absorber, Camera, Field, Filter, Grid, Interior, Medium, Mesh, Object, Projection, Scene, Shape, Sides, Temperature,
+};
 use spectile::spectral::{Channels, Curve, Outside, planck as law};
 
-use super::{Builder, IntoCurve, disk, look, narrow};
+use super::closed_forms::Case;
+use super::{Builder, IntoCurve, disk, look, narrow, sphere};
 
 impl Builder {
     /// The last material has a temperature.
@@ -101,7 +104,7 @@ pub fn means(curve: &Curve, channels: &Channels) -> Vec<f64> {
 
 /// Two disks one metre apart that stand for infinite plates of diffuse materials at temperatures: VALIDATION 1.2. Each
 /// case shows one of them.
-pub fn hot_plates(radius: f64, bounces: u32) -> Vec<super::closed_forms::Case> {
+pub fn hot_plates(radius: f64, bounces: u32) -> Vec<Case> {
     let mut cases = Vec::new();
     for (e, kelvin, published, seed) in [
         ([0.9, 0.8], [400.0, 300.0], [0.03163354, 0.01426593], 310),
@@ -124,7 +127,7 @@ pub fn hot_plates(radius: f64, bounces: u32) -> Vec<super::closed_forms::Case> {
                 .diffuse(disk(DVec3::Z, DVec3::NEG_Z, radius), 1.0 - e[1])
                 .at_kelvin(kelvin[1])
                 .build();
-            cases.push(super::closed_forms::Case { scene, expected, seed });
+            cases.push(Case { scene, expected, seed });
         }
     }
     cases
@@ -163,4 +166,66 @@ pub const DEPTHS: [f64; 10] = [1e-9, 1e-6, 1e-3, 0.1, 0.5, 1.0, 2.0, 5.0, 20.0, 
 /// The temperature for which Planck's radiance at 10 um is `radiance`: 1/x = log(1 + c₁/(λ⁵ L)).
 pub fn kelvin_of(radiance: f64) -> f64 {
     law::C2 / (1e-5 * (law::C1L / 1e-25 * 1e-9 / radiance).ln_1p())
+}
+
+/// A window of four pixels before a lamp of radiance 1, cut by two boxes of gas, one within the other, in a third gas: where each
+/// camera ray starts decides what it goes through. Which box is met first in the list of objects should not.
+pub fn window_in_gases(inner_first: bool) -> (Scene, Vec<f64>) {
+    let window = Projection::Orthographic { half_size: DVec2::new(1.0, 0.25) };
+    let b = Builder::new().camera(look(3.0 * DVec3::Z, DVec3::ZERO, DVec3::Y, window)).film(4, 1, Filter::Box).lamp(
+        disk(DVec3::ZERO, DVec3::Z, 4.0),
+        1.0,
+        Sides::Front,
+    );
+    let outer = |b: Builder| b.gas(0.4).null_box(DVec3::new(-3.0, -2.0, 0.5), DVec3::new(0.0, 2.0, 4.0));
+    let inner = |b: Builder| b.gas(0.9).null_box(DVec3::new(-2.0, -1.0, 1.0), DVec3::new(-0.5, 1.0, 3.5));
+    let b = if inner_first { outer(inner(b)) } else { inner(outer(b)) };
+    let depths: [f64; 4] = [0.9 * 2.0 + 0.4 * 0.5 + 0.1 * 0.5, 0.4 * 2.5 + 0.1 * 0.5, 0.1 * 3.0, 0.1 * 3.0];
+    (b.gas(0.1).outer().build(), depths.map(|depth| (-depth).exp()).to_vec())
+}
+
+/// A lens of radius 0.8 at z = 3, half of it in gas, and sharp in one point of a lamp of radiance 1 at z = 0: the mean over the lens of
+/// what the straight ways to that point lose.
+pub fn lens_in_gas() -> Case {
+    let (gas, radius, at) = (1.5, 0.8, 0.25);
+    let lens = Projection::ThinLens { tan_half: DVec2::splat(1e-6), aperture_radius: radius, focus_distance: 3.0 };
+    // Straight down, and the point beside the axis: the axis itself goes along the boundary.
+    let camera = look(DVec3::new(at, 0.0, 3.0), DVec3::new(at, 0.0, 0.0), DVec3::Y, lens);
+    let scene = Builder::new()
+        .camera(camera)
+        .lamp(disk(DVec3::ZERO, DVec3::Z, 4.0), 1.0, Sides::Front)
+        .gas(gas)
+        .null_box(DVec3::new(-3.0, -3.0, 0.5), DVec3::new(0.0, 3.0, 4.0))
+        .build();
+    // The midpoint rule over squared radius and angle.
+    const STEPS: u32 = 1_000;
+    let middle = |i: u32| (f64::from(i) + 0.5) / f64::from(STEPS);
+    let through = |i: u32, j: u32| {
+        let (r, angle) = (radius * middle(i).sqrt(), std::f64::consts::TAU * middle(j));
+        let [x, y] = [r * angle.cos(), r * angle.sin()];
+        // The way from (at + x, y, 3) to (at, 0, 0) leaves the gas through x = 0 or z = 0.5.
+        let share = if at + x < 0.0 { (1.0 + at / x).min(5.0 / 6.0) } else { 0.0 };
+        (-gas * share * (x * x + y * y + 9.0).sqrt()).exp()
+    };
+    let sum: f64 = (0..STEPS * STEPS).map(|n| through(n / STEPS, n % STEPS)).sum();
+    Case { scene, expected: vec![sum / f64::from(STEPS * STEPS)], seed: 360 }
+}
+
+/// A wide lens among bodies: partly in a ball of gas, partly in glass that absorbs and holds a hot gas.
+pub fn lens_in_glass() -> Scene {
+    let lens = Projection::ThinLens { tan_half: DVec2::splat(0.3), aperture_radius: 0.7, focus_distance: 3.0 };
+    Builder::new()
+        .camera(look(DVec3::new(0.0, 0.1, 3.0), DVec3::ZERO, DVec3::Y, lens))
+        .film(3, 3, Filter::Gaussian)
+        .channels(Channels::from_bounds(vec![[3e3, 5e3], [8e3, 12e3]], None))
+        .bounces(4)
+        .lamp(disk(DVec3::ZERO, DVec3::Z, 3.0), planck(400.0), Sides::Front)
+        .gas(0.8)
+        .null(sphere(DVec3::new(-0.6, 0.3, 2.8), 0.6))
+        .dielectric(cuboid(DVec3::new(0.1, -1.0, 2.2), DVec3::new(1.2, 1.0, 3.3)), 1.5, 0.0)
+        .gas(0.5)
+        .filled()
+        .medium(1.0, Some(Field::Constant(500.0)), Field::Constant(1.0))
+        .null(sphere(DVec3::new(0.6, -0.2, 2.9), 0.3))
+        .build()
 }

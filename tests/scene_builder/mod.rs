@@ -287,6 +287,13 @@ pub fn sphere(center: DVec3, radius: f64) -> Shape {
     Shape::Sphere { center, radius }
 }
 
+/// A mesh around `center` with shading normals that lead away from there.
+pub fn round_normals(center: DVec3, mesh: &Shape) -> Attributes {
+    let Shape::Mesh(mesh) = mesh else { panic!("round shapes have their own normals") };
+    let away = |i: u32| (mesh.positions[i as usize] - center).normalize();
+    Attributes { normals: Some(mesh.triangles.iter().map(|t| t.map(away)).collect()), ..Attributes::default() }
+}
+
 /// An icosahedron whose triangles are split in four `levels` times, vertices pushed onto the sphere; outward normals.
 pub fn icosphere(center: DVec3, radius: f64, levels: u32) -> Shape {
     let golden = 0.5 * (1.0 + 5f64.sqrt());
