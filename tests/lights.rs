@@ -14,7 +14,7 @@ use scene_builder::*;
 use spectile::reference;
 use spectile::render::prepare::Prepared;
 use spectile::render::rng::hash;
-use spectile::scene::{Environment, Filter, Projection, Scene, Sides, Texels};
+use spectile::scene::{Environment, Filter, Projection, Scene, Sides, Texels, Wavelengths};
 use spectile::spectral::{Channels, Curve, Outside, upsample};
 use statistics::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -468,9 +468,12 @@ fn spectra_around_everything() {
     if let Some(Environment::Map(map)) = &mut scene.environment {
         map.to_map = DMat3::from_rotation_y(0.7);
     }
-    // Bands at any distance are kept exact.
-    assert!(Prepared::new(&scene, 0).unwrap().features.knots);
-    compare("spectral map", &scene, 32, 4096, 0.02);
+    // Bands at any distance are kept exact: by knots, or by strata that end at all bands.
+    for (wavelengths, knots) in [(Wavelengths::Uniform, true), (Wavelengths::Emission, false)] {
+        scene.integrator.wavelengths = wavelengths;
+        assert_eq!(Prepared::new(&scene, 0).unwrap().features.knots, knots, "{wavelengths:?}");
+        compare("spectral map", &scene, 32, 4096, 0.02);
+    }
 }
 
 /// All at once: a map, a sun, a point, a directional light and a lamp, with roulette.

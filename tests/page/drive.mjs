@@ -43,6 +43,11 @@ await page.waitForFunction(() => window.spectile.picture.drawn > 0);
 seen.first_picture_ms = Date.now() - browser.began;
 await browser.settled();
 seen.start = await browser.look();
+// On a busy machine a render's first tile may come after the empty picture has been drawn.
+for (let i = 0; i < 200 && seen.start.colours <= 20; i++) {
+  await page.waitForTimeout(100);
+  seen.start = await browser.look();
+}
 seen.title = await page.title();
 if (what === "view") seen.against_png = await against_png();
 
