@@ -19,6 +19,7 @@ use spectile::render::prepare::Prepared;
 use spectile::render::schedule::{self, Event};
 use spectile::render::wave::Budget;
 use spectile::render::worker::Worker;
+use spectile::report::throughput::median;
 use spectile::scene::{self, Scene};
 
 /// Set in the process that measures: the driver reads its number of threads once, at the first call.
@@ -52,11 +53,6 @@ fn anonymous_bytes() -> u64 {
     line.trim().trim_end_matches(" kB").parse::<u64>().unwrap_or(0) << 10
 }
 
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
-}
-
 /// Paths per CPU second, and microseconds of a path in generate and evaluate.
 fn speed(scene: &Scene, rounds: usize, samples: u32) -> Result<()> {
     let prepared = Arc::new(Prepared::new(scene, 0)?);
@@ -77,8 +73,9 @@ fn speed(scene: &Scene, rounds: usize, samples: u32) -> Result<()> {
     epoch(&mut worker, 1 + rounds as u32)?;
     let us = |seconds: f64| 1e6 * seconds / paths;
     println!("{}, K = {}, {samples} samples a unit, {rounds} rounds", worker.gpu.name, scene.channels.len());
-    let middle = median(&mut rates);
-    println!("paths per CPU second: median {middle:.0}, {:.0} to {:.0}", rates[0], rates[rates.len() - 1]);
+    rates.sort_by(f64::total_cmp);
+    let (middle, fastest) = (median(&rates), rates[rates.len() - 1]);
+    println!("paths per CPU second: median {middle:.0}, {:.0} to {fastest:.0}", rates[0]);
     println!(
         "of a path: generate {:.3} us, evaluate {:.3} us",
         us(worker.profile.generate_s),

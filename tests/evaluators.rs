@@ -73,12 +73,6 @@ fn general(channels: usize) -> Builder {
         .sky(0.3)
 }
 
-/// Relative rounding of a mean of `samples` paths of up to `records` records: each record takes a few operations and a value from a
-/// table, each step of the mean three, and one evaluator may fuse a product and a sum that another does not.
-fn rounding(records: u32, samples: u32) -> f64 {
-    (6.0 * f64::from(records) + 3.0 * f64::from(samples) + 8.0) * f64::from(f32::EPSILON) / 2.0
-}
-
 #[test]
 fn the_same_paths_give_the_same_means() {
     let independent = |mut scene: Scene| {
@@ -98,7 +92,7 @@ fn the_same_paths_give_the_same_means() {
         let settings = Settings { seed: 3, ..Settings::default() };
         let expected = render(&with(&scene, Evaluator::DpeptPixel), 2, samples, settings);
         expected.assert_clean();
-        let bound = rounding(Prepared::new(&scene, 0).expect("a scene").max_records(), samples);
+        let bound = device::rounding(Prepared::new(&scene, 0).expect("a scene").max_records(), samples);
         for evaluator in OTHERS {
             // Waves of a few pixels and samples, and large ones; kernels of general scenes take long to compile.
             let is_plain = what.starts_with("plain");
@@ -155,10 +149,7 @@ fn no_evaluator_is_biased() {
     };
     let expected = of(Evaluator::DpeptPixel, 100);
     for (seed, evaluator) in (1..).zip(OTHERS) {
-        for (k, (a, b)) in expected.iter().zip(of(evaluator, seed)).enumerate() {
-            let z = (a.mean - b.mean) / a.error.hypot(b.error);
-            assert!(z.abs() < 4.5, "{}, channel {k}: {a:?} {b:?}, z = {z:.2}", evaluator.name());
-        }
+        statistics::assert_same_means(evaluator.name(), &expected, &of(evaluator, seed), 4.5);
     }
 }
 

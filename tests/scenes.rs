@@ -256,7 +256,7 @@ fn every_evaluator_renders_every_scene_alike() {
         let overrides = overrides.map(|(key, value)| (key.to_owned(), value.to_string()));
         let mut scene = scene::load(&file, &overrides).expect("a scene");
         let records = Prepared::new(&scene, 0).expect("a scene that fits").max_records();
-        let bound = (6.0 * f64::from(records) + 200.0) * f64::from(f32::EPSILON) / 2.0;
+        let bound = device::rounding(records, 64);
         let mut rendered = |evaluator, seed| {
             scene.integrator.evaluator = evaluator;
             let rendered = render(&scene, 8, 64, Settings { seed, ..Settings::default() });
@@ -271,11 +271,9 @@ fn every_evaluator_renders_every_scene_alike() {
                 assert!((a - b).abs() <= bound * a.abs(), "{name}, {}: {a} and {b}", evaluator.name());
             }
             let other = rendered(evaluator, seed);
-            for (k, (a, b)) in expected.image_means().iter().zip(other.image_means()).enumerate() {
-                let z = (a.mean - b.mean) / a.error.hypot(b.error);
-                // Of 8 epochs each: Student's distribution of about 14 degrees of freedom, 24 channels, 15 pairs.
-                assert!(z.abs() < 7.5, "{name}, {}, channel {k}: {a:?} {b:?}, z = {z:.2}", evaluator.name());
-            }
+            let what = format!("{name}, {}", evaluator.name());
+            // Of 8 epochs each: Student's distribution of about 14 degrees of freedom, 24 channels, 15 pairs.
+            statistics::assert_same_means(&what, &expected.image_means(), &other.image_means(), 7.5);
         }
         println!("{name}: all evaluators agree");
     }

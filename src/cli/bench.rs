@@ -182,25 +182,24 @@ fn measure_step(
         Part::LeftOut => [false, true].map(|everything| with(Evaluator::DpeptPixel, everything)).into(),
         _ => args.evaluators.iter().map(|&evaluator| with(evaluator, false)).collect(),
     };
-    let (mut trials, mut rows) = (Vec::new(), Vec::new());
+    let (mut trials, mut measured) = (Vec::new(), Vec::new());
     for (evaluator, everything, scene) in ways {
         check_interrupt(interrupt)?;
-        let trial = match Trial::new(&scene, gpu, step.pool, interrupt) {
-            Ok(trial) => trial,
+        match Trial::new(&scene, gpu, step.pool, interrupt) {
+            Ok(trial) => {
+                trials.push(trial);
+                measured.push((evaluator, everything));
+            }
             // What does not fit is a result too.
             Err(error @ (Error::Usage(_) | Error::DeviceMemory(_))) => {
                 report.missing.push(format!("{name}, {}, {} channels: {error}", evaluator.name(), step.channels));
-                continue;
             }
             Err(error) => return Err(error),
-        };
-        let plan = trial.plan();
-        rows.push((evaluator, everything, *plan, trial.planned_bytes(), trial.allocated_bytes));
-        trials.push(trial);
+        }
     }
-    for ((evaluator, everything, plan, planned_bytes, allocated_bytes), rates) in
-        rows.into_iter().zip(measure(&mut trials, args.rounds)?)
-    {
+    let rates = measure(&mut trials, args.rounds)?;
+    for ((trial, (evaluator, everything)), rates) in trials.iter().zip(measured).zip(rates) {
+        let plan = trial.plan();
         report.rows.push(Row {
             part: step.part,
             scene: name.to_owned(),
@@ -211,17 +210,14 @@ fn measure_step(
             rates,
             path_bytes: plan.path_bytes(),
             channel_bytes: u64::from(plan.spectral_state_size) / u64::from(step.channels.next_multiple_of(4)),
-            planned_bytes,
-            allocated_bytes,
+            planned_bytes: trial.planned_bytes(),
+            allocated_bytes: trial.allocated_bytes,
         });
     }
     Ok(())
 }
 
 fn parse_evaluator(text: &str) -> std::result::Result<Evaluator, String> {
-    let all = &Evaluator::ALL[1..];
-    let found = all.iter().find(|evaluator| evaluator.name() == text.trim());
-    found.copied().ok_or_else(|| {
-        format!("an evaluator is one of {}", all.iter().map(|e| e.name()).collect::<Vec<_>>().join(", "))
-    })
+    let all = || Evaluator::ALL[1..].iter().map(|evaluator| evaluator.name()).collect::<Vec<_>>().join(", ");
+    Evaluator::named(text.trim()).ok_or_else(|| format!("an evaluator is one of {}", all()))
 }

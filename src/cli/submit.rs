@@ -153,11 +153,8 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     Prepared::new(&scene, args.seed)?;
     let stop = StopRule { samples: Some(args.spp), ..StopRule::default() };
     let samples = stop.samples_limit(scene.integrator.epoch, args.uncertainty)?.unwrap_or(args.spp);
-    let mut header = plan::header(&scene, plan::tile_size(&scene, args.scene.tile), args.seed);
-    if args.uncertainty {
-        header = header.with_uncertainty();
-    }
-    // Last, as `render` does it: attributes keep their order, and cubes are compared byte by byte.
+    let tile = plan::tile_size(&scene, args.scene.tile);
+    let mut header = plan::header(&scene, tile, args.seed, args.uncertainty);
     plan::record_evaluator(&mut header, plan::evaluator(&scene, None, args.gpus_per_task == 0)?);
     header.validate().map_err(Error::Usage)?;
     let existing = if args.resume { Existing::Resume } else { Existing::Refuse };

@@ -10,4 +10,5 @@ pub mod layout;
 pub mod pass;
 pub mod self_test;
 pub mod shader;
+pub mod timestamps;
 pub mod upload;

@@ -83,8 +83,7 @@ impl StopRule {
 impl Job {
     /// What the cube is, in tiles of this size.
     pub fn header(&self, tile: [u32; 2]) -> Header {
-        let header = plan::header(&self.scene, tile, self.seed);
-        if self.uncertainty { header.with_uncertainty() } else { header }
+        plan::header(&self.scene, tile, self.seed, self.uncertainty)
     }
 
     /// The tiles to render, of the cube that `header` describes.

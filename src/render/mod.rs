@@ -19,6 +19,7 @@ pub mod radiators;
 pub mod rng;
 pub mod schedule;
 pub mod sky;
+mod spectra;
 pub mod surfaces;
 pub mod textures;
 pub mod watch;

@@ -30,7 +30,7 @@ pub fn tile_size(scene: &Scene, asked: Option<u32>) -> [u32; 2] {
 }
 
 /// The header of the cube that rendering `scene` makes, but for [`record_evaluator`].
-pub fn header(scene: &Scene, tile: [u32; 2], seed: u64) -> Header {
+pub fn header(scene: &Scene, tile: [u32; 2], seed: u64, uncertainty: bool) -> Header {
     let integrator = serde_json::to_value(&scene.integrator).expect("plain values");
     let mut attributes = Map::new();
     attributes.insert("scene_digest".into(), json!(scene.digest));
@@ -42,14 +42,15 @@ pub fn header(scene: &Scene, tile: [u32; 2], seed: u64) -> Header {
             "integrator": integrator,
         }),
     );
-    Header {
+    let header = Header {
         size: scene.film.cube_size(),
         origin: [scene.film.crop[0], scene.film.crop[1]],
         tile,
         channels: scene.channels.clone(),
         epoch: scene.integrator.epoch,
         attributes,
-    }
+    };
+    if uncertainty { header.with_uncertainty() } else { header }
 }
 
 /// The evaluator for `scene` on a software device or a GPU; or the one with which the cube was begun that `there` describes, since
@@ -58,8 +59,7 @@ pub fn evaluator(scene: &Scene, there: Option<&Header>, software: bool) -> Resul
     let Some(recorded) = there.and_then(|header| header.attributes.get(EVALUATOR)) else {
         return Ok(scene.integrator.evaluator.on(software, scene.channels.len()));
     };
-    let known = Evaluator::ALL[1..].iter().copied().find(|evaluator| recorded == evaluator.name());
-    known.ok_or_else(|| {
+    recorded.as_str().and_then(Evaluator::named).ok_or_else(|| {
         Error::Usage(format!("the cube was begun with the evaluator {recorded}, which this version does not have"))
     })
 }

@@ -353,12 +353,12 @@ impl Taken {
 /// Does `each` of `work` on so many threads, until one fails.
 fn side_by_side<T: Send>(
     threads: usize,
-    work: impl ExactSizeIterator<Item = T> + Send,
+    mut work: impl ExactSizeIterator<Item = T> + Send,
     each: impl Fn(T) -> Result<()> + Sync,
 ) -> Result<()> {
     let threads = threads.min(work.len());
     if threads <= 1 {
-        return work.into_iter().try_for_each(each);
+        return work.try_for_each(each);
     }
     let work = Mutex::new(work);
     let next = || work.lock().unwrap_or_else(PoisonError::into_inner).next();

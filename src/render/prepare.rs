@@ -6,20 +6,17 @@ use crate::gpu::layout::{
     LAMP_SUN, Lamp, Material, NONE,
 };
 use crate::gpu::self_test::LOOP_LIMIT;
-use crate::render::emission::{Emitted, Share};
+use crate::render::emission::Emitted;
 use crate::render::heat;
 use crate::render::integration::Integration;
 use crate::render::lights::{LightPicks, STEPS, light_picks};
 use crate::render::media::Media;
 use crate::render::radiators::{self, Radiators};
 use crate::render::sky::SkyMap;
+use crate::render::spectra::{daylight, spectral_tables};
 use crate::render::surfaces::{Kind, Needed, Surfaces};
-use crate::scene::{
-    Attributes, Bsdf, Environment, Evaluator, Filter, Light, Projection, Reflectance, Sampler, Scene, Sides, Texels,
-    Wavelengths,
-};
-use crate::spectral::Curve;
-use crate::spectral::table::{Exactness, SpectralTables, Tabulated, Wanted};
+use crate::scene::{Attributes, Bsdf, Evaluator, Filter, Light, Projection, Reflectance, Sampler, Scene, Sides};
+use crate::spectral::table::SpectralTables;
 use crate::spectral::warp::Warp;
 use crate::{Error, Result};
 use glam::DVec3;
@@ -29,8 +26,6 @@ use std::f64::consts::PI;
 const MAX_REGISTER_SPECTRA: usize = 8;
 /// Evaluation walks the records of a path in one loop (DESIGN section 7).
 const MAX_RECORDS: u32 = LOOP_LIMIT;
-/// Spectrum ids have 16 bits in a record.
-const MAX_SPECTRA: usize = 1 << 16;
 /// Parts of the renderer that a scene needs; what is false is left out of shaders and buffers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Features {
@@ -375,17 +370,6 @@ impl Prepared {
     }
 }
 
-struct SpectrumIds {
-    /// Scene spectrum → position among the curves of the tables.
-    factors: std::collections::BTreeMap<usize, usize>,
-    sources: std::collections::BTreeMap<usize, usize>,
-    /// Of each that materials of general scenes need.
-    needed: Vec<usize>,
-    /// That of what a path's throughput begins with, where it is not 1.
-    path_weight: Option<usize>,
-    names: Vec<String>,
-}
-
 /// The scene's lights as the device has them, and their places among the emitters.
 fn lamps(scene: &Scene, accel: &Accel, picks: &LightPicks, source: impl Fn(usize) -> u32) -> (Vec<Lamp>, Vec<Emitter>) {
     let lamp = |(index, (&light, &pick)): (usize, (&usize, &f64))| {
@@ -411,117 +395,6 @@ fn lamps(scene: &Scene, accel: &Accel, picks: &LightPicks, source: impl Fn(usize
         (lamp, Emitter { primitive: index as u32, spectrum, pick: pick as f32, area: factor as f32 })
     };
     picks.lamps.iter().zip(&picks.emitters[accel.emitters.len()..]).enumerate().map(lamp).unzip()
-}
-
-/// The spectrum that multiplies all texels of a map of colours.
-fn daylight(environment: &Environment) -> Option<usize> {
-    match &environment.map()?.texels {
-        Texels::Rgb { daylight, .. } => Some(*daylight),
-        Texels::Spectral { .. } => None,
-    }
-}
-
-/// Tables of the constant 1, of what multiplies throughput, then of what emits; the weights of responses and wavelengths last.
-/// With them, where in the channels wavelengths are drawn, by what is `emitted`.
-fn spectral_tables<'a>(
-    scene: &Scene,
-    heat: &heat::Heat,
-    needed: &[Needed],
-    responses: Option<&[Curve]>,
-    emitted: impl FnOnce() -> Vec<Share<'a>>,
-) -> Result<(SpectralTables, SpectrumIds, Warp)> {
-    // General scenes have all of theirs among those needed.
-    let plain = if needed.is_empty() { &scene.materials[..] } else { &[] };
-    let factors = plain.iter().filter_map(|m| match m.bsdf {
-        Bsdf::Diffuse { reflectance: Reflectance::Spectrum(reflectance) } => Some(reflectance),
-        _ => None,
-    });
-    let kinds = scene.objects.iter().zip(&heat.kinds);
-    let sources = kinds.filter(|(_, kind)| !matches!(kind, heat::Kind::ByPlace(_)));
-    let sources = sources.filter_map(|(object, _)| object.emission.as_ref().map(|e| e.radiance));
-    let sources = sources.chain(scene.environment.as_ref().and_then(|e| e.uniform().or(daylight(e))));
-    let sources = sources.chain(scene.lights.iter().map(|light| light.spectrum()));
-    let sources = sources.chain(heat.by_angle.iter().flatten().flatten().copied());
-    let mut curves = vec![&Curve::Constant(1.0)];
-    let mut names = vec!["1".to_owned()];
-    let mut number = |list: std::collections::BTreeSet<usize>| -> std::collections::BTreeMap<usize, usize> {
-        list.into_iter()
-            .map(|s| {
-                curves.push(&scene.spectra[s].curve);
-                names.push(scene.spectra[s].name.clone());
-                (s, curves.len() - 1)
-            })
-            .collect()
-    };
-    let (factors, sources) = (number(factors.collect()), number(sources.collect()));
-    let first = curves.len();
-    let mut wanted: Vec<Wanted> = curves.into_iter().map(|curve| Tabulated::Same(curve).into()).collect();
-    for spectrum in needed {
-        let (name, curve, exactness) = match spectrum {
-            Needed::Scene(id) => (&scene.spectra[*id].name, &scene.spectra[*id].curve, Exactness::Peak),
-            Needed::Derived(name, curve) => (name, curve, Exactness::Peak),
-            Needed::Pointwise(name, curve) => (name, curve, Exactness::Pointwise),
-            Needed::Exact(name, curve) => (name, curve, Exactness::Exact),
-        };
-        wanted.push(Wanted { exactness, ..Tabulated::Same(curve).into() });
-        names.push(name.clone());
-    }
-    let needed = (first..wanted.len()).collect();
-    // Weights come last.
-    let spectrum = responses.map_or(Tabulated::Same(&Curve::Constant(1.0)), Tabulated::PerChannel);
-    let weights = Wanted { weighted: true, ..spectrum.into() };
-    let make = |warp: &Warp| {
-        let is_weighted = responses.is_some() || warp.bits() > 0;
-        let wanted: Vec<Wanted> = wanted.iter().copied().chain(is_weighted.then_some(weights)).collect();
-        SpectralTables::warped(&wanted, &scene.channels, warp)
-    };
-    let mut warp = Warp::uniform(&scene.channels);
-    let mut tables = None;
-    if scene.integrator.wavelengths == Wavelengths::Emission {
-        let emitted = emitted();
-        let emitted: Vec<(&Curve, f64)> = emitted.iter().map(|(curve, factor)| (&**curve, *factor)).collect();
-        let curves = wanted.iter().filter_map(|wanted| match wanted.spectrum {
-            Tabulated::Same(curve) => Some(curve),
-            Tabulated::PerChannel(_) => None,
-        });
-        let most_bits = SpectralTables::most_bits(wanted.len() + 1, &scene.channels);
-        let drawn = Warp::of_emission(&scene.channels, &emitted, responses, &curves.collect::<Vec<_>>(), most_bits);
-        // Not where a path would cost more than its share of noise that goes.
-        if drawn.bits() > 0 {
-            let [even_tables, drawn_tables] = [&warp, &drawn].map(make);
-            let dearer = WEIGHT_COST * lookup_cost(&drawn_tables) / lookup_cost(&even_tables);
-            if drawn.gain(&scene.channels, &emitted, responses) > dearer {
-                (warp, tables) = (drawn, Some(drawn_tables));
-            } else {
-                tables = Some(even_tables);
-            }
-        }
-    }
-    let tables = tables.unwrap_or_else(|| make(&warp));
-    let path_weight = (responses.is_some() || warp.bits() > 0).then_some(wanted.len());
-    if path_weight.is_some() {
-        names.push("weights of wavelengths".to_owned());
-    }
-    if names.len() > MAX_SPECTRA {
-        return Err(Error::input(
-            &scene.file,
-            format!("{} spectra in use, at most {MAX_SPECTRA} are supported", names.len()),
-        ));
-    }
-    Ok((tables, SpectrumIds { factors, sources, needed, path_weight, names }, warp))
-}
-
-/// What drawn wavelengths cost a path by themselves: one more spectrum to look up, the weights.
-const WEIGHT_COST: f64 = 1.15;
-
-/// Time of a path with such tables, generation included, relative to one with a single stratum. Measured on lavapipe in the Cornell box
-/// of 8 to 400 channels under a mercury lamp; a search among knots is what costs most.
-fn lookup_cost(tables: &SpectralTables) -> f64 {
-    match (tables.has_knots(), tables.stratum_bits) {
-        (true, _) => 2.6,
-        (false, 0) => 1.0,
-        (false, _) => 1.3,
-    }
 }
 
 fn material(scene: &Scene, m: &crate::scene::Material, factor: impl Fn(usize) -> u32) -> Material {

@@ -122,7 +122,7 @@ impl WavePlan {
             Some(memory) => memory - buffer::WGPU_BYTES - plan.scene_bytes - plan.wave_bytes(),
         };
         let wanted = budget.paths.map_or_else(|| wanted_paths(limits.software, channels, records), u64::from);
-        let more_paths = (wanted.min(most)).saturating_sub(u64::from(plan.paths)).min(left / plan.path_bytes());
+        let more_paths = wanted.min(most).saturating_sub(u64::from(plan.paths)).min(left / plan.path_bytes());
         // In fours, so that every buffer grows by exactly what its paths take, alignment included.
         let more_paths = more_paths - more_paths % 4;
         plan.paths += more_paths as u32;

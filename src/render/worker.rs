@@ -12,12 +12,17 @@ use crate::gpu::fault::Phase;
 use crate::gpu::layout::{Counters, Proof, Wave};
 use crate::gpu::pass::Pass;
 use crate::gpu::shader;
+use crate::gpu::timestamps::Timestamps;
 use crate::gpu::upload::{self, SceneBuffers};
 use crate::render::compose::EvaluateShape;
 use crate::render::patience::Patience;
 use crate::render::prepare::Prepared;
 use crate::render::wave::{Budget, DeviceLimits, WavePlan};
 use crate::{Error, Result};
+
+mod path_buffers;
+
+use path_buffers::PathBuffers;
 
 /// A rectangle x0, y0, x1, y1 of the full film: one tile in one epoch.
 pub type UnitRect = [u32; 4];
@@ -52,6 +57,13 @@ pub fn check_interrupt(interrupt: &Interrupt) -> Result<()> {
 pub struct Profile {
     pub generate_s: f64,
     pub evaluate_s: f64,
+}
+
+impl Profile {
+    /// Adds the time of a pass of a wave; they generate and evaluate by turns.
+    fn add(&mut self, pass: usize, seconds: f64) {
+        *if pass.is_multiple_of(2) { &mut self.generate_s } else { &mut self.evaluate_s } += seconds;
+    }
 }
 
 /// A device with everything a scene needs on it.
@@ -98,23 +110,6 @@ struct InFlight {
 struct Stage {
     pass: Pass,
     groups: Vec<wgpu::BindGroup>,
-}
-
-/// What lies between the passes of a wave.
-struct PathBuffers {
-    wave: wgpu::Buffer,
-    units: wgpu::Buffer,
-    steps: wgpu::Buffer,
-    step_stride: u32,
-    states: wgpu::Buffer,
-    spectral_states: Option<wgpu::Buffer>,
-    heads: wgpu::Buffer,
-    records: wgpu::Buffer,
-    throughputs: Option<wgpu::Buffer>,
-    queue: wgpu::Buffer,
-    queue_lengths: wgpu::Buffer,
-    counters: wgpu::Buffer,
-    means: wgpu::Buffer,
 }
 
 /// A staging buffer and the units whose means it will hold.
@@ -424,15 +419,14 @@ impl Worker {
         let submission = self.gpu.queue.submit([encoder.finish()]);
         self.waves.push_back(InFlight { number: self.submitted, paths, submission });
         if let Some(timestamps) = &self.timestamps {
-            let [generate, evaluate] = timestamps.read(&self.gpu, self.limit())?;
-            self.profile.generate_s += generate;
-            self.profile.evaluate_s += evaluate;
+            let passes = timestamps.read(&self.gpu, self.limit())?;
+            passes.into_iter().enumerate().for_each(|(pass, seconds)| self.profile.add(pass, seconds));
         }
         Ok(())
     }
 
-    /// Where passes are clocked, does what `encoder` has and adds the time to that of generate (0) or evaluate (1).
-    fn lap(&mut self, encoder: &mut wgpu::CommandEncoder, stage: usize) -> Result<()> {
+    /// Where passes are clocked, does what `encoder` has, the pass of that number, and adds its time.
+    fn lap(&mut self, encoder: &mut wgpu::CommandEncoder, pass: usize) -> Result<()> {
         if !self.clocked {
             return Ok(());
         }
@@ -440,9 +434,7 @@ impl Worker {
         let began = Instant::now();
         let submission = self.gpu.queue.submit([done.finish()]);
         buffer::wait(&self.gpu, submission, self.limit())?;
-        let seconds = began.elapsed().as_secs_f64();
-        let Profile { generate_s, evaluate_s } = &mut self.profile;
-        *[generate_s, evaluate_s][stage] += seconds;
+        self.profile.add(pass, began.elapsed().as_secs_f64());
         Ok(())
     }
 
@@ -459,11 +451,7 @@ impl Worker {
     ) -> wgpu::ComputePass<'e> {
         encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some(label),
-            timestamp_writes: self.timestamps.as_ref().map(|t| wgpu::ComputePassTimestampWrites {
-                query_set: &t.queries,
-                beginning_of_pass_write_index: Some(2 * index),
-                end_of_pass_write_index: Some(2 * index + 1),
-            }),
+            timestamp_writes: self.timestamps.as_ref().map(|timestamps| timestamps.writes(index)),
         })
     }
 }
@@ -497,92 +485,6 @@ impl Stage {
         pass.set_bind_group(0, &self.groups[0], &[]);
         pass.set_bind_group(1, &self.groups[1], offsets);
         pass.dispatch_workgroups(x, y, z);
-    }
-}
-
-impl PathBuffers {
-    fn new(gpu: &Gpu, plan: &WavePlan) -> PathBuffers {
-        use wgpu::BufferUsages as U;
-        let storage = U::STORAGE | U::COPY_SRC | U::COPY_DST;
-        let step_stride = plan.step_stride();
-        let mut step_bytes = vec![0u8; plan.step_bytes() as usize];
-        for (step, bytes) in plan.steps().iter().zip(step_bytes.chunks_mut(step_stride as usize)) {
-            bytes[..size_of_val(step)].copy_from_slice(bytemuck::bytes_of(step));
-        }
-        let steps = buffer::empty(gpu, "steps", plan.step_bytes(), U::UNIFORM | U::COPY_DST);
-        gpu.queue.write_buffer(&steps, 0, &step_bytes);
-        PathBuffers {
-            wave: buffer::empty(gpu, "wave", size_of::<Wave>() as u64, U::UNIFORM | U::COPY_DST),
-            units: buffer::empty(gpu, "units", plan.unit_list_bytes(), storage),
-            steps,
-            step_stride,
-            states: buffer::empty(gpu, "states", plan.state_bytes(), storage),
-            spectral_states: (plan.spectral_state_size > 0)
-                .then(|| buffer::empty(gpu, "spectral_states", plan.spectral_state_bytes(), storage)),
-            heads: buffer::empty(gpu, "heads", plan.head_bytes(), storage),
-            records: buffer::empty(gpu, "records", plan.record_bytes(), storage),
-            throughputs: plan.roulette.then(|| buffer::empty(gpu, "throughputs", plan.throughput_bytes(), storage)),
-            queue: buffer::empty(gpu, "queue", plan.queue_bytes(), storage),
-            queue_lengths: buffer::empty(gpu, "queue_lengths", plan.queue_length_bytes(), storage),
-            counters: buffer::empty(gpu, "counters", size_of::<Counters>() as u64, storage),
-            means: buffer::empty(gpu, "means", plan.mean_bytes(), storage),
-        }
-    }
-
-    fn find(&self, name: &str) -> Option<wgpu::BufferBinding<'_>> {
-        let buffer = match name {
-            "wave" => &self.wave,
-            "units" => &self.units,
-            "step" => {
-                let size = wgpu::BufferSize::new(16);
-                return Some(wgpu::BufferBinding { buffer: &self.steps, offset: 0, size });
-            }
-            "states" => &self.states,
-            "spectral_states" => self.spectral_states.as_ref()?,
-            "heads" => &self.heads,
-            "records" => &self.records,
-            "throughputs" => self.throughputs.as_ref()?,
-            "queue" => &self.queue,
-            "queue_lengths" => &self.queue_lengths,
-            "counters" => &self.counters,
-            "means" => &self.means,
-            _ => return None,
-        };
-        Some(buffer.as_entire_buffer_binding())
-    }
-}
-
-/// Begin and end of the passes of a wave, which generate and evaluate by turns.
-struct Timestamps {
-    passes: u32,
-    queries: wgpu::QuerySet,
-    resolved: wgpu::Buffer,
-}
-
-impl Timestamps {
-    fn new(gpu: &Gpu, passes: u32) -> Timestamps {
-        let queries = gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
-            label: Some("timestamps"),
-            ty: wgpu::QueryType::Timestamp,
-            count: 2 * passes,
-        });
-        let usage = wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC;
-        Timestamps { passes, queries, resolved: buffer::empty(gpu, "timestamps", 16 * u64::from(passes), usage) }
-    }
-
-    fn resolve(&self, encoder: &mut wgpu::CommandEncoder) {
-        encoder.resolve_query_set(&self.queries, 0..2 * self.passes, &self.resolved, 0);
-    }
-
-    /// Seconds of generate and evaluate, when they are done.
-    fn read(&self, gpu: &Gpu, limit: Duration) -> Result<[f64; 2]> {
-        let ticks: Vec<[u64; 2]> = buffer::read(gpu, &self.resolved, 16 * u64::from(self.passes), limit)?;
-        let period = f64::from(gpu.queue.get_timestamp_period()) * 1e-9;
-        let mut seconds = [0.0; 2];
-        for (pass, [begin, end]) in ticks.into_iter().enumerate() {
-            seconds[pass % 2] += end.saturating_sub(begin) as f64 * period;
-        }
-        Ok(seconds)
     }
 }
 

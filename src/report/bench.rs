@@ -184,14 +184,12 @@ impl Report {
             let each = points.iter().map(|(channels, speedup)| format!("K = {channels}: {speedup:.2}"));
             let _ = writeln!(text, "{} over pt: {}", evaluator.name(), each.collect::<Vec<_>>().join(", "));
         }
-        for row in self.rows.iter().filter(|row| row.everything) {
-            if let Some(gain) = self.gain(row) {
-                let _ = writeln!(
-                    text,
-                    "{}: its own kernels make {gain:.2} times the paths of one set for all scenes",
-                    row.scene
-                );
-            }
+        for (own, _, times) in self.pairs() {
+            let _ = writeln!(
+                text,
+                "{}: its own kernels make {times:.2} times the paths of one set for all scenes",
+                own.scene
+            );
         }
         for what in &self.missing {
             let _ = writeln!(text, "not measured: {what}");
@@ -199,10 +197,13 @@ impl Report {
         text
     }
 
-    /// How many times faster a scene's own kernels are than those of `row`, which have everything.
-    fn gain(&self, row: &Row) -> Option<f64> {
-        let own = self.rows.iter().find(|own| own.is(Part::LeftOut, &row.scene, row.evaluator) && !own.everything)?;
-        Some(own.rates.median() / row.rates.median())
+    /// Each scene with its own kernels and with those that have everything, and how many times faster its own are.
+    fn pairs(&self) -> impl Iterator<Item = (&Row, &Row, f64)> {
+        self.rows.iter().filter(|row| row.everything).filter_map(|all| {
+            let own =
+                self.rows.iter().find(|own| own.is(Part::LeftOut, &all.scene, all.evaluator) && !own.everything)?;
+            Some((own, all, own.rates.median() / all.rates.median()))
+        })
     }
 
     /// Lines of `y` over `x` for each evaluator, of the rows of one part and scene.
@@ -406,25 +407,18 @@ impl Report {
     }
 
     fn left_out(&self, page: &mut Page) {
-        let rows: Vec<Vec<String>> = self
-            .rows
-            .iter()
-            .filter(|row| row.part == Part::LeftOut && row.everything)
-            .filter_map(|all| {
-                let own =
-                    self.rows.iter().find(|own| own.is(Part::LeftOut, &all.scene, all.evaluator) && !own.everything)?;
-                let times = self.gain(all)?;
-                Some(vec![
-                    all.scene.clone(),
-                    all.channels.to_string(),
-                    rate(&own.rates),
-                    rate(&all.rates),
-                    format!("{times:.2}"),
-                    format!("{} / {}", own.path_bytes, all.path_bytes),
-                    format!("{} / {}", format_bytes(own.planned_bytes), format_bytes(all.planned_bytes)),
-                ])
-            })
-            .collect();
+        let row = |(own, all, times): (&Row, &Row, f64)| {
+            vec![
+                all.scene.clone(),
+                all.channels.to_string(),
+                rate(&own.rates),
+                rate(&all.rates),
+                format!("{times:.2}"),
+                format!("{} / {}", own.path_bytes, all.path_bytes),
+                format!("{} / {}", format_bytes(own.planned_bytes), format_bytes(all.planned_bytes)),
+            ]
+        };
+        let rows: Vec<Vec<String>> = self.pairs().map(row).collect();
         if rows.is_empty() {
             return;
         }

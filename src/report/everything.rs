@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 
+use crate::accel;
 use crate::scene::{
     Absorber, Attributes, Bsdf, Emission, Environment, EnvironmentMap, Field, Grid, Interior, Light, Material, Medium,
     Mesh, Object, Reflectance, Scene, Shape, Sides, Spectrum, Temperature, Texels, Texture, TextureKind, Weight,
@@ -20,15 +21,10 @@ const SIZE: f64 = 1e-3;
 /// `scene`, and a black box behind its camera with one of each kind of material, texture, light, medium and heat that it has not.
 /// The picture is the same but for what the box hides from light; camera, film, sampler and roulette are as they were.
 pub fn with_everything(scene: &Scene) -> Scene {
-    let (low, high) = scene
-        .objects
-        .iter()
-        .map(|object| object.shape.bounds())
-        .filter(|[low, high]| low.cmple(*high).all())
-        .fold((scene.camera.position, scene.camera.position), |(a, b), [low, high]| (a.min(low), b.max(high)));
-    let size = SIZE * (high - low).length();
-    let mut all =
-        Everything { scene: scene.clone(), at: scene.camera.position - 2.0 * size * scene.camera.forward, size };
+    let camera = scene.camera.position;
+    let [low, high] = accel::bounds(scene.objects.iter().map(|object| &object.shape)).unwrap_or([camera; 2]);
+    let size = SIZE * (high.max(camera) - low.min(camera)).length();
+    let mut all = Everything { scene: scene.clone(), at: camera - 2.0 * size * scene.camera.forward, size };
     all.add();
     all.scene
 }

@@ -82,10 +82,15 @@ impl Trial {
     /// Renders an epoch of the first `count` tiles, around again after the last. Seconds.
     fn turn(&mut self, count: usize) -> Result<f64> {
         let tiles: Vec<UnitRect> = self.tiles.iter().copied().cycle().take(count).collect();
+        self.render(&tiles, SAMPLES)
+    }
+
+    /// Renders the next epoch of `tiles`. Seconds.
+    fn render(&mut self, tiles: &[UnitRect], samples: u32) -> Result<f64> {
         let began = Instant::now();
         self.epoch += 1;
-        for units in tiles.chunks(self.worker.plan.units_at_once(SAMPLES)) {
-            self.worker.submit(units, self.epoch, SAMPLES, &mut |_| Ok(()))?;
+        for units in tiles.chunks(self.worker.plan.units_at_once(samples)) {
+            self.worker.submit(units, self.epoch, samples, &mut |_| Ok(()))?;
         }
         self.worker.collect(&mut |_| Ok(()))?;
         Ok(began.elapsed().as_secs_f64())
@@ -95,16 +100,7 @@ impl Trial {
 /// Seconds that each of `rounds` frames takes, a sample of every pixel.
 pub fn frames(trial: &mut Trial, rounds: u32) -> Result<Vec<f64>> {
     let tiles = trial.tiles.clone();
-    let frame = |_| {
-        let began = Instant::now();
-        trial.epoch += 1;
-        for units in tiles.chunks(trial.worker.plan.units_at_once(1)) {
-            trial.worker.submit(units, trial.epoch, 1, &mut |_| Ok(()))?;
-        }
-        trial.worker.collect(&mut |_| Ok(()))?;
-        Ok(began.elapsed().as_secs_f64())
-    };
-    (0..rounds).map(frame).collect()
+    (0..rounds).map(|_| trial.render(&tiles, 1)).collect()
 }
 
 /// Measures all `trials` by turns, so that what else the machine does concerns all alike, then the passes of each once more.

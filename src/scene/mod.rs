@@ -183,6 +183,11 @@ impl Evaluator {
         matches!(self, Evaluator::DpeptPath | Evaluator::DpeptSpectral)
     }
 
+    /// The one of this name, but for `auto`, which is none.
+    pub fn named(name: &str) -> Option<Evaluator> {
+        Evaluator::ALL[1..].iter().copied().find(|evaluator| evaluator.name() == name)
+    }
+
     /// As scenes write it.
     pub fn name(self) -> &'static str {
         match self {

@@ -53,6 +53,12 @@ pub struct Epochs {
     pub rays: u64,
 }
 
+/// Relative rounding of a mean of `samples` paths of up to `records` records: each record takes a few operations and a value from a
+/// table, each step of the mean three, and one evaluator may fuse a product and a sum that another does not.
+pub fn rounding(records: u32, samples: u32) -> f64 {
+    (6.0 * f64::from(records) + 3.0 * f64::from(samples) + 8.0) * f64::from(f32::EPSILON) / 2.0
+}
+
 /// One device at a time: two cores gain nothing from more.
 fn turn() -> MutexGuard<'static, ()> {
     static TURN: Mutex<()> = Mutex::new(());

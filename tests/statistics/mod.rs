@@ -56,6 +56,16 @@ impl Estimate {
     }
 }
 
+/// Fails where two sets of means differ by so many standard errors of their difference.
+pub fn assert_same_means(what: &str, a: &[Estimate], b: &[Estimate], sigmas: f64) {
+    assert_eq!(a.len(), b.len());
+    for (k, (a, b)) in a.iter().zip(b).enumerate() {
+        let difference = a.minus(b);
+        let z = difference.mean / difference.error;
+        assert!(z.abs() < sigmas, "{what}, channel {k}: {a:?} {b:?}, z = {z:.2}");
+    }
+}
+
 /// Means over the pixels of an image, per channel, from values and their standard errors, [pixel][channel].
 pub fn image_estimates(mean: &[f64], error: &[f64], channels: usize, freedom: f64) -> Vec<Estimate> {
     let pixels = (mean.len() / channels) as f64;
