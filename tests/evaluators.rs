@@ -42,9 +42,10 @@ fn floor(channels: usize) -> Builder {
         )
 }
 
-/// Diffuse surfaces, several lamps (one with lines), a sky, roulette.
+/// Diffuse surfaces, several lamps (one with more lines close together than kinks can follow), a sky, roulette.
 fn plain(channels: usize) -> Builder {
-    let lines = table(&[400.0, 549.0, 549.1, 549.2, 700.0], &[0.1, 0.1, 9.0, 0.1, 0.1]);
+    let lines =
+        table(&[400.0, 549.0, 549.1, 549.2, 549.3, 549.4, 549.5, 700.0], &[0.1, 0.1, 9.0, 0.1, 5.0, 3.0, 0.1, 0.1]);
     floor(channels)
         .roulette(2)
         .diffuse(sphere(DVec3::new(0.7, -0.6, 0.3), 0.3), table(&[400.0, 530.0, 700.0], &[0.9, 0.1, 0.3]))
@@ -92,7 +93,9 @@ fn the_same_paths_give_the_same_means() {
         let settings = Settings { seed: 3, ..Settings::default() };
         let expected = render(&with(&scene, Evaluator::DpeptPixel), 2, samples, settings);
         expected.assert_clean();
-        let bound = device::rounding(Prepared::new(&scene, 0).expect("a scene").max_records(), samples);
+        let prepared = Prepared::new(&scene, 0).expect("a scene");
+        assert_eq!(prepared.tables.kinks, 0, "{what}: the others have strata instead");
+        let bound = device::rounding(prepared.max_records(), samples);
         for evaluator in OTHERS {
             // Waves of a few pixels and samples, and large ones; kernels of general scenes take long to compile.
             let is_plain = what.starts_with("plain");
@@ -115,6 +118,42 @@ fn the_same_paths_give_the_same_means() {
     }
     println!("largest difference over its bound: {far:.1e}");
     assert!(far > 0.0, "all bits are the same: was another evaluator run at all?");
+}
+
+/// Where evaluation per pixel holds spectra with kinks, the others read strata: as far apart as tables may be from spectra.
+#[test]
+fn kinks_are_the_same_spectra_as_strata() {
+    let mut far = 0.0f64;
+    for channels in [8, 23, 50] {
+        let scene = floor(channels)
+            .diffuse(
+                sphere(DVec3::new(0.7, -0.6, 0.3), 0.3),
+                table(&[400.0, 511.0, 523.0, 700.0], &[0.9, 0.3, 0.4, 0.3]),
+            )
+            .lamp(sphere(DVec3::new(0.5, 0.8, 0.0), 0.2), table(&[400.0, 466.0, 700.0], &[3.0, 7.0, 4.0]), Sides::Front)
+            .build();
+        let prepared = |evaluator| Prepared::for_evaluator(&scene, 0, evaluator).expect("a scene");
+        let (kinked, other) = (prepared(Evaluator::DpeptPixel), prepared(Evaluator::DpeptSpectral));
+        assert!((1..=2).contains(&kinked.tables.kinks) && !kinked.features.strata && other.features.strata);
+        let samples = 64;
+        let of = |evaluator| render(&with(&scene, evaluator), 1, samples, Settings::default());
+        let (a, b) = (of(Evaluator::DpeptPixel), of(Evaluator::DpeptSpectral));
+        a.assert_clean();
+        // Table errors are relative to a channel's peak, and no spectrum falls below 1/2.4 of it within one: two of each vertex.
+        let error = |p: &Prepared| p.tables.bounds.iter().map(|b| 2.4 * b.pointwise).fold(0.0, f64::max);
+        let records = kinked.max_records();
+        let tables = 2.0 * f64::from(records) * (error(&kinked) + error(&other));
+        let bound = device::rounding(records, samples) + tables;
+        assert!(bound < 0.01, "{bound}");
+        for (a, b) in a.means.iter().flatten().zip(b.means.iter().flatten()) {
+            let (a, b) = (f64::from(*a), f64::from(*b));
+            let error = (a - b).abs() / a.abs().max(1e-30);
+            assert!(error <= bound, "{channels} channels: {a} and {b}, bound {bound:e}");
+            far = far.max(error);
+        }
+    }
+    println!("largest difference: {far:.1e}");
+    assert!(far > 0.0, "all bits are the same: were the tables others at all?");
 }
 
 /// Each evaluator, bit for bit, whatever the waves.

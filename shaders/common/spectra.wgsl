@@ -1,6 +1,7 @@
 // Spectra at a path's wavelength sample, for a quad of channels.
 
-// [stratum][spectrum][quad of channels][value, slope]; spectrum 0 is the constant 1.
+// [stratum][spectrum][quad of channels][value, slope]; spectrum 0 is the constant 1. In registers, in one stratum, there may be kinks:
+// [spectrum][quad of channels][value, slope, places of kinks, changes of slope there].
 @group(1) @binding(8) var<storage, read> spectra: array<vec4<f32>>;
 
 // Where the path's wavelength sample stands: its stratum, and the place within.
@@ -25,7 +26,11 @@ fn spectral_sample(mu: u32) -> SpectralSample {
 }
 
 fn table_index(stratum: u32, spectrum: u32, quad: u32) -> u32 {
+#if KINKS
+    return (spectrum * QUADS + quad) * (2u + 2u * KINKS);
+#else
     return ((stratum * SPECTRA + spectrum) * QUADS + quad) * 2u;
+#endif
 }
 
 #if REGISTERS

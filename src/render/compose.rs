@@ -214,6 +214,9 @@ impl Prepared {
 
     /// How spectral tables are laid out.
     fn spectra_defines(&self, d: &mut Defines) {
+        if self.tables.kinks > 0 {
+            d.constant("KINKS", self.tables.kinks);
+        }
         d.constant("SPECTRA", self.tables.stratified as u32);
         d.constant("CHANNELS", self.channels as u32);
         d.constant("CHANNELS_PADDED", self.tables.channels_padded as u32);

@@ -117,7 +117,12 @@ pub fn feature_lines(prepared: &Prepared, waves: &WavePlan) -> Vec<FeatureLine> 
         line(
             "spectra in registers",
             f.registers,
-            format!("no table lookups per vertex; {} spectra here", prepared.factors + prepared.sources),
+            match (prepared.factors + prepared.sources, prepared.tables.kinks) {
+                (spectra, 0) => format!("no table lookups per vertex; {spectra} spectra here"),
+                (spectra, kinks) => {
+                    format!("no table lookups per vertex; {spectra} spectra, up to {kinks} kinks in a channel")
+                }
+            },
         ),
         line(
             "materials of several lobes",

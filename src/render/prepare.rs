@@ -13,7 +13,7 @@ use crate::render::lights::{LightPicks, STEPS, light_picks};
 use crate::render::media::Media;
 use crate::render::radiators::{self, Radiators};
 use crate::render::sky::SkyMap;
-use crate::render::spectra::{daylight, spectral_tables};
+use crate::render::spectra::{MAX_REGISTER_SPECTRA, daylight, spectral_tables};
 use crate::render::surfaces::{Kind, Needed, Surfaces};
 use crate::scene::{Attributes, Bsdf, Evaluator, Filter, Light, Projection, Reflectance, Sampler, Scene, Sides};
 use crate::spectral::table::SpectralTables;
@@ -22,8 +22,6 @@ use crate::{Error, Result};
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// Spectra that may be held in registers while a pixel is evaluated; with more, each is looked up where it is needed.
-const MAX_REGISTER_SPECTRA: usize = 8;
 /// Evaluation walks the records of a path in one loop (DESIGN section 7).
 const MAX_RECORDS: u32 = LOOP_LIMIT;
 /// Parts of the renderer that a scene needs; what is false is left out of shaders and buffers.
@@ -229,7 +227,9 @@ impl Prepared {
         let environment = uniform.as_ref().or(sky.as_ref().map(|sky| &sky.flux));
         let emitted = || Emitted::of(scene, &accel, &picks.lamps, environment).shares(scene, &accel);
         let needed = surfaces.as_ref().map_or(&[][..], |s| &s.spectra);
-        let (tables, ids, warp) = spectral_tables(scene, &heat, needed, weights, emitted)?;
+        // A pixel's paths share them; who takes a path at a time would fill them for each.
+        let in_registers = !general && integration.is_none() && evaluator == Evaluator::DpeptPixel;
+        let (tables, ids, warp) = spectral_tables(scene, &heat, needed, in_registers, weights, emitted)?;
         if let Some(surfaces) = &mut surfaces {
             surfaces.name_spectra(|position| tables.ids[ids.needed[position]]);
         }
@@ -296,8 +296,7 @@ impl Prepared {
             ..General::of(surfaces, scene)
         };
         features.general = surfaces.as_ref().map(of);
-        // A pixel's paths share them; who takes a path at a time would fill them for each.
-        features.registers &= !general && integration.is_none() && evaluator == Evaluator::DpeptPixel;
+        features.registers &= in_registers;
         let frame = frame(scene, seed, &accel, &picks, environment_spectrum, tables.stratum_bits);
         let max_records = max_records(vertices_at_once(evaluator, &frame), features, surfaces.as_ref(), media.as_ref());
         if max_records >= MAX_RECORDS {

@@ -1,5 +1,6 @@
 //! Spectra, channels, Planck's law and colour, in f64 nanometres.
 
+pub mod bent;
 pub mod channels;
 pub mod colour;
 pub mod curve;

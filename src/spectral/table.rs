@@ -1,6 +1,7 @@
 //! Spectra as the device wants them: for every channel a few strata of the wavelength coordinate μ, in each of them a
 //! value and a slope; and exact knots for what no affordable number of strata resolves.
 
+use super::bent::BentLine;
 use super::warp::Warp;
 use super::{Channels, Curve};
 
@@ -49,9 +50,9 @@ impl<'a> From<Tabulated<'a>> for Wanted<'a> {
 
 /// One spectrum over one stratum of one channel: `value + place * slope`, place in [0, 1).
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Line {
-    value: f64,
-    slope: f64,
+pub(super) struct Line {
+    pub value: f64,
+    pub slope: f64,
 }
 
 /// The tables of a scene. Spectrum ids number the curves given to [`SpectralTables::build`] in another order: see `ids`.
@@ -63,7 +64,9 @@ pub struct SpectralTables {
     pub stratified: usize,
     /// Channels rounded up to a multiple of four.
     pub channels_padded: usize,
-    /// [stratum][spectrum][quad][value x 4, slope x 4].
+    /// Kinks that each spectrum has in each channel, where there is one stratum; see [`BentLine`].
+    pub kinks: u32,
+    /// [stratum][spectrum][quad][value x 4, slope x 4, each kink's place x 4, each kink's bend x 4].
     pub strata: Vec<f32>,
     /// First knot of (knotted spectrum, padded channel), with one more entry at the end.
     pub knot_starts: Vec<u32>,
@@ -135,6 +138,7 @@ impl SpectralTables {
             stratum_bits,
             stratified: stratified.len(),
             channels_padded,
+            kinks: 0,
             strata: vec![0.0; (stratified.len() * channels_padded * 2) << stratum_bits],
             knot_starts: vec![0],
             knots: Vec::new(),
@@ -148,6 +152,47 @@ impl SpectralTables {
             tables.bounds[i] = tables.add_knots(&wanted[i], &place);
         }
         tables
+    }
+
+    /// The curves in one stratum, bent where they have nodes: `None` where one of them would need more than `most` kinks in a channel,
+    /// or strata.
+    pub fn bent(curves: &[&Curve], channels: &Channels, most: usize) -> Option<SpectralTables> {
+        let lines: Vec<Vec<(BentLine, f64)>> = curves
+            .iter()
+            .map(|curve| channels.bounds.iter().map(|&[a, b]| BentLine::of(curve, a, b, most)).collect())
+            .collect::<Option<_>>()?;
+        let kinks = lines.iter().flatten().map(|(line, _)| line.kinks.len()).max().unwrap_or(0);
+        let channels_padded = channels.len().next_multiple_of(4);
+        let rows = 2 + 2 * kinks;
+        let mut strata = vec![0.0; curves.len() * channels_padded * rows];
+        for (id, lines) in lines.iter().enumerate() {
+            for (k, (line, _)) in lines.iter().enumerate() {
+                let at = (id * channels_padded / 4 + k / 4) * rows * 4 + k % 4;
+                (strata[at], strata[at + 4]) = (line.value, line.slope);
+                for (i, (place, bend)) in line.kinks.iter().enumerate() {
+                    (strata[at + 4 * (2 + i)], strata[at + 4 * (2 + kinks + i)]) = (*place, *bend);
+                }
+            }
+        }
+        let bounds = lines.iter().zip(curves).map(|(lines, curve)| {
+            let each = lines.iter().zip(&channels.bounds).map(|((line, pointwise), &[a, b])| {
+                let exact = curve.mean(a, b);
+                let mean = if exact != 0.0 { (line.mean() / exact - 1.0).abs() } else { line.mean().abs() };
+                Bounds { pointwise: *pointwise, mean }
+            });
+            each.fold(Bounds::default(), Bounds::max)
+        });
+        Some(SpectralTables {
+            stratum_bits: 0,
+            stratified: curves.len(),
+            channels_padded,
+            kinks: kinks as u32,
+            strata,
+            knot_starts: vec![0],
+            knots: Vec::new(),
+            ids: (0..curves.len() as u32).collect(),
+            bounds: bounds.collect(),
+        })
     }
 
     fn fill_strata(&mut self, id: usize, wanted: &Wanted, place: &Place) -> Bounds {
@@ -282,7 +327,7 @@ impl Place<'_> {
 
 /// The line over [from, to] with the curve's mean and first moment (so that its product with a linear factor has the
 /// right mean as well), or the curve itself where it is linear; never negative.
-fn fit(curve: &Curve, from: f64, to: f64) -> Line {
+pub(super) fn fit(curve: &Curve, from: f64, to: f64) -> Line {
     if let Some(nodes) = curve.linear_pieces(from, to) {
         if let [(_, a), (_, b)] = nodes[..] {
             return Line { value: a, slope: b - a };
