@@ -1,7 +1,6 @@
 //! Lights without a surface, environment maps, many lights: closed forms in the f64 reference and on the device, and the device
 //! against the reference.
 
-mod aimer;
 mod device;
 mod scene_builder;
 mod statistics;
@@ -17,7 +16,6 @@ use spectile::render::rng::hash;
 use spectile::scene::{Environment, Filter, Projection, Scene, Sides, Texels, Wavelengths};
 use spectile::spectral::{Channels, Curve, Outside, upsample};
 use statistics::*;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// The mean is `expected` within 1e-7 in the reference (rays of a narrow camera differ by 1e-9, and nothing here is 100 times as
 /// steep), and in f32 within `allowance` on the device.
@@ -250,151 +248,6 @@ fn one_bright_texel() {
     let estimate = reference::render_image(&scene, 40_000, 6);
     let values = [Estimate { mean: estimate.mean[0], error: estimate.standard_error[0], freedom: 39_999.0 }];
     assert_estimates("one texel, reference", &values, &expected, Bound { resolution: 0.01, allowance: 1e-5 });
-}
-
-// ---- What the device chooses
-
-/// p-value of `counts` against expected ones, cells of fewer than 10 in one; with Sidak's limit for five tests at ALPHA.
-#[track_caller]
-fn assert_chi_square(what: &str, counts: &[f64], expected: &[f64]) {
-    let (mut chi2, mut cells, mut few) = (0.0, 0, [0.0; 2]);
-    for (count, want) in counts.iter().zip(expected) {
-        if *want < 10.0 {
-            few = [few[0] + count, few[1] + want];
-        } else {
-            chi2 += (count - want).powi(2) / want;
-            cells += 1;
-        }
-    }
-    if few[1] > 0.0 {
-        chi2 += (few[0] - few[1]).powi(2) / few[1];
-        cells += 1;
-    }
-    let p = ChiSquared::new(f64::from(cells - 1)).unwrap().sf(chi2);
-    let limit = -((-ALPHA).ln_1p() / 5.0).exp_m1();
-    assert!(p >= limit, "{what}: chi-square {chi2} in {cells} cells, p = {p:e}");
-}
-
-/// Pairs of random numbers of 24 bits.
-fn random(count: u32, seed: u32) -> Vec<[f32; 2]> {
-    let number = |i: u32| (hash(hash(seed) ^ i) >> 8) as f32 / 16_777_216.0;
-    (0..count).map(|i| [number(2 * i), number(2 * i + 1)]).collect()
-}
-
-/// Directions of maps against the density that the device gives for them, integrated over the cells between texel centres at 12 x
-/// 12 points; the density integrates to 1, is positive wherever radiance is, and is that which comes with a direction.
-#[test]
-fn directions_follow_the_map() {
-    const POINTS: usize = 12;
-    const COUNT: u32 = 60_000;
-    for (case, [width, height]) in [[6usize, 4usize], [8, 5], [16, 8], [1, 7], [9, 1]].into_iter().enumerate() {
-        let value = |t: usize| match case {
-            0 => 1.0,
-            1 => {
-                if t == 19 {
-                    1e4
-                } else {
-                    0.0
-                }
-            }
-            _ => (t * t % 17) as f32,
-        };
-        let values: Vec<f32> = (0..width * height).map(value).collect();
-        let mut scene =
-            grey_map(Builder::new().black(sphere(DVec3::ZERO, 1.0)), [width as u32, height as u32], &values).build();
-        let to_map = DMat3::from_axis_angle(DVec3::new(1.0, 2.0, -2.0) / 3.0, case as f64);
-        if let Some(Environment::Map(map)) = &mut scene.environment {
-            map.to_map = to_map;
-        }
-        let prepared = Prepared::new(&scene, 0).unwrap();
-
-        // Points in every cell: (u, v), and what they stand for in solid angle.
-        let rows: Vec<[f64; 2]> = (0..=height)
-            .map(|j| [j as f64 - 0.5, j as f64 + 0.5].map(|edge| (edge / height as f64).clamp(0.0, 1.0)))
-            .collect();
-        let mut points = Vec::new();
-        for [top, bottom] in &rows {
-            for column in 0..width {
-                for k in 0..POINTS * POINTS {
-                    let [x, y] = [k % POINTS, k / POINTS].map(|i| (i as f64 + 0.5) / POINTS as f64);
-                    let (u, v) = ((column as f64 + 0.5 + x) / width as f64, top + y * (bottom - top));
-                    let area = TAU / width as f64 * PI * (bottom - top) / (POINTS * POINTS) as f64;
-                    let (phi, theta) = (TAU * (u - 0.5), PI * v);
-                    let m = DVec3::new(theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos());
-                    points.push((to_map.transpose() * m, area * theta.sin()));
-                }
-            }
-        }
-        let directions: Vec<DVec3> = points.iter().map(|(direction, _)| *direction).collect();
-        let (chosen, densities) = aimer::aim(&prepared, &random(COUNT, case as u32), &directions);
-        let probabilities: Vec<f64> = (densities.chunks(POINTS * POINTS).zip(points.chunks(POINTS * POINTS)))
-            .map(|(densities, points)| densities.iter().zip(points).map(|(density, (_, area))| density * area).sum())
-            .collect();
-        // Midpoints of a density that is bilinear over 1 / sin, times sin: exact but for f32.
-        let total: f64 = probabilities.iter().sum();
-        assert!((total - 1.0).abs() < 1e-4, "case {case}: {total}");
-        for (direction, density) in directions.iter().zip(&densities) {
-            let lit = bilinear([width as u32, height as u32], &values, to_map * *direction) > 1e-3;
-            assert!(!lit || *density > 0.0, "case {case}: nothing is chosen towards {direction}");
-        }
-        let mut counts = vec![0.0; probabilities.len()];
-        for (direction, _) in &chosen {
-            let m = to_map * *direction;
-            let u = 0.5 + m.x.atan2(-m.z) / TAU;
-            let v = m.x.hypot(m.z).atan2(m.y) / PI;
-            let column = (u * width as f64 - 0.5).rem_euclid(width as f64) as usize % width;
-            let row = ((v * height as f64 + 0.5) as usize).min(height);
-            counts[row * width + column] += 1.0;
-        }
-        let expected: Vec<f64> = probabilities.iter().map(|p| p * f64::from(COUNT)).collect();
-        assert_chi_square(&format!("map {case}"), &counts, &expected);
-        // The same density where a direction is found again; f32 directions blur it beside the poles and edges.
-        let found = aimer::aim(&prepared, &[], &chosen.iter().map(|(direction, _)| *direction).collect::<Vec<_>>()).1;
-        let off = chosen.iter().zip(&found).filter(|((_, own), again)| (*again / own - 1.0).abs() > 1e-3).count();
-        assert!(off * 1000 < COUNT as usize, "case {case}: {off} densities of {COUNT} differ");
-    }
-}
-
-/// Directions of suns against a uniform density over their disks: rings of equal solid angle x sectors.
-#[test]
-fn directions_fill_the_disk_of_a_sun() {
-    const COUNT: u32 = 60_000;
-    for (case, (degrees, axis)) in [
-        (0.01f64, DVec3::Z),
-        (0.2665, DVec3::new(1.0, 2.0, 3.0)),
-        (5.0, DVec3::NEG_Y),
-        (45.0, DVec3::new(-1.0, 0.1, 0.0)),
-        (90.0, DVec3::new(0.3, -0.4, -0.5)),
-    ]
-    .into_iter()
-    .enumerate()
-    {
-        const RINGS: usize = 8;
-        const SECTORS: usize = 12;
-        let (radius, axis) = (degrees.to_radians(), axis.normalize());
-        let scene = Builder::new().black(sphere(DVec3::ZERO, 1.0)).sun(-axis, radius, 1.0).build();
-        let prepared = Prepared::new(&scene, 0).unwrap();
-        let (chosen, _) = aimer::aim(&prepared, &random(COUNT, 10 + case as u32), &[]);
-        // The device's axis is one of f32, up to 6e-8 off: as much as the finest disk's rings tell apart is 100 times that.
-        let axis = axis.as_vec3().as_dvec3();
-        let (s, t) = axis.normalize().any_orthonormal_pair();
-        let cap = 2.0 * (0.5 * radius).sin().powi(2);
-        let mut counts = vec![0.0; RINGS * SECTORS];
-        for (d, density) in &chosen {
-            assert!((density * TAU * cap - 1.0).abs() < 1e-5, "{degrees}: {density}");
-            let share = 0.5 * d.normalize().distance_squared(axis.normalize()) / cap;
-            let turn = 0.5 + d.dot(t).atan2(d.dot(s)) / TAU;
-            let ring = ((share * RINGS as f64) as usize).min(RINGS - 1);
-            counts[ring * SECTORS + ((turn * SECTORS as f64) as usize).min(SECTORS - 1)] += 1.0;
-        }
-        let each = f64::from(COUNT) / (RINGS * SECTORS) as f64;
-        assert_chi_square(&format!("sun of {degrees}°"), &counts, &[each; RINGS * SECTORS]);
-        // Met where it is aimed at: all but the rim, which f32 blurs.
-        let met = aimer::aim(&prepared, &[], &chosen.iter().map(|(d, _)| *d).collect::<Vec<_>>()).1;
-        assert!(met.iter().filter(|density| **density < 0.0).count() * 100 < COUNT as usize, "{degrees}");
-        let beyond = axis * (1.02 * radius).cos() + s * (1.02 * radius).sin();
-        assert!(degrees > 80.0 || aimer::aim(&prepared, &[], &[beyond]).1[0] < 0.0);
-    }
 }
 
 // ---- The device against the reference

@@ -122,7 +122,7 @@ fn reference(args: &Args, scene: &Scene, gpu: &Arc<Gpu>, interrupt: &Arc<Interru
     let least = 2 * scene.integrator.epoch;
     let time = args.budget * REFERENCE_BUDGETS;
     let limit = Limit { time, samples: args.spp.saturating_mul(REFERENCE_BUDGETS).max(least) };
-    let image = render(scene, args.seed + 1, gpu, limit, interrupt, |_, _| Ok(()))?;
+    let image = render(scene, args.seed + 1, None, gpu, limit, interrupt, |_, _| Ok(()))?;
     if image.samples < least {
         return Err(Error::Usage(format!(
             "the reference got {} samples per pixel in {:.0} s, and its noise is known from {least} on: give a larger --budget \

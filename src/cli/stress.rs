@@ -8,7 +8,7 @@ use serde_json::json;
 use super::Output;
 use crate::gpu::adapter::{Gpu, Selection};
 use crate::report::{self, Circumstances};
-use crate::stress::{self, Case};
+use crate::stress::{self, Case, Machine};
 use crate::{Error, Result};
 
 /// Render stiff and extreme cases, and compare each with its answer
@@ -56,13 +56,14 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     let interrupt = super::interrupt::watch()?;
     let gpu = Arc::new(Gpu::open_all(&args.devices)?.remove(0));
     let circumstances = Circumstances::now(&gpu);
+    let machine = Machine { gpu, devices: args.devices.clone(), interrupt };
     if let Some(folder) = &args.output {
         report::make_folder(folder)?;
     }
     output.event("start", json!({ "cases": cases.len(), "measured": circumstances.facts() }))?;
     let mut outcomes = Vec::new();
     for case in cases {
-        let outcome = stress::run(&case, &gpu, &interrupt)?;
+        let outcome = stress::run(&case, &machine)?;
         output.event("case", stress::facts(&case, &outcome))?;
         output.text(&line(&case, &outcome))?;
         if !args.cases.is_empty() {

@@ -72,6 +72,8 @@ modules! {
     UPDATE_PATH = "update_path.wgsl";
     FOLD_PATHS = "fold_paths.wgsl";
     SELF_TEST = "self_test.wgsl";
+    CHOOSE = "stress/choose.wgsl";
+    AIM = "stress/aim.wgsl";
 }
 
 /// Names with values: switches for `#if`, counts for `#repeat`, texts for `$NAME`.

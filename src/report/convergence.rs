@@ -107,7 +107,7 @@ impl Image {
     }
 
     /// The variance of the mean of a value; NaN below two epochs.
-    fn variance(&self, i: usize) -> f64 {
+    pub fn variance(&self, i: usize) -> f64 {
         let epochs = f64::from(self.epochs);
         if self.epochs < 2 { f64::NAN } else { self.spread[i] / (epochs * (epochs - 1.0)) }
     }
@@ -205,11 +205,12 @@ pub struct Limit {
     pub samples: u32,
 }
 
-/// Renders `scene` on `gpu` until `limit`, and tells `after` of every epoch: the picture and the seconds of
+/// Renders `scene` on `gpu` until `limit`, in tiles of a size other than the default if one is given, and tells `after` of every epoch: the picture and the seconds of
 /// rendering so far, without set-up.
 pub fn render(
     scene: &Scene,
     seed: u64,
+    tile: Option<u32>,
     gpu: &Arc<Gpu>,
     limit: Limit,
     interrupt: &Arc<Interrupt>,
@@ -217,7 +218,7 @@ pub fn render(
 ) -> Result<Image> {
     let prepared = Arc::new(Prepared::for_evaluator(scene, seed, plan::evaluator(scene, None, gpu.is_software)?)?);
     let integration = prepared.integration.clone();
-    let tile = plan::tile_size(scene, None);
+    let tile = plan::tile_size(scene, tile);
     let mut worker = Worker::new(Arc::clone(gpu), prepared, tile, Budget { memory: None, paths: None })?;
     worker.watch(interrupt);
     let [x0, y0, x1, y1] = scene.film.crop;
@@ -284,7 +285,8 @@ pub fn measure(
     reference: &Reference,
     mut after: impl FnMut(Point) -> Result<()>,
 ) -> Result<()> {
-    render(scene, seed, gpu, limit, interrupt, |image, seconds| after(reference.point(image, seconds))).map(|_| ())
+    render(scene, seed, None, gpu, limit, interrupt, |image, seconds| after(reference.point(image, seconds)))
+        .map(|_| ())
 }
 
 #[cfg(test)]

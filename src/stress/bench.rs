@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use super::{Check, Outcome};
 use crate::Result;
-use crate::gpu::adapter::Gpu;
+use crate::gpu::adapter::{Gpu, Selection};
 use crate::render::worker::Interrupt;
 use crate::report::convergence::{Image, Limit, render};
 use crate::scene::{self, Scene};
@@ -31,9 +31,16 @@ pub fn lamp(radiance: &str) -> String {
 /// Renders the scenes of one case and gathers its checks.
 pub struct Bench<'a> {
     case: &'static str,
-    gpu: &'a Arc<Gpu>,
-    interrupt: &'a Arc<Interrupt>,
+    machine: &'a Machine,
     pub outcome: Outcome,
+}
+
+/// What cases run on.
+pub struct Machine {
+    pub gpu: Arc<Gpu>,
+    /// The devices of which `gpu` is the first.
+    pub devices: Selection,
+    pub interrupt: Arc<Interrupt>,
 }
 
 /// Means over a picture's pixels, [channel], and their standard errors from the spread of the pixels, which show the same.
@@ -44,8 +51,12 @@ pub struct Measured {
 }
 
 impl<'a> Bench<'a> {
-    pub fn new(case: &'static str, gpu: &'a Arc<Gpu>, interrupt: &'a Arc<Interrupt>) -> Bench<'a> {
-        Bench { case, gpu, interrupt, outcome: Outcome::default() }
+    pub fn new(case: &'static str, machine: &'a Machine) -> Bench<'a> {
+        Bench { case, machine, outcome: Outcome::default() }
+    }
+
+    pub fn machine(&self) -> &'a Machine {
+        self.machine
     }
 
     /// The scene that `text` describes. Lines between brackets that a case does not give are these: an orthographic camera at
@@ -71,10 +82,15 @@ impl<'a> Bench<'a> {
 
     /// Renders so many samples per pixel.
     pub fn render(&mut self, text: &str, samples: u32) -> Result<Measured> {
+        self.render_with(text, samples, 1, None)
+    }
+
+    /// The same with a seed and, where the default is not meant, a size of tiles.
+    pub fn render_with(&mut self, text: &str, samples: u32, seed: u64, tile: Option<u32>) -> Result<Measured> {
         let scene = self.scene(text)?;
         // Far beyond what any case takes.
         let limit = Limit { time: Duration::from_secs(24 * 3600), samples };
-        let image = render(&scene, 1, self.gpu, limit, self.interrupt, |_, _| Ok(()))?;
+        let image = render(&scene, seed, tile, &self.machine.gpu, limit, &self.machine.interrupt, |_, _| Ok(()))?;
         self.outcome.non_finite += image.non_finite;
         self.outcome.negative += image.negative;
         self.outcome.overflow += image.overflow;
@@ -106,6 +122,16 @@ impl<'a> Bench<'a> {
     pub fn check_all(&mut self, what: &str, expected: &[f64], measured: &Measured, relative: f64) {
         for (k, &expected) in expected.iter().enumerate() {
             self.check(format!("{what}, channel {k}"), expected, measured.of(k), relative);
+        }
+    }
+}
+
+impl Machine {
+    /// So many devices, which share what there is.
+    pub fn several(&self, count: usize) -> Selection {
+        match &self.devices {
+            Selection::List(positions) => Selection::List(vec![positions[0]; count]),
+            Selection::All | Selection::Count(_) => Selection::Count(count),
         }
     }
 }

@@ -102,7 +102,8 @@ fn slivers(bench: &mut Bench) -> Result<()> {
 
 /// A lamp that fills the view, in the same OBJ file as `count` equal triangles before it: what is seen, and rays that found no end.
 fn piled(bench: &mut Bench, corners: [[f64; 3]; 3], count: usize, samples: u32) -> Result<(f64, u64)> {
-    let file = std::env::temp_dir().join(format!("spectile-stress-pile-{}.obj", std::process::id()));
+    let folder = tempfile::tempdir().map_err(|error| Error::storage(&std::env::temp_dir(), error))?;
+    let file = folder.path().join("pile.obj");
     let lamp = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]];
     let mut text: String = lamp.iter().chain(&corners).map(|[x, y, z]| format!("v {x:e} {y:e} {z:e}\n")).collect();
     text += "f 1 2 3\nf 1 3 4\n";
@@ -113,11 +114,9 @@ fn piled(bench: &mut Bench, corners: [[f64; 3]; 3], count: usize, samples: u32) 
         file.display().to_string()
     );
     let before = bench.outcome.overflow;
-    let seen = bench.render(&scene, samples);
-    // Nothing depends on it once it is read.
-    let _ = std::fs::remove_file(&file);
+    let seen = bench.render(&scene, samples)?;
     let unended = std::mem::replace(&mut bench.outcome.overflow, before) - before;
-    Ok((seen?.mean[0], unended))
+    Ok((seen.mean[0], unended))
 }
 
 fn pile(bench: &mut Bench) -> Result<()> {

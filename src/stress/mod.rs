@@ -2,22 +2,24 @@
 //!
 //! Cases are scenes as users write them, rendered by the renderer that they use; answers are closed forms, worked out beside each.
 
+mod aiming;
+mod asked;
 mod bench;
+mod chi_square;
 mod geometry;
 mod interreflection;
+mod invariance;
 mod range;
+mod sampling;
+mod scattering;
 mod spectra;
 mod surfaces;
 
-use std::sync::Arc;
-
 use serde_json::{Value, json};
 
-pub use bench::Bench;
+pub use bench::{Bench, Machine};
 
 use crate::Result;
-use crate::gpu::adapter::Gpu;
-use crate::render::worker::Interrupt;
 use crate::report::Circumstances;
 use crate::report::page::Page;
 
@@ -101,13 +103,14 @@ fn verdict(passes: bool) -> &'static str {
 
 /// All cases, in the order of VALIDATION section 3.
 pub fn cases() -> Vec<Case> {
-    [spectra::CASES, range::CASES, interreflection::CASES, surfaces::CASES, geometry::CASES].concat()
+    let groups = [spectra::CASES, range::CASES, interreflection::CASES, surfaces::CASES, geometry::CASES];
+    [&groups[..], &[scattering::CASES, aiming::CASES, sampling::CASES, invariance::CASES]].concat().concat()
 }
 
 /// Runs a case. Errors: an interrupt; what else goes wrong is the case's outcome.
-pub fn run(case: &Case, gpu: &Arc<Gpu>, interrupt: &Arc<Interrupt>) -> Result<Outcome> {
+pub fn run(case: &Case, machine: &Machine) -> Result<Outcome> {
     let began = std::time::Instant::now();
-    let mut bench = Bench::new(case.name, gpu, interrupt);
+    let mut bench = Bench::new(case.name, machine);
     let error = match (case.run)(&mut bench) {
         Ok(()) => None,
         Err(error @ crate::Error::Interrupted { .. }) => return Err(error),

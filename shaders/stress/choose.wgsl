@@ -1,4 +1,4 @@
-// The renderer's choice of directions at a surface of material 0 along z: the first question is (o, 1 if from behind), then
+// The renderer's choice of directions at a surface of material 0 along z. The first question is (o, 1 if from behind), then
 // (two random numbers for the direction, two for the part) with (0, 0, 0, 0) after it give (direction, 1), or 0 where nothing
 // goes on, or -1 for the only direction of a part; (direction, -) with (1, 0, 0, 0) after it give the density.
 
