@@ -160,5 +160,6 @@ fn surface_at(ray: Ray, hit: Hit) -> Surface {
 #endif
     // From the vertices: more exact than along the ray.
     let position = (1.0 - hit.u - hit.v) * p.a + hit.u * p.b + hit.v * p.c;
-    return Surface(position, triangle_normal(p), material, p.emitter);
+    let normal = triangle_normal(p);
+    return Surface(off_edges(position, normal, p), normal, material, p.emitter);
 }

@@ -165,8 +165,7 @@ impl Evaluator {
 
     /// Channels up to which `auto` is the conventional path tracer on GPUs. Measured with `spectile bench` on an H200 (docs/reports):
     /// its paths per second over those of `dpept-pixel`, geometric mean of four scenes, were 1.43 at 8 channels, 0.86 at 32 and 0.36 at
-    /// 128. On software devices `dpept-pixel` is the fastest or within 7 % of it, but for plain scenes with wavelength strata and some
-    /// hundred channels, where holding all spectra in registers does not pay: that is for `dpept-pixel` to mend.
+    /// 128. On software devices `dpept-pixel` is the fastest or within 7 % of it.
     pub const MOST_PT_CHANNELS: usize = 16;
 
     /// What to use on a software device or a GPU: this evaluator, or what `auto` stands for.
