@@ -252,8 +252,10 @@ fn every_evaluator_renders_every_scene_alike() {
     let others = [Evaluator::DpeptPath, Evaluator::DpeptSpectral, Evaluator::Pt];
     for (folder, name) in scenes() {
         let file = made().join(&folder).join(format!("{name}.toml"));
-        let overrides = [("film.width", 8), ("film.height", 5), ("channels.equal.count", 24)];
-        let overrides = overrides.map(|(key, value)| (key.to_owned(), value.to_string()));
+        let size = [("film.width", "8"), ("film.height", "5")];
+        let channels = [("channels.equal.count", "24"), ("channels.false_colour", "[18, 12, 4]")];
+        let overrides = [size, channels].concat();
+        let overrides: Vec<_> = overrides.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
         let mut scene = scene::load(&file, &overrides).expect("a scene");
         let records = Prepared::new(&scene, 0).expect("a scene that fits").max_records();
         let bound = device::rounding(records, 64);
