@@ -1,5 +1,6 @@
-// Traversal of the compressed wide BVH (Ylitie, Karras and Laine, HPG 2017), nodes as obvhs builds them. STACK_SIZE is
-// the depth of this scene's tree: a private array costs a software device by its size.
+// Traversal of the compressed wide BVH (Ylitie, Karras and Laine, HPG 2017), nodes as obvhs builds them. The stack is
+// as deep as this scene's tree: a private array costs a software device by its size.
+const STACK_SIZE: u32 = $STACK_SIZE;
 
 // A driver in use ends loops silently after 65,535 iterations of an invocation: two traversals must stay below half.
 #if MEDIA
@@ -147,19 +148,4 @@ fn traverse(ray: Ray, limit: f32, any_hit: bool, overflow: ptr<function, bool>) 
     steps_taken = steps;
 #endif
     return hit;
-}
-
-fn surface_at(ray: Ray, hit: Hit) -> Surface {
-    let p = load_primitive(hit.primitive);
-    let material = p.tag & 0x00ffffffu;
-#if SHAPES
-    if ((p.tag >> 24u) != 0u) {
-        let s = shape_surface(p, ray.origin + hit.distance * ray.direction);
-        return Surface(s[0], s[1], material, p.emitter);
-    }
-#endif
-    // From the vertices: more exact than along the ray.
-    let position = (1.0 - hit.u - hit.v) * p.a + hit.u * p.b + hit.v * p.c;
-    let normal = triangle_normal(p);
-    return Surface(off_edges(position, normal, p), normal, material, p.emitter);
 }

@@ -15,6 +15,7 @@
 @group(0) @binding($(8+i)) var<storage, read> primitives_$i: array<vec4<u32>>;
 #end
 
+#if NODE_WINDOWS
 // Word `part` (0..5) of an 80-byte CWBVH node.
 fn load_node(node: u32, part: u32) -> vec4<u32> {
 #if MANY_NODE_WINDOWS
@@ -30,6 +31,7 @@ fn load_node(node: u32, part: u32) -> vec4<u32> {
     return nodes_0[node * 5u + part];
 #endif
 }
+#endif
 
 // A 48-byte primitive. Words that are not numbers never pass through a float, which could lose them as subnormal.
 fn load_primitive(primitive: u32) -> Primitive {

@@ -4,7 +4,7 @@
 //! so that its text is the same as if the feature did not exist:
 //! `#if NAME`, `#else`, `#endif` (NAME defined and not 0) and `#repeat NAME i` … `#end` (as many times as NAME says, with
 //! `$i` and `$(4+i)` counting; loops nest). `$NAME` stands for a value; constants are declared on top. `#include PATH` stands for
-//! the text of a file that several passes have inside of a function.
+//! the text of a file that several passes have inside of a function, `#lines NAME` for lines that the scene makes.
 
 use std::collections::BTreeMap;
 
@@ -35,6 +35,8 @@ modules! {
     TRIANGLE = "common/triangle.wgsl";
     SHAPES = "common/shapes.wgsl";
     BVH = "common/bvh.wgsl";
+    FEW_TRIANGLES = "common/few_triangles.wgsl";
+    SURFACE = "common/surface.wgsl";
     LIGHT = "common/light.wgsl";
     ATTRIBUTES = "common/attributes.wgsl";
     TEXTURE = "common/texture.wgsl";
@@ -81,6 +83,7 @@ modules! {
 pub struct Defines {
     values: BTreeMap<&'static str, u32>,
     constants: Vec<(&'static str, u32)>,
+    lines: BTreeMap<&'static str, Vec<String>>,
 }
 
 impl Defines {
@@ -94,6 +97,12 @@ impl Defines {
     pub fn constant(&mut self, name: &'static str, value: u32) -> &mut Self {
         self.constants.push((name, value));
         self.set(name, value)
+    }
+
+    /// Sets the text that stands for `#lines NAME`.
+    pub fn lines(&mut self, name: &'static str, lines: Vec<String>) -> &mut Self {
+        self.lines.insert(name, lines);
+        self
     }
 
     fn get(&self, name: &str) -> u32 {
@@ -189,6 +198,11 @@ fn emit(lines: &[(usize, &str)], module: &Module, defines: &Defines, counts: &Co
                 emit(&lines[at + 1..end], module, defines, &[counts, &[(counter, i)]].concat(), out);
             }
             at = end + 1;
+        } else if let Some(name) = directive.strip_prefix("#lines ") {
+            for line in defines.lines.get(name).into_iter().flatten() {
+                out.push(line.clone(), (module.name, number));
+            }
+            at += 1;
         } else if let Some(path) = directive.strip_prefix("#include ") {
             let included = INCLUDED.iter().find(|module| module.name == path);
             let included = included.unwrap_or_else(|| panic!("shaders/{}:{number}: no file {path}", module.name));

@@ -103,7 +103,9 @@ fn parts<'a>(prepared: &'a Prepared, windows: &Windows) -> Vec<(String, &'a [u8]
             parts.push((format!("{name}_{i}"), &bytes[(i * size) as usize..end as usize]));
         }
     };
-    add_windows("nodes", windows.nodes, bytemuck::cast_slice(&prepared.accel.nodes), NODE_BYTES);
+    if !prepared.features.few_triangles {
+        add_windows("nodes", windows.nodes, bytemuck::cast_slice(&prepared.accel.nodes), NODE_BYTES);
+    }
     add_windows("primitives", windows.primitives, bytemuck::cast_slice(&prepared.accel.primitives), PRIMITIVE_BYTES);
     if prepared.features.knots {
         parts.push(("knot_starts".into(), bytemuck::cast_slice(&tables.knot_starts)));

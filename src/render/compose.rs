@@ -1,5 +1,6 @@
 //! Shaders as a scene composes them: the modules of each pass, its switches and constants, and the shape of its workgroups.
 
+use crate::gpu::layout::Primitive;
 use crate::gpu::self_test::LOOP_LIMIT;
 use crate::gpu::shader::{self, Defines, Module};
 use crate::render::heat;
@@ -12,7 +13,11 @@ impl Prepared {
     pub fn defines(&self, windows: &Windows) -> Defines {
         let f = &self.features;
         let mut d = Defines::default();
-        d.constant("STACK_SIZE", self.accel.depth);
+        if f.few_triangles {
+            d.lines("TRIANGLES", self.triangle_lines());
+        } else {
+            d.set("STACK_SIZE", self.accel.depth);
+        }
         d.set("CAMERA_THIN_LENS", f.thin_lens).set("CAMERA_ORTHOGRAPHIC", f.orthographic).set("GAUSSIAN", f.gaussian);
         d.set("BOUNCE_BY_BOUNCE", self.evaluator == Evaluator::Pt);
         d.set("INDEPENDENT", f.independent).set("ROULETTE", f.roulette).set("SHAPES", f.shapes);
@@ -24,16 +29,28 @@ impl Prepared {
             }
         }
         d.set("EMITTERS", f.emitters).set("ENVIRONMENT", f.environment).set("LIGHTS", f.emitters || f.environment);
-        for (count, many, size_name, list) in [
-            ("NODE_WINDOWS", "MANY_NODE_WINDOWS", "NODE_WINDOW", &windows.nodes),
-            ("PRIMITIVE_WINDOWS", "MANY_PRIMITIVE_WINDOWS", "PRIMITIVE_WINDOW", &windows.primitives),
-        ] {
+        let nodes = ("NODE_WINDOWS", "MANY_NODE_WINDOWS", "NODE_WINDOW", &windows.nodes);
+        for (count, many, size_name, list) in (!f.few_triangles).then_some(nodes).into_iter().chain([(
+            "PRIMITIVE_WINDOWS",
+            "MANY_PRIMITIVE_WINDOWS",
+            "PRIMITIVE_WINDOW",
+            &windows.primitives,
+        )]) {
             d.set(count, list.count);
             if list.count > 1 {
                 d.set(many, true).constant(size_name, list.size);
             }
         }
         d
+    }
+
+    /// A test of each of a few triangles, which are constants of the shader: the shortest decimals that are these f32 and no others.
+    fn triangle_lines(&self) -> Vec<String> {
+        let vertex = |[x, y, z]: [f32; 3]| format!("vec3<f32>({x:?}f, {y:?}f, {z:?}f)");
+        let test = |(i, p): (usize, &Primitive)| {
+            format!("    hit = nearer(ray_sheared, hit, {i}u, {}, {}, {});", vertex(p.a), vertex(p.b), vertex(p.c))
+        };
+        self.accel.primitives.iter().enumerate().map(test).collect()
     }
 
     /// The modules of each pass, the pass itself last.
@@ -47,7 +64,8 @@ impl Prepared {
         if self.features.shapes {
             modules.push(shader::SHAPES);
         }
-        modules.push(shader::BVH);
+        modules.push(if self.features.few_triangles { shader::FEW_TRIANGLES } else { shader::BVH });
+        modules.push(shader::SURFACE);
         if self.features.emitters || self.features.environment || self.features.general.is_some() {
             modules.push(shader::LIGHT);
         }

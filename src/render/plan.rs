@@ -88,6 +88,17 @@ pub fn feature_lines(prepared: &Prepared, waves: &WavePlan) -> Vec<FeatureLine> 
     vec![
         line("area lights", f.emitters, format!("{bounces} records of {} bytes a path", prepared.record_bytes())),
         line("environment", f.environment, "one light to choose from".into()),
+        line(
+            "BVH",
+            !f.few_triangles,
+            match f.few_triangles {
+                true => format!(
+                    "every ray tests all {} triangles, constants of its kernel",
+                    prepared.accel.primitives.len()
+                ),
+                false => format!("{} nodes, a stack of {} a ray", prepared.accel.nodes.len(), prepared.accel.depth),
+            },
+        ),
         line("spheres, disks, cylinders", f.shapes, format!("{}, a test per primitive", module(s::SHAPES))),
         line(
             "next-event estimation",

@@ -179,9 +179,16 @@ fn camera_on_surface(bench: &mut Bench) -> Result<()> {
 
 fn watertight(bench: &mut Bench) -> Result<()> {
     let sky = "[environment]\nradiance = 1e6\n[film]\nwidth = 64\nheight = 64\n";
-    for (what, scale, x) in [("a room of 2 m", 1.0, 0.0), ("the same 1e3 m away", 1.0, 1e3)] {
+    // Out of sight, and more triangles than rays test one by one.
+    let beside = |i: usize| {
+        format!("[[objects]]\ncube = {{ min = [{i}, 2, 2], max = [{i}.5, 2.5, 2.5] }}\nmaterial = \"wall\"\n")
+    };
+    let beside: String = (0..5).map(beside).collect();
+    for (what, x, more) in
+        [("a room of 2 m", 0.0, ""), ("the same 1e3 m away", 1e3, ""), ("one among others", 0.0, &beside)]
+    {
         // 64 x 64 pixels x 1,280 samples.
-        let seen = bench.render(&(room(scale, x, 0.9, 0.0, 0) + sky), 1280)?;
+        let seen = bench.render(&(room(1.0, x, 0.9, 0.0, 0) + sky + more), 1280)?;
         bench.check_within(what, 0.0, (seen.mean[0], 0.0), 0.0);
     }
     Ok(())

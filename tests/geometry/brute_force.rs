@@ -22,6 +22,53 @@ fn distance_f64(p: &Primitive, ray: &Ray, slack: impl Fn(f64, f64) -> f64) -> Op
     (u >= -slack && v >= -slack && u + v <= 1.0 + slack && t > 0.0).then_some(t)
 }
 
+/// What tests a few triangles one by one finds what the BVH finds, to the last bit; of two in one place, either.
+#[test]
+fn few_triangles_are_hit_as_by_the_bvh() {
+    let mut random = Random(4);
+    for count in [1, 7, 48] {
+        let mut mesh = Mesh::default();
+        for i in 0..count {
+            // Every third shares an edge with the last one.
+            let first = if i % 3 == 2 { 3 * i - 2 } else { 3 * i };
+            let (centre, size) = (random.in_cube(), 0.8 * random.next());
+            mesh.positions.extend((0..3).map(|_| centre + size * random.in_cube()));
+            mesh.triangles.push([first, first + 1, 3 * i + 2]);
+        }
+        let mut prepared = Prepared::new(&black_mesh(mesh), 0).unwrap();
+        assert!(prepared.features.few_triangles);
+        let corners: Vec<DVec3> = prepared
+            .accel
+            .primitives
+            .iter()
+            .flat_map(|p| [p.a, p.b, p.c])
+            .map(|v| DVec3::from(v.map(f64::from)))
+            .collect();
+        let rays: Vec<Ray> = (0..40_000)
+            .map(|i| {
+                let origin = f32s(1.2 * random.in_cube());
+                let towards = |to: DVec3| to - DVec3::from(origin.map(f64::from));
+                let direction = match i % 4 {
+                    0 => DVec3::AXES[i / 4 % 3],
+                    1 => towards(corners[i / 4 % corners.len()]),
+                    2 => towards(0.5 * (corners[i / 4 % corners.len()] + corners[(i / 4 + 1) % corners.len()])),
+                    _ => random.direction(),
+                };
+                Ray { origin, direction: f32s(direction) }
+            })
+            .collect();
+        let few = trace(&prepared, &rays);
+        prepared.features.few_triangles = false;
+        let mut hits = 0;
+        for ((ray, few), bvh) in rays.iter().zip(&few).zip(trace(&prepared, &rays)) {
+            assert!(!few.overflow && few.distance.to_bits() == bvh.distance.to_bits(), "{ray:?}: {few:?}, {bvh:?}");
+            assert_eq!(few.primitive.is_some(), bvh.primitive.is_some());
+            hits += u32::from(few.primitive.is_some());
+        }
+        assert!(hits > 3000, "{hits} hits of {count} triangles");
+    }
+}
+
 /// The nearest of 2,000 triangles of all sizes, at random and along axes: what the device finds lies between the nearest
 /// hit of slightly larger and of slightly smaller triangles.
 #[test]
