@@ -8,7 +8,6 @@ use super::asked::{Aimed, Aiming, SAMPLES, bin, random};
 use super::chi_square::{check, p_value};
 use super::{Bench, Case};
 use crate::Result;
-use crate::gpu::layout::EMITS_BOTH_SIDES;
 use crate::render::prepare::Prepared;
 use crate::scene::{Environment, EnvironmentMap, Texels};
 
@@ -19,92 +18,100 @@ pub const CASES: &[Case] = &[Case {
     run: aiming,
 }];
 
-/// Equal shares of a lamp in which a chosen point, in device units as seen from a place, falls; and its density by geometry.
-type Share<'a> = &'a dyn Fn(DVec3, DVec3) -> (usize, f64);
+/// A lamp's cells of equal share, and rings and sectors of a round one.
+const CELLS: usize = 64;
+const ROUND: usize = 8;
 
-/// A lamp of one shape, its number of equal cells, and in which of them a point is.
+/// A lamp as the device has it.
+#[derive(Clone, Copy)]
+enum Lamp {
+    Triangle,
+    Disk,
+    Cylinder,
+    Sphere,
+}
+
+impl Lamp {
+    /// In which of its cells the point `p` is that was chosen from `from`, and the density by solid angle that geometry gives it. `a`,
+    /// `b`, `c`: the device's numbers of the primitive.
+    fn cell_and_density(self, [a, b, c]: [DVec3; 3], area: f64, p: DVec3, from: DVec3) -> (usize, f64) {
+        let by_area = |normal: DVec3| {
+            let way = p - from;
+            way.length_squared() / (area * way.normalize().dot(normal).abs())
+        };
+        // `share` of the rings, and an angle about `axis`.
+        let round = |share: f64, off: DVec3, axis: DVec3| {
+            let (s, t) = axis.normalize().any_orthonormal_pair();
+            bin(share, ROUND) * ROUND + bin(0.5 + off.dot(t).atan2(off.dot(s)) / TAU, ROUND)
+        };
+        match self {
+            Lamp::Triangle => {
+                let (u, v) = (b - a, c - a);
+                let normal = u.cross(v);
+                // Barycentric coordinates, and the row of small triangles in which they are.
+                let n = normal.length_squared();
+                let x = (p - a).cross(v).dot(normal) / n;
+                let y = u.cross(p - a).dot(normal) / n;
+                let [x, y] = [x, y].map(|w| ROUND as f64 * w.clamp(0.0, 0.999_999));
+                let (column, row) = (x.floor() as usize, y.floor() as usize);
+                let upper = usize::from(x.fract() + y.fract() > 1.0);
+                // Row j has 2 (8 - j) - 1 of them.
+                let cell = row * (2 * ROUND - row) + (2 * column + upper).min(2 * (ROUND - row) - 2);
+                (cell.min(CELLS - 1), by_area(normal.normalize()))
+            }
+            Lamp::Disk => (round((p - a).length_squared() / c.x.powi(2), p - a, b), by_area(b)),
+            Lamp::Cylinder => {
+                let axis = b - a;
+                let along = (p - a).dot(axis) / axis.length_squared();
+                let off = p - a - along * axis;
+                (round(along, off, axis), by_area(off.normalize()))
+            }
+            Lamp::Sphere => {
+                // Uniform in the cone that it fills.
+                let axis = a - from;
+                let cap = 1.0 - (1.0 - b.x.powi(2) / axis.length_squared()).sqrt();
+                let way = (p - from).normalize();
+                let share = 0.5 * way.distance_squared(axis.normalize()) / cap;
+                (round(share, way, axis), 1.0 / (TAU * cap))
+            }
+        }
+    }
+}
+
 fn lamps(bench: &mut Bench, tests: usize) -> Result<()> {
-    const RINGS: usize = 8;
     let places = [[0.4, 0.3, 3.0], [2.0, 0.0, 1.0], [-1.0, -2.5, 0.7], [0.1, 0.0, 2.2], [-3.0, 2.0, -1.5]];
-    for (shape, text) in [
-        ("a triangle", "quad = { corner = [-0.5, -0.5, 0], edge_u = [1, 0, 0], edge_v = [0.3, 1, 0] }"),
-        ("a disk", "disk = { center = [0, 0, 0], normal = [0.3, 0.2, 1], radius = 0.7 }"),
-        ("a cylinder", "cylinder = { from = [-0.5, 0.2, 0], to = [0.6, 0, 0.3], radius = 0.4 }"),
-        ("a sphere", "sphere = { center = [0.1, 0.1, 0], radius = 0.6 }"),
+    for (lamp, name, shape) in [
+        (Lamp::Triangle, "a triangle", "quad = { corner = [-0.5, -0.5, 0], edge_u = [1, 0, 0], edge_v = [0.3, 1, 0] }"),
+        (Lamp::Disk, "a disk", "disk = { center = [0, 0, 0], normal = [0.3, 0.2, 1], radius = 0.7 }"),
+        (Lamp::Cylinder, "a cylinder", "cylinder = { from = [-0.5, 0.2, 0], to = [0.6, 0, 0.3], radius = 0.4 }"),
+        (Lamp::Sphere, "a sphere", "sphere = { center = [0.1, 0.1, 0], radius = 0.6 }"),
     ] {
         // The mirror makes the scene a general one.
         let scene = bench.scene(&format!(
-            "[materials.m.conductor]\neta = 0.2\nk = 3.4\n[materials.b.black]\n[[objects]]\n{text}\nmaterial = \"b\"\nemission = 1\n\
+            "[materials.m.conductor]\neta = 0.2\nk = 3.4\n[materials.b.black]\n[[objects]]\n{shape}\nmaterial = \"b\"\nemission = 1\n\
              emission_sides = \"both\"\n[[objects]]\nsphere = {{ center = [0, 0, -9], radius = 1 }}\nmaterial = \"m\"\n"
         ))?;
         let prepared = Prepared::new(&scene, 0)?;
         let emitter = prepared.emitters[0];
-        assert!(emitter.spectrum & EMITS_BOTH_SIDES != 0, "the lamp shines from both sides");
         let primitive = prepared.accel.primitives[emitter.primitive as usize];
-        let [a, b, c] = [primitive.a, primitive.b, primitive.c].map(|v| DVec3::from_array(v.map(f64::from)));
-        let area = f64::from(emitter.area);
-        let by_area = |point: DVec3, from: DVec3, normal: DVec3| {
-            let way = point - from;
-            way.length_squared() / (area * (way.normalize().dot(normal)).abs())
-        };
-        let ring = |share: f64, x: f64, y: f64| bin(share, RINGS) * RINGS + bin(0.5 + y.atan2(x) / TAU, RINGS);
-        let triangle = |p: DVec3, from: DVec3| {
-            let (u, v) = (b - a, c - a);
-            let normal = u.cross(v);
-            // Barycentric, and the small triangle of 64 in which it is.
-            let n = normal.length_squared();
-            let (x, y) = ((p - a).cross(v).dot(normal) / n, u.cross(p - a).dot(normal) / n);
-            let (x, y) = (8.0 * x.clamp(0.0, 0.999_999), 8.0 * y.clamp(0.0, 0.999_999));
-            let (i, j) = (x.floor() as usize, y.floor() as usize);
-            let upper = usize::from(x.fract() + y.fract() > 1.0);
-            // Row j has 2 (8 - j) - 1 triangles.
-            let cell = j * (16 - j) + (2 * i + upper).min(2 * (8 - j) - 2);
-            (cell.min(63), by_area(p, from, normal.normalize()))
-        };
-        let disk = |p: DVec3, from: DVec3| {
-            let (s, t) = b.any_orthonormal_pair();
-            let off = p - a;
-            (ring(off.length_squared() / c.x.powi(2), off.dot(s), off.dot(t)), by_area(p, from, b))
-        };
-        let cylinder = |p: DVec3, from: DVec3| {
-            let axis = b - a;
-            let (s, t) = axis.normalize().any_orthonormal_pair();
-            let along = (p - a).dot(axis) / axis.length_squared();
-            let off = p - a - along * axis;
-            (ring(along, off.dot(s), off.dot(t)), by_area(p, from, off.normalize()))
-        };
-        let sphere = |p: DVec3, from: DVec3| {
-            // Uniform in the cone that it fills.
-            let axis = a - from;
-            let cap = 1.0 - (1.0 - b.x.powi(2) / axis.length_squared()).sqrt();
-            let (s, t) = axis.normalize().any_orthonormal_pair();
-            let way = (p - from).normalize();
-            let share = 0.5 * way.distance_squared(axis.normalize()) / cap;
-            (ring(share, way.dot(s), way.dot(t)), 1.0 / (TAU * cap))
-        };
-        let share: Share = match shape {
-            "a triangle" => &triangle,
-            "a disk" => &disk,
-            "a cylinder" => &cylinder,
-            _ => &sphere,
-        };
+        let numbers = [primitive.a, primitive.b, primitive.c].map(|v| DVec3::from_array(v.map(f64::from)));
         let kernel = Aiming::new(&bench.machine().gpu, &prepared)?;
         let (mut least, mut off) = (1.0f64, 0.0f64);
         for (seed, place) in places.iter().enumerate() {
             let from = DVec3::from_array(prepared.accel.space.point(DVec3::from_array(*place)).map(f64::from));
-            let mut counts = vec![0.0; 64];
+            let mut counts = vec![0.0; CELLS];
             for (point, density) in kernel.aim(from, &random(SAMPLES, seed as u32))? {
-                let (cell, expected) = share(point, from);
+                let (cell, expected) = lamp.cell_and_density(numbers, f64::from(emitter.area), point, from);
                 counts[cell] += 1.0;
-                // Behind the horizon of a cylinder the far side is met, at a grazing angle anything.
+                // The cosine of a grazing angle is what rounding makes it.
                 if density > 0.0 && density < 100.0 {
                     off = off.max((density / expected - 1.0).abs());
                 }
             }
-            least = least.min(p_value(&counts, &[f64::from(SAMPLES) / 64.0; 64]));
+            least = least.min(p_value(&counts, &[f64::from(SAMPLES) / CELLS as f64; CELLS]));
         }
-        check(bench, shape.to_owned(), least, tests);
-        bench.check_within(format!("{shape}: densities, relative"), 0.0, (off, 0.0), 1e-3);
+        check(bench, name.to_owned(), least, tests);
+        bench.check_within(format!("{name}: densities, relative"), 0.0, (off, 0.0), 1e-3);
     }
     Ok(())
 }
