@@ -24,7 +24,7 @@ use std::f64::consts::PI;
 
 /// Evaluation walks the records of a path in one loop (DESIGN section 7).
 const MAX_RECORDS: u32 = LOOP_LIMIT;
-/// Triangles up to which rays test them all. Measured on lavapipe: generating a path of the Cornell box, with 34 of them, takes 0.4 to
+/// Triangles up to which rays test them all. Measured on lavapipe: generating a path of the Cornell box, with 32 of them, takes 0.4 to
 /// 0.5 of the time that it takes with the BVH; kernels grow with every one.
 const FEW_TRIANGLES: usize = 48;
 
