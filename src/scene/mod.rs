@@ -165,7 +165,7 @@ impl Evaluator {
 
     /// Channels up to which `auto` is the conventional path tracer on GPUs. Measured with `spectile bench` on an H200 (docs/reports):
     /// its paths per second over those of `dpept-pixel`, geometric mean of four scenes, were 1.43 at 8 channels, 0.86 at 32 and 0.36 at
-    /// 128. On software devices `dpept-pixel` is the fastest or within 7 % of it.
+    /// 128. On software devices `dpept-pixel` was the fastest in all of them, or one percent from it.
     pub const MOST_PT_CHANNELS: usize = 16;
 
     /// What to use on a software device or a GPU: this evaluator, or what `auto` stands for.
