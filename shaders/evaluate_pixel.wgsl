@@ -31,20 +31,12 @@ fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
 #else
     // One stratum: every spectrum of these channels stays in registers.
 #repeat VECTORS v
-#repeat FACTORS i
-    let factor_value_$i_$v = spectra[table_index(0u, $(1+i)u, quad_$v)];
-    let factor_slope_$i_$v = spectra[table_index(0u, $(1+i)u, quad_$v) + 1u];
+#repeat HELD i
+    let held_value_$i_$v = spectra[table_index(0u, $(1+i)u, quad_$v)];
+    let held_slope_$i_$v = spectra[table_index(0u, $(1+i)u, quad_$v) + 1u];
 #repeat KINKS j
-    let factor_kink_$j_$i_$v = spectra[table_index(0u, $(1+i)u, quad_$v) + 2u + $ju];
-    let factor_bend_$j_$i_$v = spectra[table_index(0u, $(1+i)u, quad_$v) + 2u + KINKS + $ju];
-#end
-#end
-#repeat SOURCES i
-    let source_value_$i_$v = spectra[table_index(0u, FIRST_SOURCE + $iu, quad_$v)];
-    let source_slope_$i_$v = spectra[table_index(0u, FIRST_SOURCE + $iu, quad_$v) + 1u];
-#repeat KINKS j
-    let source_kink_$j_$i_$v = spectra[table_index(0u, FIRST_SOURCE + $iu, quad_$v) + 2u + $ju];
-    let source_bend_$j_$i_$v = spectra[table_index(0u, FIRST_SOURCE + $iu, quad_$v) + 2u + KINKS + $ju];
+    let held_kink_$j_$i_$v = spectra[table_index(0u, $(1+i)u, quad_$v) + 2u + $ju];
+    let held_bend_$j_$i_$v = spectra[table_index(0u, $(1+i)u, quad_$v) + 2u + KINKS + $ju];
 #end
 #end
 #end
@@ -64,35 +56,19 @@ fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
         foreign |= head.y ^ mark;
 #if REGISTERS
 #repeat VECTORS v
-#repeat FACTORS i
+#repeat HELD i
 #if STRATA
-        let factor_at_$i_$v = table_index(s.stratum, $(1+i)u, quad_$v);
-        let factor_$i_$v = spectra[factor_at_$i_$v] + s.place * spectra[factor_at_$i_$v + 1u];
+        let held_at_$i_$v = table_index(s.stratum, $(1+i)u, quad_$v);
+        let held_$i_$v = spectra[held_at_$i_$v] + s.place * spectra[held_at_$i_$v + 1u];
 #else
 #if KINKS
-        var factor_$i_$v = factor_value_$i_$v + s.place * factor_slope_$i_$v;
+        var held_$i_$v = held_value_$i_$v + s.place * held_slope_$i_$v;
 #repeat KINKS j
-        factor_$i_$v += factor_bend_$j_$i_$v * max(s.place - factor_kink_$j_$i_$v, vec4<f32>(0.0));
+        held_$i_$v += held_bend_$j_$i_$v * max(s.place - held_kink_$j_$i_$v, vec4<f32>(0.0));
 #end
-        factor_$i_$v = max(factor_$i_$v, vec4<f32>(0.0));
+        held_$i_$v = max(held_$i_$v, vec4<f32>(0.0));
 #else
-        let factor_$i_$v = factor_value_$i_$v + s.place * factor_slope_$i_$v;
-#endif
-#endif
-#end
-#repeat SOURCES i
-#if STRATA
-        let source_at_$i_$v = table_index(s.stratum, FIRST_SOURCE + $iu, quad_$v);
-        let source_$i_$v = spectra[source_at_$i_$v] + s.place * spectra[source_at_$i_$v + 1u];
-#else
-#if KINKS
-        var source_$i_$v = source_value_$i_$v + s.place * source_slope_$i_$v;
-#repeat KINKS j
-        source_$i_$v += source_bend_$j_$i_$v * max(s.place - source_kink_$j_$i_$v, vec4<f32>(0.0));
-#end
-        source_$i_$v = max(source_$i_$v, vec4<f32>(0.0));
-#else
-        let source_$i_$v = source_value_$i_$v + s.place * source_slope_$i_$v;
+        let held_$i_$v = held_value_$i_$v + s.place * held_slope_$i_$v;
 #endif
 #endif
 #end

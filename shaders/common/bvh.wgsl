@@ -123,10 +123,7 @@ fn traverse(ray: Ray, limit: f32, any_hit: bool, overflow: ptr<function, bool>) 
                 continue;
             }
 #endif
-            let found = intersect_triangle(sheared_ray, p.a, p.b, p.c);
-            if (found.x > 0.0 && found.x < hit.distance) {
-                hit = Hit(found.x, primitive, found.y, found.z);
-            }
+            hit = nearer(sheared_ray, hit, primitive, p.a, p.b, p.c);
         }
 
         if (any_hit && hit.primitive != NONE) {

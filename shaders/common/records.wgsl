@@ -145,10 +145,10 @@
         var factor_$v = vec4<f32>(1.0);
         var source_$v = vec4<f32>(0.0);
 #repeat FACTORS i
-        factor_$v = select(factor_$v, factor_$i_$v, factor_id == $(1+i)u);
+        factor_$v = select(factor_$v, held_$i_$v, factor_id == $(1+i)u);
 #end
 #repeat SOURCES i
-        source_$v = select(source_$v, source_$i_$v, source_id == FIRST_SOURCE + $iu);
+        source_$v = select(source_$v, held_$(FACTORS+i)_$v, source_id == FIRST_SOURCE + $iu);
 #end
 #else
         let factor_$v = spectrum_value(factor_id, quad_$v, s);

@@ -46,6 +46,15 @@ fn intersect_triangle(ray: ShearedRay, a_in: vec3<f32>, b_in: vec3<f32>, c_in: v
     return vec3<f32>(dot(edge, z) * inverse, edge.y * inverse, edge.z * inverse);
 }
 
+// `hit`, or what the ray meets before it.
+fn nearer(ray: ShearedRay, hit: Hit, primitive: u32, a: vec3<f32>, b: vec3<f32>, c: vec3<f32>) -> Hit {
+    let found = intersect_triangle(ray, a, b, c);
+    if (found.x > 0.0 && found.x < hit.distance) {
+        return Hit(found.x, primitive, found.y, found.z);
+    }
+    return hit;
+}
+
 // Counter-clockwise vertices face the front. Edges are scaled first: tiny triangles would leave only subnormals. The
 // edges of a sliver may round to parallel ones: any direction is as good then, but not NaN.
 fn triangle_normal(p: Primitive) -> vec3<f32> {

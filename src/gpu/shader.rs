@@ -3,7 +3,7 @@
 //! A pass is the ordered concatenation of plain WGSL files. Line directives leave out what a scene does not need,
 //! so that its text is the same as if the feature did not exist:
 //! `#if NAME`, `#else`, `#endif` (NAME defined and not 0) and `#repeat NAME i` … `#end` (as many times as NAME says, with
-//! `$i` and `$(4+i)` counting; loops nest). `$NAME` stands for a value; constants are declared on top. `#include PATH` stands for
+//! `$i`, `$(4+i)` and `$(NAME+i)` counting; loops nest). `$NAME` stands for a value; constants are declared on top. `#include PATH` stands for
 //! the text of a file that several passes have inside of a function, `#lines NAME` for lines that the scene makes.
 
 use std::collections::BTreeMap;
@@ -215,7 +215,7 @@ fn emit(lines: &[(usize, &str)], module: &Module, defines: &Defines, counts: &Co
     }
 }
 
-/// Replaces `$i`, `$(4+i)` and `$NAME`.
+/// Replaces `$i`, `$(4+i)`, `$(NAME+i)` and `$NAME`.
 fn substitute(line: &str, defines: &Defines, counts: &Counts) -> String {
     let count = |counter: char| counts.iter().find(|c| c.0 == counter).map(|c| c.1);
     let mut result = String::with_capacity(line.len());
@@ -225,7 +225,8 @@ fn substitute(line: &str, defines: &Defines, counts: &Counts) -> String {
         rest = &rest[at + 1..];
         let sum = rest.strip_prefix('(').and_then(|r| r.split_once(')')).and_then(|(sum, after)| {
             let (offset, counter) = sum.split_once('+')?;
-            Some((offset.parse::<u32>().ok()? + count(counter.chars().next()?)?, after))
+            let offset = offset.parse().ok().or_else(|| defines.values.get(offset).copied())?;
+            Some((offset + count(counter.chars().next()?)?, after))
         });
         let first = rest.chars().next().unwrap_or(' ');
         if let Some((value, after)) = sum {

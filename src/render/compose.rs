@@ -29,18 +29,16 @@ impl Prepared {
             }
         }
         d.set("EMITTERS", f.emitters).set("ENVIRONMENT", f.environment).set("LIGHTS", f.emitters || f.environment);
-        let nodes = ("NODE_WINDOWS", "MANY_NODE_WINDOWS", "NODE_WINDOW", &windows.nodes);
-        for (count, many, size_name, list) in (!f.few_triangles).then_some(nodes).into_iter().chain([(
-            "PRIMITIVE_WINDOWS",
-            "MANY_PRIMITIVE_WINDOWS",
-            "PRIMITIVE_WINDOW",
-            &windows.primitives,
-        )]) {
+        let mut spread = |count: &'static str, many: &'static str, size: &'static str, list: &WindowList| {
             d.set(count, list.count);
             if list.count > 1 {
-                d.set(many, true).constant(size_name, list.size);
+                d.set(many, true).constant(size, list.size);
             }
+        };
+        if !f.few_triangles {
+            spread("NODE_WINDOWS", "MANY_NODE_WINDOWS", "NODE_WINDOW", &windows.nodes);
         }
+        spread("PRIMITIVE_WINDOWS", "MANY_PRIMITIVE_WINDOWS", "PRIMITIVE_WINDOW", &windows.primitives);
         d
     }
 
@@ -267,6 +265,7 @@ impl Prepared {
             self.general_defines(general, &mut d);
         }
         d.set("FACTORS", self.factors as u32).set("SOURCES", self.sources as u32);
+        d.set("HELD", (self.factors + self.sources) as u32);
         d.set("WORKGROUP", shape.lanes * shape.pixels);
         d.constant("FIRST_SOURCE", 1 + self.factors as u32);
         if let Some(weight) = self.path_weight {

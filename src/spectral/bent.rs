@@ -2,7 +2,7 @@
 //! strata would take, which it would have to read anew for every path.
 
 use super::Curve;
-use super::table::{POINTWISE_BOUND, fit};
+use super::table::{POINTWISE_BOUND, few_nodes, fit};
 
 /// `value + place * slope + Σ bend * max(place - at, 0)`, place in [0, 1) over a channel; not below 0.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,14 +17,13 @@ impl BentLine {
     /// `curve` over [from, to] nm, and the largest error relative to its peak there: with as few kinks as keep the bound of tables, or
     /// `None` where more than `most` would be needed, or none help.
     pub fn of(curve: &Curve, from: f64, to: f64, most: usize) -> Option<(BentLine, f64)> {
-        let pieces = curve.linear_pieces(from, to);
         let line = fit(curve, from, to);
         let straight = BentLine { value: line.value as f32, slope: line.slope as f32, kinks: Vec::new() };
-        let nodes = pieces.clone().unwrap_or_else(|| {
-            (0..=8).map(|i| from + (to - from) * f64::from(i) / 8.0).map(|nm| (nm, curve.eval(nm))).collect()
-        });
-        let peak = curve.max(from, to);
+        let pieces = curve.linear_pieces(from, to);
+        let is_smooth = pieces.is_none();
+        let nodes = pieces.unwrap_or_else(|| few_nodes(curve, from, to));
         let places: Vec<(f64, f64)> = nodes.iter().map(|(nm, value)| ((nm - from) / (to - from), *value)).collect();
+        let peak = curve.max(from, to);
         let within = |line: BentLine| {
             let error = line.error(&places) / if peak > 0.0 { peak } else { 1.0 };
             (error <= POINTWISE_BOUND).then_some((line, error))
@@ -32,7 +31,7 @@ impl BentLine {
         within(straight).or_else(|| {
             // Jumps have no width.
             let jumps = places.windows(2).any(|w| w[1].0 <= w[0].0);
-            if pieces.is_none() || jumps || places.len() > most + 2 {
+            if is_smooth || jumps || places.len() > most + 2 {
                 return None;
             }
             let slopes: Vec<f64> = places.windows(2).map(|w| (w[1].1 - w[0].1) / (w[1].0 - w[0].0)).collect();

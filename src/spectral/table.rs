@@ -175,10 +175,9 @@ impl SpectralTables {
             }
         }
         let bounds = lines.iter().zip(curves).map(|(lines, curve)| {
-            let each = lines.iter().zip(&channels.bounds).map(|((line, pointwise), &[a, b])| {
-                let exact = curve.mean(a, b);
-                let mean = if exact != 0.0 { (line.mean() / exact - 1.0).abs() } else { line.mean().abs() };
-                Bounds { pointwise: *pointwise, mean }
+            let each = lines.iter().zip(&channels.bounds).map(|((line, pointwise), &[a, b])| Bounds {
+                pointwise: *pointwise,
+                mean: off(line.mean(), curve.mean(a, b)),
             });
             each.fold(Bounds::default(), Bounds::max)
         });
@@ -311,18 +310,25 @@ impl Place<'_> {
         for (j, line) in lines.iter().enumerate() {
             let (a, b) = (self.warp.edge(k, j, bits), self.warp.edge(k, j + 1, bits));
             mean += (line.value + 0.5 * line.slope) * (b - a) / (to - from);
-            let nodes = curve.linear_pieces(a, b).unwrap_or_else(|| {
-                (0..=8).map(|i| a + (b - a) * f64::from(i) / 8.0).map(|nm| (nm, curve.eval(nm))).collect()
-            });
-            for (nm, value) in nodes {
+            for (nm, value) in curve.linear_pieces(a, b).unwrap_or_else(|| few_nodes(curve, a, b)) {
                 let place = (nm - a) / (b - a);
                 let of = if kind == Exactness::Pointwise { value.max(1e-9 * peak) } else { peak };
                 pointwise = pointwise.max((line.value + place * line.slope - value).abs() / of);
             }
         }
         let exact = curve.mean(from, to);
-        Bounds { pointwise, mean: if exact != 0.0 { (mean / exact - 1.0).abs() } else { mean.abs() } }
+        Bounds { pointwise, mean: off(mean, exact) }
     }
+}
+
+/// How far a mean is off, relative to what it should be where that is not 0.
+fn off(mean: f64, exact: f64) -> f64 {
+    if exact != 0.0 { (mean / exact - 1.0).abs() } else { mean.abs() }
+}
+
+/// Where a smooth curve is compared with a line.
+pub(super) fn few_nodes(curve: &Curve, from: f64, to: f64) -> Vec<(f64, f64)> {
+    (0..=8).map(|i| from + (to - from) * f64::from(i) / 8.0).map(|nm| (nm, curve.eval(nm))).collect()
 }
 
 /// The line over [from, to] with the curve's mean and first moment (so that its product with a linear factor has the

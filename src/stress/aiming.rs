@@ -39,11 +39,7 @@ impl Lamp {
             let way = p - from;
             way.length_squared() / (area * way.normalize().dot(normal).abs())
         };
-        // `share` of the rings, and an angle about `axis`.
-        let round = |share: f64, off: DVec3, axis: DVec3| {
-            let (s, t) = axis.normalize().any_orthonormal_pair();
-            bin(share, ROUND) * ROUND + bin(0.5 + off.dot(t).atan2(off.dot(s)) / TAU, ROUND)
-        };
+        let round = |share: f64, off: DVec3, axis: DVec3| ring_and_sector(share, off, axis.normalize(), ROUND);
         match self {
             Lamp::Triangle => {
                 let (u, v) = (b - a, c - a);
@@ -70,12 +66,21 @@ impl Lamp {
                 // Uniform in the cone that it fills.
                 let axis = a - from;
                 let cap = 1.0 - (1.0 - b.x.powi(2) / axis.length_squared()).sqrt();
-                let way = (p - from).normalize();
-                let share = 0.5 * way.distance_squared(axis.normalize()) / cap;
-                (round(share, way, axis), 1.0 / (TAU * cap))
+                (in_cone((p - from).normalize(), axis.normalize(), cap, ROUND), 1.0 / (TAU * cap))
             }
         }
     }
+}
+
+/// The cell of what is at `share` of [`ROUND`] rings, by its angle about `axis` among so many sectors.
+fn ring_and_sector(share: f64, off: DVec3, axis: DVec3, sectors: usize) -> usize {
+    let (s, t) = axis.any_orthonormal_pair();
+    bin(share, ROUND) * sectors + bin(0.5 + off.dot(t).atan2(off.dot(s)) / TAU, sectors)
+}
+
+/// The same of a direction in a cone about `axis` with 1 - cos of its half angle `cap`, rings of equal solid angle.
+fn in_cone(way: DVec3, axis: DVec3, cap: f64, sectors: usize) -> usize {
+    ring_and_sector(0.5 * way.distance_squared(axis) / cap, way, axis, sectors)
 }
 
 fn lamps(bench: &mut Bench, tests: usize) -> Result<()> {
@@ -117,7 +122,6 @@ fn lamps(bench: &mut Bench, tests: usize) -> Result<()> {
 }
 
 fn suns(bench: &mut Bench, tests: usize) -> Result<()> {
-    const RINGS: usize = 8;
     const SECTORS: usize = 12;
     for (case, (degrees, axis)) in [
         (0.01f64, DVec3::Z),
@@ -140,17 +144,15 @@ fn suns(bench: &mut Bench, tests: usize) -> Result<()> {
         let chosen = kernel.aim(DVec3::ZERO, &random(SAMPLES, 10 + case as u32))?;
         // The device's axis is one of f32, up to 6e-8 off: as much as the finest disk's rings tell apart is 100 times that.
         let axis = axis.normalize().as_vec3().as_dvec3().normalize();
-        let (s, t) = axis.any_orthonormal_pair();
         let cap = 2.0 * (0.5 * degrees.to_radians()).sin().powi(2);
-        let (mut counts, mut off) = (vec![0.0; RINGS * SECTORS], 0.0f64);
+        let (mut counts, mut off) = (vec![0.0; ROUND * SECTORS], 0.0f64);
         for (d, density) in &chosen {
             off = off.max((density * TAU * cap - 1.0).abs());
-            let share = 0.5 * d.normalize().distance_squared(axis) / cap;
-            counts[bin(share, RINGS) * SECTORS + bin(0.5 + d.dot(t).atan2(d.dot(s)) / TAU, SECTORS)] += 1.0;
+            counts[in_cone(d.normalize(), axis, cap, SECTORS)] += 1.0;
         }
-        let each = f64::from(SAMPLES) / (RINGS * SECTORS) as f64;
+        let each = f64::from(SAMPLES) / (ROUND * SECTORS) as f64;
         let name = format!("a sun of {degrees}°");
-        check(bench, name.clone(), p_value(&counts, &[each; RINGS * SECTORS]), tests);
+        check(bench, name.clone(), p_value(&counts, &[each; ROUND * SECTORS]), tests);
         bench.check_within(format!("{name}: densities, relative"), 0.0, (off, 0.0), 1e-5);
         // Met where it is aimed at: all but the rim, which f32 blurs.
         let directions: Vec<DVec3> = chosen.iter().map(|(d, _)| *d).collect();

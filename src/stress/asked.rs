@@ -26,8 +26,8 @@ pub fn random<const N: usize>(count: u32, seed: u32) -> Vec<[f32; N]> {
     (0..count).map(|i| std::array::from_fn(|j| number(N as u32 * i + j as u32))).collect()
 }
 
-/// A compiled kernel of one question a thread, and what it binds.
-struct Kernel<'a> {
+/// A compiled kernel of one question a thread, and what it binds: `asked` and `given` of group 1 beside the scene.
+pub struct Kernel<'a> {
     gpu: &'a Gpu,
     pass: Pass,
     scene: SceneBuffers,
@@ -36,19 +36,23 @@ struct Kernel<'a> {
 }
 
 impl<'a> Kernel<'a> {
-    fn new(gpu: &'a Gpu, prepared: &Prepared, modules: &[Module]) -> Result<Kernel<'a>> {
+    /// `module` in the place of the pass that follows paths, after all that it is made of.
+    pub fn around(gpu: &'a Gpu, prepared: &Prepared, module: Module) -> Result<Kernel<'a>> {
+        let mut modules = prepared.bounce_modules();
+        modules.pop();
+        modules.push(module);
         let windows = upload::windows(prepared, device_limits(gpu).binding)?;
         let scene = SceneBuffers::new(gpu, prepared, &windows)?;
-        let pass = Pass::new(gpu, &shader::compose(modules, &prepared.defines(&windows)))?;
+        let pass = Pass::new(gpu, &shader::compose(&modules, &prepared.defines(&windows)))?;
         let unused = buffer::empty(gpu, "unused", 256, wgpu::BufferUsages::STORAGE);
         Ok(Kernel { gpu, pass, scene, unused })
     }
 
     /// So many `answers` to what is `asked`.
-    fn ask(&self, asked: &[[f32; 4]], answers: usize) -> Result<Vec<[f32; 4]>> {
+    pub fn ask<T: bytemuck::Pod>(&self, asked: &[[f32; 4]], answers: usize) -> Result<Vec<T>> {
         let gpu = self.gpu;
         let input = buffer::storage(gpu, "asked", asked)?;
-        let size = 16 * answers as u64;
+        let size = (size_of::<T>() * answers) as u64;
         let output = buffer::empty(gpu, "given", size, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC);
         let bind = |group| {
             self.pass.bind(gpu, group, |name| match name {
@@ -92,11 +96,7 @@ pub struct Scattering<'a>(Kernel<'a>);
 
 impl<'a> Scattering<'a> {
     pub fn new(gpu: &'a Gpu, prepared: &Prepared) -> Result<Scattering<'a>> {
-        let mut modules = prepared.bounce_modules();
-        // Everything but the pass itself.
-        modules.pop();
-        modules.push(shader::CHOOSE);
-        Ok(Scattering(Kernel::new(gpu, prepared, &modules)?))
+        Ok(Scattering(Kernel::around(gpu, prepared, shader::CHOOSE)?))
     }
 
     /// Directions for random numbers (two for the direction, two for the part), light arriving along `o`.
@@ -132,10 +132,7 @@ pub struct Aiming<'a>(Kernel<'a>);
 
 impl<'a> Aiming<'a> {
     pub fn new(gpu: &'a Gpu, prepared: &Prepared) -> Result<Aiming<'a>> {
-        let mut modules = prepared.bounce_modules();
-        modules.pop();
-        modules.push(shader::AIM);
-        Ok(Aiming(Kernel::new(gpu, prepared, &modules)?))
+        Ok(Aiming(Kernel::around(gpu, prepared, shader::AIM)?))
     }
 
     /// From `origin` (device units), for pairs of random numbers.
@@ -154,6 +151,6 @@ impl<'a> Aiming<'a> {
     fn ask(&self, origin: DVec3, questions: Vec<[f32; 4]>) -> Result<Vec<Aimed>> {
         let count = questions.len();
         let asked: Vec<[f32; 4]> = std::iter::once(origin.as_vec3().extend(0.0).to_array()).chain(questions).collect();
-        Ok(self.0.ask(&asked, count)?.iter().map(|given| (vector(given), f64::from(given[3]))).collect())
+        Ok(self.0.ask(&asked, count)?.iter().map(|given: &[f32; 4]| (vector(given), f64::from(given[3]))).collect())
     }
 }

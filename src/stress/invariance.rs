@@ -52,10 +52,11 @@ fn still_life(channels: &str) -> String {
 }
 
 fn machinery(bench: &mut Bench) -> Result<()> {
+    const SAMPLES: u32 = 64;
     let folder = tempfile::tempdir().map_err(|error| Error::storage(&std::env::temp_dir(), error))?;
     let scene = bench.scene(&still_life("equal = { from = 400, to = 700, count = 30 }"))?;
     let machine = bench.machine();
-    let job = |name: &str, samples: u32| Job {
+    let job = |name: &str| Job {
         scene: scene.clone(),
         output: folder.path().join(name),
         existing: Existing::Join,
@@ -63,7 +64,7 @@ fn machinery(bench: &mut Bench) -> Result<()> {
         seed: 7,
         tile: Some(8),
         uncertainty: true,
-        stop: StopRule { samples: Some(samples), ..StopRule::default() },
+        stop: StopRule { samples: Some(SAMPLES), ..StopRule::default() },
         preview: None,
         profile: false,
         devices: machine.several(1),
@@ -75,36 +76,36 @@ fn machinery(bench: &mut Bench) -> Result<()> {
         let cube = Cube::open(&output)?;
         let mut bits = Vec::new();
         for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
-            bits.extend(cube.spectrum(x, y)?.unwrap_or_default().iter().map(|v| v.to_bits()));
+            let spectrum = cube.spectrum(x, y)?.ok_or_else(|| Error::Internal(format!("no pixel {x}, {y}")))?;
+            bits.extend(spectrum.iter().map(|v| v.to_bits()));
         }
         Ok(bits)
     };
     let render = |job: &Job| schedule::run(job, &machine.interrupt, &mut |_| Ok(())).map(|_| ());
 
-    const SAMPLES: u32 = 64;
-    let first = job("first.zarr", SAMPLES);
+    let first = job("first.zarr");
     render(&first)?;
     let expected = bits(first.output)?;
     let mut others = Vec::new();
     for devices in [2, 3] {
-        let job = Job { devices: machine.several(devices), ..job(&format!("devices-{devices}.zarr"), SAMPLES) };
+        let job = Job { devices: machine.several(devices), ..job(&format!("devices-{devices}.zarr")) };
         render(&job)?;
         others.push((format!("{devices} devices"), bits(job.output)?));
     }
     // The least that a render says it needs.
-    let refusal = render(&Job { memory: Some(1), ..job("memory.zarr", SAMPLES) }).err().map(|error| error.to_string());
+    let refusal = render(&Job { memory: Some(1), ..job("memory.zarr") }).err().map(|error| error.to_string());
     let least = refusal.iter().flat_map(|text| text.split(' ')).filter_map(|word| word.parse().ok()).nth(1);
     let least: u64 = least.ok_or_else(|| Error::Internal(format!("no least memory is named: {refusal:?}")))?;
-    let little = Job { memory: Some(least), ..job("memory.zarr", SAMPLES) };
+    let little = Job { memory: Some(least), ..job("memory.zarr") };
     render(&little)?;
     others.push((format!("in {least} bytes"), bits(little.output)?));
     // 15 tiles of 8 x 8: the last ones first.
     for tiles in [10..15, 3..10, 0..3] {
-        render(&Job { tiles: Some(tiles), ..job("order.zarr", SAMPLES) })?;
+        render(&Job { tiles: Some(tiles), ..job("order.zarr") })?;
     }
     others.push(("tiles in another order".into(), bits(folder.path().join("order.zarr"))?));
-    // Stopped in order after a third of the samples, then gone on with.
-    let stopped = job("stopped.zarr", SAMPLES);
+    // Stopped in order after a quarter of the samples, then gone on with.
+    let stopped = job("stopped.zarr");
     let interrupt = Arc::new(Interrupt::default());
     let mut stop = |event: Event| {
         if matches!(event, Event::Epoch(status) if status.samples >= SAMPLES / 4) {
@@ -117,7 +118,7 @@ fn machinery(bench: &mut Bench) -> Result<()> {
     render(&stopped)?;
     others.push((format!("stopped ({was_stopped})"), bits(stopped.output)?));
     // Broken off by an error of whoever listens, in the middle of an epoch, as often as it takes.
-    let broken = job("broken.zarr", SAMPLES);
+    let broken = job("broken.zarr");
     let mut ends = 0;
     loop {
         let mut events = 0;

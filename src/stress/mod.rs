@@ -3,7 +3,7 @@
 //! Cases are scenes as users write them, rendered by the renderer that they use; answers are closed forms, worked out beside each.
 
 mod aiming;
-mod asked;
+pub mod asked;
 mod bench;
 mod chi_square;
 mod geometry;
