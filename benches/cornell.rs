@@ -15,7 +15,7 @@ use spectile::Result;
 use spectile::cube::{Cube, Existing};
 use spectile::gpu::adapter::{Gpu, Selection};
 use spectile::render::job::{Job, StopRule};
-use spectile::render::prepare::Prepared;
+use spectile::device::prepared::Prepared;
 use spectile::render::schedule::{self, Event};
 use spectile::render::wave::Budget;
 use spectile::render::worker::Worker;

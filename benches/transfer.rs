@@ -14,7 +14,7 @@ use spectile::Result;
 use spectile::cube::{Existing, Header, Writer};
 use spectile::gpu::adapter::Gpu;
 use spectile::render::plan;
-use spectile::render::prepare::Prepared;
+use spectile::device::prepared::Prepared;
 use spectile::render::wave::Budget;
 use spectile::render::worker::{UnitRect, Worker};
 use spectile::scene;

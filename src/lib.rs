@@ -1,6 +1,6 @@
 //! Spectile: a spectral image renderer.
 //!
-//! `scene` (parsed, checked, in metres and nanometres) → `render::prepare` → `gpu` → `render` (generate,
+//! `scene` (parsed, checked, in metres and nanometres) → `device::prepared` → `gpu` → `render` (generate,
 //! evaluate, transfer, merge) → `cube` (a Zarr v3 store). `reference` is an independent f64 path tracer.
 
 pub mod accel;

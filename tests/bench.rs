@@ -11,7 +11,7 @@ use device::{Settings, render};
 use glam::{DVec2, DVec3};
 use scene_builder::*;
 use serde_json::Value;
-use spectile::render::prepare::Prepared;
+use spectile::device::prepared::Prepared;
 use spectile::report::everything::with_everything;
 use spectile::scene::{Filter, Projection, Sides};
 use spectile::spectral::Channels;

@@ -7,9 +7,9 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use spectile::gpu::shader::{Source, compose};
+use spectile::device::text::{Source, compose};
 use spectile::gpu::upload;
-use spectile::render::prepare::Prepared;
+use spectile::device::prepared::Prepared;
 use spectile::render::wave::{Budget, DeviceLimits, WavePlan};
 use spectile::scene;
 

@@ -7,7 +7,7 @@ mod statistics;
 use device::{Settings, render};
 use glam::{DVec2, DVec3};
 use scene_builder::*;
-use spectile::render::prepare::Prepared;
+use spectile::device::prepared::Prepared;
 use spectile::render::wave::{Budget, DeviceLimits, WavePlan};
 use spectile::scene::{Evaluator, Field, Filter, Projection, Sampler, Scene, Sides};
 use spectile::spectral::{Channels, Curve, Outside};

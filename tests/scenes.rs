@@ -16,7 +16,7 @@ use std::sync::OnceLock;
 
 use device::{Settings, render};
 use spectile::cube::Cube;
-use spectile::render::prepare::Prepared;
+use spectile::device::prepared::Prepared;
 use spectile::scene::{self, Evaluator};
 use tempfile::TempDir;
 

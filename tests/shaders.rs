@@ -7,9 +7,9 @@ use glam::{DMat3, DVec2, DVec3};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use scene_builder::*;
 use spectile::gpu::adapter::STORAGE_BUFFERS;
-use spectile::gpu::shader::{Source, compose};
-use spectile::render::compose::{EvaluateShape, WindowList, Windows};
-use spectile::render::prepare::{Features, Prepared};
+use spectile::device::text::{Source, compose};
+use spectile::device::kernels::{EvaluateShape, WindowList, Windows};
+use spectile::device::prepared::{Features, Prepared};
 use spectile::scene::{
     Attributes, Evaluator, Field, Filter, Projection, Sampler, Scene, Shape, Sides, Texels, TextureKind,
 };

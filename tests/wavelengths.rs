@@ -10,7 +10,7 @@ use glam::{DVec2, DVec3};
 use scene_builder::heat::infrared;
 use scene_builder::*;
 use spectile::reference;
-use spectile::render::prepare::Prepared;
+use spectile::device::prepared::Prepared;
 use spectile::scene::{Field, Filter, Projection, Scene, Sides, Wavelengths};
 use spectile::spectral::{Channels, Curve, Outside, Response};
 use statistics::*;

@@ -15,7 +15,7 @@ use crate::gpu::adapter::{Gpu, Selection};
 use crate::render::job::StopRule;
 use crate::render::plan;
 use crate::render::pool::MERGE_THREADS;
-use crate::render::prepare::Prepared;
+use crate::device::prepared::Prepared;
 use crate::render::wave::{Budget, WavePlan};
 use crate::render::worker::Worker;
 use crate::scene::Scene;

@@ -13,7 +13,7 @@ use crate::cube::{Cube, Existing, Header, check_target, make, now_s};
 use crate::files::{self, format_bytes};
 use crate::render::job::StopRule;
 use crate::render::plan;
-use crate::render::prepare::Prepared;
+use crate::device::prepared::Prepared;
 use crate::slurm::client::{self, Tried};
 use crate::slurm::{self, Job, Request, Submitted, script};
 use crate::{Error, Result};

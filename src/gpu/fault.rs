@@ -7,7 +7,7 @@ use std::sync::{Arc, Condvar, Mutex};
 use std::time::Duration;
 
 use crate::gpu::adapter::{Gpu, Trouble};
-use crate::gpu::layout::Wave;
+use crate::device::words::Wave;
 
 /// Moments in the life of a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

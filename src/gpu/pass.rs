@@ -1,7 +1,7 @@
 //! A compute pass: a composed shader, its pipeline, and bindings found by the names they have in the WGSL.
 
 use crate::gpu::adapter::Gpu;
-use crate::gpu::shader::Source;
+use crate::device::text::Source;
 use crate::{Error, Result};
 
 /// A compute pipeline whose bind groups are made from the shader's own declarations.

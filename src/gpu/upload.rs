@@ -3,8 +3,8 @@
 use crate::files::format_bytes;
 use crate::gpu::adapter::Gpu;
 use crate::gpu::buffer;
-use crate::render::compose::{WindowList, Windows};
-use crate::render::prepare::Prepared;
+use crate::device::kernels::{WindowList, Windows};
+use crate::device::prepared::Prepared;
 use crate::{Error, Result};
 
 const NODE_BYTES: u64 = 80;

@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 use crate::cube::{self, BLOCK, Header};
 use crate::files::format_bytes;
 use crate::gpu::upload;
-use crate::render::prepare::{Features, Prepared};
+use crate::device::prepared::{Features, Prepared};
 use crate::render::wave::{Budget, DeviceLimits, WavePlan};
 use crate::scene::{Evaluator, Scene};
 use crate::{Error, Result};
@@ -81,10 +81,10 @@ pub struct FeatureLine {
 /// Every optional part, used or left out.
 pub fn feature_lines(prepared: &Prepared, waves: &WavePlan) -> Vec<FeatureLine> {
     let f: &Features = &prepared.features;
-    let module = |m: crate::gpu::shader::Module| format!("{} lines of shader", m.text.lines().count());
+    let module = |m: crate::device::text::Module| format!("{} lines of shader", m.text.lines().count());
     let bounces = prepared.frame.max_bounces + 1;
     let line = |name, used, effect: String| FeatureLine { name, used, effect };
-    use crate::gpu::shader as s;
+    use crate::device::text as s;
     vec![
         line("area lights", f.emitters, format!("{bounces} records of {} bytes a path", prepared.record_bytes())),
         line("environment", f.environment, "one light to choose from".into()),

@@ -13,10 +13,10 @@ use crate::gpu::adapter::Gpu;
 use crate::gpu::buffer::{self, WARM_UP};
 #[cfg(test)]
 use crate::gpu::fault::Phase;
-use crate::gpu::layout::Counters;
-use crate::gpu::self_test;
+use crate::device::words::Counters;
+use crate::render::self_test;
 use crate::preview::Source;
-use crate::render::prepare::Prepared;
+use crate::device::prepared::Prepared;
 use crate::render::queue::{Group, Next, Queue};
 use crate::render::watch::{Device, Reports};
 use crate::render::wave::{Budget, WavePlan};

@@ -13,7 +13,7 @@ use crate::gpu::adapter::Gpu;
 use crate::render::job::{Job, SURE_EPOCHS};
 use crate::render::plan;
 use crate::render::pool::{Merged, Pool, Report, Tally};
-use crate::render::prepare::Prepared;
+use crate::device::prepared::Prepared;
 use crate::render::queue::Queue;
 use crate::render::watch::{Polled, Reports};
 use crate::render::worker::{Interrupt, Profile, check_interrupt};

@@ -2,10 +2,10 @@
 
 use crate::files::format_bytes;
 use crate::gpu::buffer;
-use crate::gpu::layout::{Counters, Step, Wave};
-use crate::gpu::self_test::LOOP_LIMIT;
+use crate::device::words::{Counters, Step, Wave};
+use crate::device::words::LOOP_LIMIT;
 use crate::gpu::upload;
-use crate::render::prepare::Prepared;
+use crate::device::prepared::Prepared;
 use crate::{Error, Result};
 
 /// Bytes of a path between the passes, beside its state and its records: head (8), its places in the queues (8),

@@ -9,14 +9,14 @@ use crate::gpu::adapter::Gpu;
 use crate::gpu::buffer;
 #[cfg(test)]
 use crate::gpu::fault::Phase;
-use crate::gpu::layout::{Counters, Proof, Wave};
+use crate::device::words::{Counters, Proof, Wave};
 use crate::gpu::pass::Pass;
-use crate::gpu::shader;
+use crate::device::text;
 use crate::gpu::timestamps::Timestamps;
 use crate::gpu::upload::{self, SceneBuffers};
-use crate::render::compose::EvaluateShape;
+use crate::device::kernels::EvaluateShape;
 use crate::render::patience::Patience;
-use crate::render::prepare::Prepared;
+use crate::device::prepared::Prepared;
 use crate::render::wave::{Budget, DeviceLimits, WavePlan};
 use crate::{Error, Result};
 

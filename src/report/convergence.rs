@@ -5,9 +5,9 @@ use std::time::{Duration, Instant};
 
 use crate::cube::{Cube, epoch_samples};
 use crate::gpu::adapter::Gpu;
-use crate::gpu::layout::Counters;
+use crate::device::words::Counters;
 use crate::render::plan;
-use crate::render::prepare::Prepared;
+use crate::device::prepared::Prepared;
 use crate::render::wave::Budget;
 use crate::render::worker::{Interrupt, UnitRect, Worker, check_interrupt};
 use crate::scene::Scene;

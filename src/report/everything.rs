@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 
-use crate::accel;
+use crate::device::accel;
 use crate::scene::{
     Absorber, Attributes, Bsdf, Emission, Environment, EnvironmentMap, Field, Grid, Interior, Light, Material, Medium,
     Mesh, Object, Reflectance, Scene, Shape, Sides, Spectrum, Temperature, Texels, Texture, TextureKind, Weight,

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use crate::Result;
 use crate::gpu::adapter::Gpu;
-use crate::render::prepare::Prepared;
+use crate::device::prepared::Prepared;
 use crate::render::wave::{Budget, WavePlan};
 use crate::render::worker::{Interrupt, UnitRect, Worker};
 use crate::scene::Scene;

@@ -429,7 +429,7 @@ mod tests {
 
     /// A jagged table of `n` nodes.
     fn jagged(n: usize, seed: u32) -> Curve {
-        let value = |i: usize| f64::from(crate::render::rng::hash(seed ^ i as u32)) / 4.3e9;
+        let value = |i: usize| f64::from(crate::device::rng::hash(seed ^ i as u32)) / 4.3e9;
         let points: Vec<_> = (0..n).map(|i| (380.0 + 400.0 * i as f64 / (n - 1) as f64, value(i))).collect();
         table(&points, Outside::Zero)
     }

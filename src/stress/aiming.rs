@@ -8,7 +8,7 @@ use super::asked::{Aimed, Aiming, SAMPLES, bin, random};
 use super::chi_square::{check, p_value};
 use super::{Bench, Case};
 use crate::Result;
-use crate::render::prepare::Prepared;
+use crate::device::prepared::Prepared;
 use crate::scene::{Environment, EnvironmentMap, Texels};
 
 pub const CASES: &[Case] = &[Case {

@@ -6,10 +6,10 @@ use crate::Result;
 use crate::gpu::adapter::Gpu;
 use crate::gpu::buffer;
 use crate::gpu::pass::Pass;
-use crate::gpu::shader::{self, Module};
+use crate::device::text::{self, Module};
 use crate::gpu::upload::{self, SceneBuffers};
-use crate::render::prepare::Prepared;
-use crate::render::rng::hash;
+use crate::device::prepared::Prepared;
+use crate::device::rng::hash;
 use crate::render::worker::device_limits;
 
 /// Random numbers of each question.

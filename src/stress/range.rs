@@ -4,7 +4,7 @@ use super::bench::{F32, TABLES, WALL, lamp};
 use super::{Bench, Case};
 use crate::Result;
 use crate::cube::{epoch_samples, merge_means};
-use crate::render::rng::hash;
+use crate::device::rng::hash;
 use crate::spectral::planck;
 
 pub const CASES: &[Case] = &[

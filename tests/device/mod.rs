@@ -5,9 +5,9 @@
 use std::sync::{Arc, Mutex, MutexGuard};
 
 use spectile::gpu::adapter::Gpu;
-use spectile::gpu::layout::Counters;
+use spectile::device::words::Counters;
 use spectile::reference;
-use spectile::render::prepare::Prepared;
+use spectile::device::prepared::Prepared;
 use spectile::render::wave::Budget;
 use spectile::render::worker::{UnitRect, Worker};
 use spectile::scene::Scene;

@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3, Vec3};
-use spectile::render::prepare::Prepared;
+use spectile::device::prepared::Prepared;
 use spectile::scene::{Filter, Mesh, Projection, Shape, Sides};
 
 use crate::device::{self, Epochs, Settings};

@@ -19,7 +19,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 use scene_builder::Builder;
-use spectile::render::rng::hash;
+use spectile::device::rng::hash;
 use spectile::scene::{Mesh, Scene, Shape};
 
 /// Uniform over [0, 1), the same in every run.

@@ -3,7 +3,7 @@
 
 use glam::{DMat3, DVec2, DVec3};
 use spectile::reference;
-use spectile::render::prepare::Prepared;
+use spectile::device::prepared::Prepared;
 use spectile::scene::{Attributes, Camera, Filter, Projection, Scene, Shape, Sides, TextureKind};
 use spectile::spectral::{Channels, Curve, Outside, planck as law};
 

@@ -1,8 +1,8 @@
 //! Heat on devices: closed forms, and against the f64 path tracer (VALIDATION 1.1, 1.2, 1.6).
 
 use glam::{DVec2, DVec3};
-use spectile::gpu::layout::{Emitter, Material};
-use spectile::render::prepare::Prepared;
+use spectile::device::words::{Emitter, Material};
+use spectile::device::prepared::Prepared;
 use spectile::scene::{Attributes, Filter, Projection, Scene, Sides, Temperature};
 use spectile::spectral::{Channels, Curve, Outside, planck as law};
 

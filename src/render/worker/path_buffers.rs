@@ -2,7 +2,7 @@
 
 use crate::gpu::adapter::Gpu;
 use crate::gpu::buffer;
-use crate::gpu::layout::{Counters, Wave};
+use crate::device::words::{Counters, Wave};
 use crate::render::wave::WavePlan;
 
 /// The buffers of a wave, by the names that shaders have for them.

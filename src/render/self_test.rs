@@ -1,0 +1,65 @@
+//! The start-up self-test: catches drivers that cut loops short or compute wrong before they spoil a cube.
+
+use crate::gpu::adapter::Gpu;
+use crate::gpu::buffer;
+use crate::gpu::pass::Pass;
+use crate::device::text::{self, Defines};
+use crate::device::rng;
+use crate::{Error, Result};
+
+const LANES: u32 = 64;
+const WORDS: usize = 6;
+/// The most loop iterations that one invocation of any kernel may run (DESIGN section 7).
+pub const LOOP_LIMIT: u32 = 32_768;
+const NAN_BITS: u32 = 0x7fc0_0000;
+const SEED: u64 = 0x0123_4567_89ab_cdef;
+
+/// Runs the kernel and compares every word with what it must be.
+pub fn run(gpu: &Gpu) -> Result<()> {
+    let _watched = gpu.deadline.watch(buffer::WARM_UP);
+    let source = shader::compose(&[shader::RNG, shader::SELF_TEST], &Defines::default());
+    let pass = Pass::new(gpu, &source)?;
+    let input = buffer::storage(gpu, "self-test input", &[LOOP_LIMIT, SEED as u32, (SEED >> 32) as u32, NAN_BITS])?;
+    let size = u64::from(LANES) * WORDS as u64 * 4;
+    let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
+    let results = buffer::empty(gpu, "self-test results", size, usage);
+    let group = pass.bind(gpu, 0, |name| match name {
+        "results" => Some(results.as_entire_buffer_binding()),
+        "input" => Some(input.as_entire_buffer_binding()),
+        _ => None,
+    })?;
+    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("self-test") });
+    {
+        let mut compute = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+        compute.set_pipeline(&pass.pipeline);
+        compute.set_bind_group(0, &group, &[]);
+        compute.dispatch_workgroups(1, 1, 1);
+    }
+    let submission = gpu.queue.submit([encoder.finish()]);
+    buffer::wait(gpu, submission, buffer::WARM_UP)?;
+    let got: Vec<u32> = buffer::read(gpu, &results, size, buffer::WARM_UP)?;
+    for lane in 0..LANES {
+        let at = lane as usize * WORDS;
+        let expected = expected(lane);
+        for (what, (got, expected)) in EXPECTED_NAMES.iter().zip(got[at..at + WORDS].iter().zip(expected)) {
+            if *got != expected {
+                return Err(Error::NoDevice(format!(
+                    "{}: the driver computes wrong: self-test of {what}, lane {lane}: {got} instead of {expected}; \
+                     update the driver or choose another device",
+                    gpu.name
+                )));
+            }
+        }
+    }
+    Ok(())
+}
+
+const EXPECTED_NAMES: [&str; WORDS] =
+    ["a long loop", "nested loops", "a private array", "random numbers", "random numbers", "not-a-number bits"];
+
+fn expected(lane: u32) -> [u32; WORDS] {
+    let single = (0..LOOP_LIMIT / 2).map(|i| (i ^ lane) & 1).sum();
+    let stack = (0..lane % 32).map(|i| i + i * lane).sum();
+    let [x, y] = rng::sobol_pair(rng::pixel_key(SEED, lane, 7, 3), lane, lane & 63, 63);
+    [single, LOOP_LIMIT / 256 * 128, stack, x, y, 1]
+}
