@@ -1,5 +1,5 @@
-// Materials of general scenes: lists of parts, the lobes that DESIGN section 6 chooses among. `src/gpu/layout.rs` holds the
-// structures' Rust twins.
+// Materials of general scenes: lists of parts, the lobes that a path chooses among (docs/METHOD.md, Decisions).
+// `src/gpu/layout.rs` holds the structures' Rust twins.
 
 struct SurfaceMaterial {
     first_part: u32,
