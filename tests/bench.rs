@@ -52,7 +52,7 @@ fn a_report_of_all_evaluators() {
         let conventional = row["evaluator"] == "pt";
         let channels = number("channels");
         if conventional {
-            // 32 bytes, 16 a channel (the method, section 4.2), heads, queues and the records of one vertex.
+            // 32 bytes, 16 a channel (Hoarau et al. 2018, section 4.2), heads, queues and the records of one vertex.
             assert_eq!(number("path_bytes"), 32.0 + 16.0 * channels + 16.0 + 24.0, "{row}");
         } else if row["kernels"] == "own" {
             assert_eq!(number("path_bytes"), 136.0, "{row}");

@@ -1,4 +1,4 @@
-//! How noise falls with samples, and that it does not depend on how many channels share the paths (VALIDATION 1.8).
+//! How noise falls with samples, and that it does not depend on how many channels share the paths.
 
 mod device;
 mod scene_builder;

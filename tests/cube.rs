@@ -60,7 +60,7 @@ fn the_first_unit_keeps_negative_zero_and_subnormals() {
     }
 }
 
-/// Portions of the first epoch, then whole epochs (DESIGN section 2).
+/// Portions of the first epoch, then whole epochs (docs/METHOD.md, Epochs).
 const PORTIONS: [u32; 11] = [1, 1, 2, 4, 8, 16, 32, 64, 64, 64, 64];
 
 #[test]

@@ -192,7 +192,7 @@ fn no_evaluator_is_biased() {
     }
 }
 
-/// Bytes of a path: 32 and 16 a channel for the conventional path tracer, as in the method (section 4.2); for the deferred ones
+/// Bytes of a path: 32 and 16 a channel for the conventional path tracer, as in Hoarau et al. 2018, section 4.2; for the deferred ones
 /// records, whatever the number of channels. Beside that 8 for its head and 8 for its places in the queues.
 #[test]
 fn only_the_conventional_path_tracer_takes_memory_by_channel() {

@@ -76,7 +76,7 @@ fn a_point_light_on_a_patch() {
     }
 }
 
-/// VALIDATION 1.1: a point at the centre of a sphere, L = ρ I / (π R²) (1 - ρⁿ) / (1 - ρ) after n bounces.
+/// A point at the centre of a sphere, L = ρ I / (π R²) (1 - ρⁿ) / (1 - ρ) after n bounces.
 #[test]
 fn a_point_light_in_a_sphere() {
     for (rho, bounces, radius) in [(0.5, 60, 1.0), (0.5, 1, 1.0), (0.8, 8, 3.0)] {
@@ -147,7 +147,7 @@ fn grey_map(builder: Builder, size: [u32; 2], values: &[f32]) -> Builder {
     builder.map(size, Texels::Spectral { nm: vec![300.0, 800.0], radiance: radiance.into() })
 }
 
-/// The map's value in direction `m` of its own frame: DESIGN section 3, written out again.
+/// The map's value in direction `m` of its own frame (v = 0 is up, u = ½ along -z and growing towards +x), written out again.
 fn bilinear(size: [u32; 2], values: &[f32], m: DVec3) -> f64 {
     let [width, height] = size.map(f64::from);
     let u = 0.5 + m.x.atan2(-m.z) / TAU;
@@ -164,7 +164,7 @@ fn bilinear(size: [u32; 2], values: &[f32], m: DVec3) -> f64 {
     sum
 }
 
-/// Directions all over the sphere look up what the contract says, turned maps included; the poles and the seam among them.
+/// Directions all over the sphere look up what was written there, turned maps included; the poles and the seam among them.
 #[test]
 fn maps_are_seen_as_written() {
     let size = [5, 4];

@@ -48,7 +48,7 @@ fn prism_at_minimum_deviation() {
     }
 }
 
-/// Reflectances by angle, a sky of radiance 1 mirrored by a plane over a black one: VALIDATION 1.4, s and p by Fresnel's
+/// Reflectances by angle, a sky of radiance 1 mirrored by a plane over a black one: s and p by Fresnel's
 /// equations, with Brewster's angle for three indices; and metals.
 #[test]
 fn reflectances_by_angle() {
@@ -78,7 +78,7 @@ fn reflectances_by_angle() {
     }
 }
 
-/// From inside glass: total reflection from the critical angle on (VALIDATION 1.4: 41.8103 degrees for 1.5, 48.6066 for
+/// From inside glass: total reflection from the critical angle on (41.8103 degrees for 1.5, 48.6066 for
 /// 1.333, 14.4775 for 4), and less than total before it.
 #[test]
 fn critical_angles() {

@@ -1,4 +1,4 @@
-//! Gases on devices: closed forms (VALIDATION 1.3), cameras and volumes within volumes, ways to lights.
+//! Gases on devices: closed forms (docs/METHOD.md), cameras and volumes within volumes, ways to lights.
 //!
 //! Where a path has nothing to choose, every sample is the answer to f32 rounding: Sums over voxels add half a digit each, and
 //! rays start 2⁻¹⁶ of the scene's half size off the boundaries that they pass.

@@ -1,4 +1,4 @@
-//! The reference path tracer against closed forms (VALIDATION sections 1.1, 1.2, 1.6, 1.7).
+//! The reference path tracer against closed forms (docs/METHOD.md lists them).
 //!
 //! Two kinds of bound: where every single sample has the exact value, f64 rounding (stated as a multiple of ε); else
 //! a two-sided z-test with the estimator's own standard error at [`ALPHA`] per test, Sidak-corrected over pixels x
@@ -55,7 +55,7 @@ fn table(nm: &[f64], value: &[f64]) -> Curve {
     Curve::Linear { nm: nm.to_vec(), value: value.to_vec(), outside: Outside::Hold }
 }
 
-/// Radiance after `vertices` surface vertices in a closed cavity (VALIDATION 1.1).
+/// Radiance after `vertices` surface vertices in a closed cavity.
 fn cavity(emission: f64, reflectance: f64, vertices: i32) -> f64 {
     emission * (1.0 - reflectance.powi(vertices)) / (1.0 - reflectance)
 }
@@ -175,7 +175,7 @@ fn parallel_grey_plates() {
     }
 }
 
-// ---- Spectra and channels (1.6, Eq. 4)
+// ---- Spectra and channels
 
 /// Mean radiance of a black body over overlapping bands, width x mean = the published band radiances.
 #[test]

@@ -1,4 +1,5 @@
-//! `spectile stress` as users meet it: the quick set passes, and what it prints is what DESIGN section 8 asks for.
+//! `spectile stress` as users meet it: the quick set passes, and what it prints can be read again: answer, error, bound,
+//! verdict.
 
 use std::process::{Command, Output};
 

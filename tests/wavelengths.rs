@@ -1,5 +1,5 @@
-//! Wavelengths drawn by what emits (DESIGN section 6, `wavelengths = "emission"`) against those of Eq. 4 and against the f64 reference,
-//! which knows nothing but Eq. 4: the same radiance, with less noise where emission is spiky.
+//! Wavelengths drawn by what emits (`wavelengths = "emission"`; docs/METHOD.md) against even ones (Eq. 4 of Hoarau et al. 2018) and
+//! against the f64 reference, which knows nothing but even ones: the same radiance, with less noise where emission is spiky.
 
 mod device;
 mod scene_builder;
@@ -158,7 +158,7 @@ fn heat_gases_and_the_sky() {
     against_reference("heat, gases, sky", &scene, 4096, 0.05);
 }
 
-/// Nothing emits in most channels, and lamps that are even within them: Eq. 4, and nothing is paid for.
+/// Nothing emits in most channels, and lamps that are even within them: even wavelengths, and nothing is paid for.
 #[test]
 fn even_emission_costs_nothing() {
     let mut scene = lit_room(visible(8)).build();

@@ -1,4 +1,4 @@
-// Evaluate, path by path (version 1 of the method, section 5.1 and Algorithm 1): a thread has one path, and goes through its channels
+// Evaluate, path by path (Hoarau et al. 2018, section 5.1 and Algorithm 1): a thread has one path, and goes through its channels
 // in batches of VECTORS x 4, for each of which it reads the whole path again. The state of a batch stays in registers. A dispatch
 // takes one sample of every pixel, so that nobody else refines the same mean.
 

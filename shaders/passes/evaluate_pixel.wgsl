@@ -1,7 +1,7 @@
 // Evaluate, pixel-major: a workgroup owns one pixel (several, when there are few channels) and a block of channels,
 // VECTORS x 4 channels a thread. It walks the pixel's saved paths in sample order, evaluates every channel along each, and
-// folds them into the running mean in registers; no atomics, one write at the end (Algorithm 1 of the method, with the
-// loops over paths and channels exchanged).
+// folds them into the running mean in registers; no atomics, one write at the end (Algorithm 1 of Hoarau et al. 2018,
+// with the loops over paths and channels exchanged).
 
 @compute @workgroup_size($WORKGROUP)
 fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,

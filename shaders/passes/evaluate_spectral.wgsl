@@ -1,4 +1,4 @@
-// Evaluate, spectrally parallel (version 2 of the method, section 5.2): a workgroup has one path (several, when there are few
+// Evaluate, spectrally parallel (Hoarau et al. 2018, section 5.2): a workgroup has one path (several, when there are few
 // channels), and each of its threads VECTORS x 4 of the channels, so that all read the same records at the same time. A dispatch
 // takes one sample of every pixel, so that nobody else refines the same mean.
 

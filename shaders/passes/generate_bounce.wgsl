@@ -3,7 +3,7 @@
 //
 // A vertex is saved as records (factor spectrum, source spectrum, weight), to be read as
 //     throughput *= factor;  radiance += weight * throughput * source,
-// with every wavelength-independent term of the path (densities, cosines, MIS) folded into the weight.
+// with every wavelength-independent term of the path (densities, cosines, MIS) multiplied into the weight.
 
 @group(1) @binding(0) var<uniform> wave: Wave;
 @group(1) @binding(1) var<storage, read> units: array<vec4<u32>>;

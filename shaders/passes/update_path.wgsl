@@ -1,4 +1,4 @@
-// The conventional path tracer (section 4 of the method), one bounce of every path that was under way: after `generate` has found
+// The conventional path tracer (Hoarau et al. 2018, section 4), one bounce of every path that was under way: after `generate` has found
 // the vertex, the state of all channels is read from memory, taken through what happened there, and written back. A workgroup has
 // one path (several, when there are few channels), each of its threads VECTORS x 4 of the channels.
 

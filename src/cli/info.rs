@@ -53,7 +53,7 @@ pub struct Args {
     pub json: bool,
 }
 
-/// Epochs below which an error estimate is only rough (DESIGN section 8).
+/// Epochs below which an error estimate is only rough: it is itself one from so few values.
 const ROUGH_BELOW: u32 = 8;
 
 pub fn run(args: &Args, output: &Output) -> Result<()> {

@@ -16,7 +16,7 @@ use crate::render::schedule::{Event, PREVIEW_PIXELS, Status, Summary};
 use crate::render::worker::check_interrupt;
 use crate::{Error, Result};
 
-/// Epochs below which an error estimate is only rough (DESIGN section 8).
+/// Epochs below which an error estimate is only rough: it is itself one from so few values.
 const ROUGH_BELOW: u32 = 8;
 /// Without a bar: lines about an epoch come at most this often, and some line at least this often.
 const LINE_EVERY: Duration = Duration::from_secs(1);

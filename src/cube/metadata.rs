@@ -294,7 +294,7 @@ fn first_difference(key: &str, a: &Value, b: &Value) -> Option<(String, String, 
     }
 }
 
-/// The arrays of DESIGN section 4, by name.
+/// The arrays of a cube, by name.
 fn arrays(header: &Header) -> Vec<(&'static str, Value)> {
     let channels = header.channels.len() as u64;
     let [width, height] = header.size.map(u64::from);

@@ -1,5 +1,4 @@
-//! The working cube: a Zarr v3 store with raw, memory-mapped chunks that other tools can open at any moment (DESIGN
-//! section 4).
+//! The working cube: a Zarr v3 store with raw, memory-mapped chunks that other tools can open at any moment.
 //!
 //! A tile of pixels with all its channels is one chunk, and one file. Units (tile, epoch) are merged into it one at a
 //! time: the new chunk is written aside, journalled, and renamed over the old one, never changed in place. So are the

@@ -1,5 +1,5 @@
-//! Putting a tile in order, under its lock: what a killed process, a full disk, a power cut or bit rot left of it
-//! (DESIGN section 4). Every step may be the last one and is done again by the next recovery.
+//! Putting a tile in order, under its lock: what a killed process, a full disk, a power cut or bit rot left of it.
+//! Every step may be the last one and is done again by the next recovery.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};

@@ -194,7 +194,7 @@ impl Cube {
         Err(Error::Usage(format!("{}: {what}", self.path.display())))
     }
 
-    /// The error estimate of every channel (DESIGN section 8), from the spread of the epochs: sqrt(Σ variance of the
+    /// The error estimate of every channel, from the spread of the epochs (docs/METHOD.md, Errors): sqrt(Σ variance of the
     /// mean / Σ mean²), sums over the pixels of all tiles begun. NaN while any of those has fewer than two epochs, 0
     /// where a channel is all zero. NaN in a cube made of another one's channels: these spread together.
     pub fn error_estimate(&self) -> Result<Vec<f64>> {

@@ -1,4 +1,4 @@
-//! A process's hold on tiles of a cube: units are merged aside, and committed in batches (DESIGN section 4).
+//! A process's hold on tiles of a cube: units are merged aside, and committed in batches.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
@@ -308,7 +308,8 @@ impl Writer {
         result
     }
 
-    /// The protocol of DESIGN section 4. The files lie aside already.
+    /// Makes a batch durable; its files lie aside already. First the journals speak of them, synced; then the renames, and the folders
+    /// synced: whoever dies between two steps leaves what `recover` can finish.
     fn commit(&self, batch: &BTreeMap<u32, Arc<Pending>>) -> Result<()> {
         if let Err(error) = self.journal(batch) {
             // What no journal speaks of is nothing but wasted space, which may be what is missing. The rest is in order

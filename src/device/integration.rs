@@ -1,10 +1,10 @@
-//! Responses that weight the radiance while rendering (DESIGN section 6, pre-integration): the device renders narrow *strata*
+//! Responses that weight the radiance while rendering (pre-integration): the device renders narrow *strata*
 //! of wavelength, weighted, and the channels are sums of theirs.
 //!
 //! The union of the supports is cut where a response begins or ends, and each piece into equal strata that are narrow for
 //! every response over it. A response has one inner channel for each of its strata: its value is the path's radiance at the
 //! stratum's wavelength times R there. Strata that responses share are the same intervals, so all of them see the same
-//! wavelengths of every path (Eq. 4 of the method, a stratum at a time). The weight is a spectrum like others on the device,
+//! wavelengths of every path (Eq. 4 of Hoarau et al. 2018, a stratum at a time). The weight is a spectrum like others on the device,
 //! with which the throughput of every path begins; sums are taken over the means of a unit, where nothing is lost by it.
 
 use crate::spectral::{Channels, Curve, Outside};

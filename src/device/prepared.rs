@@ -22,7 +22,7 @@ use crate::{Error, Result};
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// Evaluation walks the records of a path in one loop (DESIGN section 7).
+/// Evaluation walks the records of a path in one loop.
 const MAX_RECORDS: u32 = LOOP_LIMIT;
 /// Triangles up to which rays test them all. Measured on lavapipe: generating a path of the Cornell box, with 32 of them, takes 0.4 to
 /// 0.5 of the time that it takes with the BVH; kernels grow with every one.

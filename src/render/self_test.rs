@@ -9,7 +9,8 @@ use crate::{Error, Result};
 
 const LANES: u32 = 64;
 const WORDS: usize = 6;
-/// The most loop iterations that one invocation of any kernel may run (DESIGN section 7).
+/// The most loop iterations, of all its loops, that one invocation of any kernel may run: Mesa 22.3's lavapipe ends loops at 65,535
+/// without a word.
 pub const LOOP_LIMIT: u32 = 32_768;
 const NAN_BITS: u32 = 0x7fc0_0000;
 const SEED: u64 = 0x0123_4567_89ab_cdef;

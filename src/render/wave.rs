@@ -302,7 +302,7 @@ impl WavePlan {
 /// Measured: on lavapipe 16 k to 64 k paths are alike, fewer pay for dispatches and more for cache misses; a GPU wants a
 /// few hundred thousand threads in flight. Many channels and long paths lengthen evaluation, at most paths x channels x
 /// records: on lavapipe 0.6 ns each on one slow core, of a modest GPU 4e10 a second are assumed, so that a dispatch ends
-/// within about 200 ms (GPU watchdogs, DESIGN section 7).
+/// within about 200 ms: GPU watchdogs end what takes seconds.
 fn wanted_paths(software: bool, channels: u64, records: u64) -> u64 {
     let (most, evaluations) = if software { (1 << 15, 1 << 29) } else { (1 << 20, 1 << 33) };
     (evaluations / (channels * records)).clamp(LEAST_PATHS, most)

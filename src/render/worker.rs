@@ -1,4 +1,4 @@
-//! One device at work: generate, evaluate, transfer. The names are the method's own.
+//! One device at work: generate, evaluate (Hoarau et al. 2018, section 5.1), transfer.
 
 use std::collections::VecDeque;
 use std::sync::Arc;

@@ -1,4 +1,5 @@
-//! The report of `bench`: the conventional path tracer and the deferred ones side by side (Fig. 4, 7, 8 and 9 of the method).
+//! The report of `bench`: the conventional path tracer and the deferred ones side by side (Fig. 4, 7, 8 and 9 of
+//! Hoarau et al. 2018).
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -15,7 +16,7 @@ use crate::scene::Evaluator;
 
 /// Pixels of the frames that frames per second are told of: 512 x 512, one sample each.
 const FRAME_PIXELS: f64 = 512.0 * 512.0;
-/// Paths and memory for which limits are told: the pools of the method, and the memory of its GPU.
+/// Paths and memory for which limits are told: the pools of Hoarau et al. 2018, and the memory of their GPU.
 const POOLS: [u64; 3] = [512 * 512, 1024 * 1024, 2048 * 2048];
 const MEMORY: u64 = 4 << 30;
 /// Channels for which the largest pool is told.

@@ -1,4 +1,4 @@
-//! Reports (DESIGN section 8): what is measured, as CSV, JSON and one self-contained page of HTML.
+//! Reports: what is measured, as CSV, JSON and one self-contained page of HTML.
 
 pub mod bench;
 pub mod chart;

@@ -1,4 +1,4 @@
-//! Probabilities of decisions, common to all channels (DESIGN section 6).
+//! Probabilities of decisions, common to all channels (docs/METHOD.md, Decisions).
 
 use super::fresnel;
 use crate::spectral::{Channels, Curve};

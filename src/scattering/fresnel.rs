@@ -71,7 +71,7 @@ const GAUSS_16: [(f64, f64); 8] = [
 mod tests {
     use super::*;
 
-    /// VALIDATION section 1.4.
+    /// To six digits: ((n - 1)² + k²) / ((n + 1)² + k²) at normal incidence, Fresnel's s and p at others, cosine-weighted means.
     #[test]
     fn published_reflectances() {
         let near = |got: f64, want: f64, digits: f64| assert!((got - want).abs() < digits, "{got}, expected {want}");

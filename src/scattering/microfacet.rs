@@ -337,7 +337,7 @@ mod tests {
         DVec3::new(r * azimuth.cos(), r * azimuth.sin(), z)
     }
 
-    /// VALIDATION section 1.1: without Fresnel loss, at α = 1 and normal incidence, 1 - ln 2; other digits to 6e-4.
+    /// Without Fresnel loss, at α = 1 and normal incidence, 1 - ln 2 (docs/METHOD.md, Closed forms); other digits to 6e-4.
     #[test]
     fn published_albedos() {
         let e = |alpha: f64, z: f64| 1.0 - ReflectionAlbedo::new([alpha; 2]).loss(direction(z, 0.4));

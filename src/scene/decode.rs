@@ -31,7 +31,7 @@ pub struct Fields<'a> {
     misspelt: Vec<&'static str>,
 }
 
-/// The keys of a table: those understood, and those of the contract that a later version brings.
+/// The keys of a table: those understood, and those that a later version brings.
 #[derive(Clone, Copy)]
 pub struct Keys {
     pub known: &'static [&'static str],

@@ -32,8 +32,8 @@ const TOP: Keys = Keys::new(&[
 ]);
 const INTEGRATOR: Keys =
     Keys::new(&["max_bounces", "russian_roulette_start", "sampler", "wavelengths", "evaluator", "epoch"]);
-/// Evaluations walk all records of a path, two a bounce and one more, in one loop of at most 32,768 iterations (DESIGN
-/// section 7).
+/// Evaluations walk all records of a path, two a bounce and one more, in one loop of at most 32,768 iterations,
+/// the most that every driver runs.
 const MAX_BOUNCES: u32 = 16_383;
 const MAX_EPOCH: u32 = 1024;
 

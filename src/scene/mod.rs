@@ -151,11 +151,11 @@ pub enum Evaluator {
     Auto,
     /// Deferred: a thread takes some channels of a pixel along all its saved paths.
     DpeptPixel,
-    /// Deferred: a thread takes all channels of a saved path, batch by batch (the method, section 5.1).
+    /// Deferred: a thread takes all channels of a saved path, batch by batch (Hoarau et al. 2018, section 5.1).
     DpeptPath,
-    /// Deferred: the threads of a workgroup take different channels of the same saved path (the method, section 5.2).
+    /// Deferred: the threads of a workgroup take different channels of the same saved path (Hoarau et al. 2018, section 5.2).
     DpeptSpectral,
-    /// The conventional path tracer: all channels of all paths in memory, updated at every bounce (the method, section 4).
+    /// The conventional path tracer: all channels of all paths in memory, updated at every bounce (Hoarau et al. 2018, section 4).
     Pt,
 }
 
@@ -209,7 +209,7 @@ pub enum Sampler {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Wavelengths {
-    /// Eq. 4 of the method.
+    /// Evenly over each channel: Eq. 4 of Hoarau et al. 2018.
     Uniform,
     /// From the emitters' own spectral density in each channel, see [`crate::spectral::warp`].
     Emission,

@@ -1,7 +1,7 @@
 //! Array jobs on a Slurm cluster: what is submitted, and what its tasks and its finaliser are told.
 //!
-//! A task is a range of tiles of one cube, rendered by an ordinary process under the locks and journals of every other
-//! (DESIGN section 4), so a task may be killed, requeued, or run twice. The finaliser comes when no task of the array is left,
+//! A task is a range of tiles of one cube, rendered by an ordinary process under the locks and journals of every other,
+//! so a task may be killed, requeued, or run twice. The finaliser comes when no task of the array is left,
 //! verifies every tile and submits again what is missing. All of them read [`Job`], a file in the cube.
 
 pub mod client;

@@ -157,7 +157,7 @@ impl Channels {
         self.responses.get(k).map_or_else(|| self.width(k), Response::fwhm)
     }
 
-    /// Wavelength sample of channel `k` (Eq. 4 of the method): Λ_k(μ) = (1-μ) λmin + μ λmax, in nm.
+    /// Wavelength sample of channel `k` (Eq. 4 of Hoarau et al. 2018): Λ_k(μ) = (1-μ) λmin + μ λmax, in nm.
     pub fn wavelength(&self, k: usize, mu: f64) -> f64 {
         let [min, max] = self.bounds[k];
         min + mu * (max - min)

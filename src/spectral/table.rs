@@ -5,7 +5,7 @@ use super::bent::BentLine;
 use super::warp::Warp;
 use super::{Channels, Curve};
 
-/// Pointwise bound relative to the channel's peak (DESIGN section 7).
+/// Pointwise bound relative to the channel's peak: what tables may be off, well below a render's noise.
 pub const POINTWISE_BOUND: f64 = 1e-4;
 /// What makes a curve a line, relative to the channel's peak: some roundings of f32.
 const LINE_BOUND: f64 = 1e-6;

@@ -80,7 +80,7 @@ impl Smooth {
         let t = (nm.clamp(first, last) - first) / (last - first);
         let [a, b, c] = self.0;
         let x = (a * t + b) * t + c;
-        // Without the cancellation of Eq. 4 where x is far below 0.
+        // `sigmoid` without its cancellation where x is far below 0.
         let root = (1.0 + x * x).sqrt();
         let tail = 0.5 / (root * (root + x.abs()));
         if x < 0.0 { tail } else { 1.0 - tail }
@@ -184,7 +184,7 @@ fn basis(i: usize) -> DVec3 {
     DVec3::new(t * t, t, 1.0)
 }
 
-/// Eq. 4 of the paper.
+/// The smooth spectrum's value (Jakob and Hanika 2019), x the polynomial's.
 fn sigmoid(x: f64) -> f64 {
     0.5 + x / (2.0 * (1.0 + x * x).sqrt())
 }
@@ -354,7 +354,7 @@ mod tests {
         assert!(smooth_of(&[]).is_empty());
     }
 
-    /// DESIGN section 3: rgb emission [1, 1, 1] is D65 with Y = 1.
+    /// What a scene means by rgb emission [1, 1, 1]: D65 with Y = 1.
     #[test]
     fn white_emission_is_d65_of_unit_luminance() {
         let bars = || columns::<4>(CIE1931);

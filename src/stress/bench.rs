@@ -15,7 +15,7 @@ use crate::scene::{self, Scene};
 const SIGMAS: f64 = 5.0;
 /// Roundings of f32: of a table, a weight and a mean.
 pub const F32: f64 = 1e-6;
-/// What tables of spectra are held to, pointwise (DESIGN section 7).
+/// What tables of spectra are held to, pointwise: `spectral::table::POINTWISE_BOUND`.
 pub const TABLES: f64 = 1e-4;
 
 /// A quad that fills the view of the camera that cases have by default.

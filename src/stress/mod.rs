@@ -1,4 +1,4 @@
-//! The stress suite (VALIDATION section 3): stiff and extreme cases, each with an answer from elsewhere, an error and a bound.
+//! The stress suite: stiff and extreme cases, each with an answer from elsewhere, an error and a bound.
 //!
 //! Cases are scenes as users write them, rendered by the renderer that they use; answers are closed forms, worked out beside each.
 
@@ -101,7 +101,7 @@ fn verdict(passes: bool) -> &'static str {
     if passes { "pass" } else { "fail" }
 }
 
-/// All cases, in the order of VALIDATION section 3.
+/// All cases, group by group, in the order in which they run and are listed.
 pub fn cases() -> Vec<Case> {
     let groups = [spectra::CASES, range::CASES, interreflection::CASES, surfaces::CASES, geometry::CASES];
     [&groups[..], &[scattering::CASES, aiming::CASES, sampling::CASES, invariance::CASES]].concat().concat()

@@ -1,4 +1,4 @@
-//! Heat on devices: closed forms, and against the f64 path tracer (VALIDATION 1.1, 1.2, 1.6).
+//! Heat on devices: closed forms, and against the f64 path tracer (docs/METHOD.md, Closed forms).
 
 use glam::{DVec2, DVec3};
 use spectile::device::words::{Emitter, Material};

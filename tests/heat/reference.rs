@@ -1,4 +1,4 @@
-//! The f64 path tracer on hot surfaces and in gases (VALIDATION 1.1-1.3).
+//! The f64 path tracer on hot surfaces and in gases (docs/METHOD.md, Closed forms).
 
 use glam::{DVec2, DVec3};
 use spectile::reference::{render, render_image};

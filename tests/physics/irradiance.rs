@@ -1,4 +1,4 @@
-//! Irradiance and form factors (VALIDATION 1.7): a white Lambert surface shows E/π.
+//! Irradiance and form factors (docs/METHOD.md, Closed forms): a white Lambert surface shows E/π.
 
 use std::f64::consts::PI;
 

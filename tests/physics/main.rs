@@ -1,4 +1,4 @@
-//! The GPU renderer against closed forms (VALIDATION sections 1.1, 1.2, 1.6, 1.7).
+//! The GPU renderer against closed forms (docs/METHOD.md lists them).
 //!
 //! Bounds as in `statistics`: Student t at ALPHA = 1e-4 per test, Sidak over channels, fixed seeds, plus a stated f32
 //! allowance. Resolutions of 0.2 to 0.4 % mean that a wrong factor of 1 to 2 % in any of these would fail.

@@ -1,4 +1,4 @@
-//! Black bodies and products of spectra over channels (VALIDATION 1.6, Eq. 4 of the method).
+//! Black bodies and products of spectra over channels, at the wavelengths of Eq. 4 of Hoarau et al. 2018.
 
 use glam::DVec3;
 use spectile::scene::{Sampler, Sides};

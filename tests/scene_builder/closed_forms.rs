@@ -1,4 +1,4 @@
-//! Scenes with known answers (VALIDATION 1.1, 1.2, 1.7) that the reference and the device are both held against. What
+//! Scenes with known answers (docs/METHOD.md, Closed forms) that the reference and the device are both held against. What
 //! differs between the two (depths, sizes, samples, bounds) is the caller's.
 
 use std::f64::consts::PI;

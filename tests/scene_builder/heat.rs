@@ -1,4 +1,4 @@
-//! Heat and gases for scenes built in tests, and cases whose answers are known (VALIDATION 1.1, 1.2, 1.3).
+//! Heat and gases for scenes built in tests, and cases whose answers are known (docs/METHOD.md, Closed forms).
 
 use std::sync::Arc;
 
@@ -102,7 +102,7 @@ pub fn means(curve: &Curve, channels: &Channels) -> Vec<f64> {
     channels.bounds.iter().map(|b| curve.mean(b[0], b[1])).collect()
 }
 
-/// Two disks one metre apart that stand for infinite plates of diffuse materials at temperatures: VALIDATION 1.2. Each
+/// Two disks one metre apart that stand for infinite plates of diffuse materials at temperatures. Each
 /// case shows one of them.
 pub fn hot_plates(radius: f64, bounces: u32) -> Vec<Case> {
     let mut cases = Vec::new();
@@ -134,7 +134,7 @@ pub fn hot_plates(radius: f64, bounces: u32) -> Vec<Case> {
 }
 
 /// A Lorentz line, depth 2 x at its middle at 1 m, as a table of lines between close nodes, in one channel of 200 half
-/// widths; and the mean transmittance 1 - W/D there: W of VALIDATION 1.3 less the wings beyond, ∫ τ / (2 x) = 2 a²/(D/2).
+/// widths; and the mean transmittance 1 - W/D there: W the equivalent width less the wings beyond, ∫ τ / (2 x) = 2 a²/(D/2).
 pub fn lorentz_line(x: f64, published: f64) -> (Curve, Channels, f64) {
     let (middle, half_width, half) = (10_000.0, 0.5, 50.0);
     let mut offsets: Vec<f64> = (0..=2000).map(|i| half * (f64::from(i) / 2000.0).powi(3)).collect();
@@ -160,7 +160,7 @@ pub fn slab(depth: f64, kelvin: Option<f64>, wall: impl FnOnce(Builder) -> Build
         .null_box(DVec3::new(-1.0, -1.0, 0.5), DVec3::new(1.0, 1.0, 1.5))
 }
 
-/// From the thinnest to the thickest (VALIDATION section 3).
+/// Optical depths from the thinnest to the thickest.
 pub const DEPTHS: [f64; 10] = [1e-9, 1e-6, 1e-3, 0.1, 0.5, 1.0, 2.0, 5.0, 20.0, 1e6];
 
 /// The temperature for which Planck's radiance at 10 um is `radiance`: 1/x = log(1 + c₁/(λ⁵ L)).

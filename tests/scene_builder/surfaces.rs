@@ -1,4 +1,4 @@
-//! Scenes with metals, glass and plastic whose answers are known (VALIDATION 1.1, 1.4, 1.5). What differs between the
+//! Scenes with metals, glass and plastic whose answers are known (docs/METHOD.md, Closed forms). What differs between the
 //! reference and a device (depths, samples, bounds) is the caller's.
 
 use glam::{DVec2, DVec3};
@@ -8,7 +8,7 @@ use spectile::spectral::{Channels, Curve, Outside};
 use super::closed_forms::Case;
 use super::{Builder, look, narrow, quad, room, sphere};
 
-/// A clear slab at normal incidence before a lamp of radiance 1: T = (1 - R)/(1 + R), all orders. VALIDATION 1.4: 0.923077
+/// A clear slab at normal incidence before a lamp of radiance 1: T = (1 - R)/(1 + R), all orders: 0.923077
 /// for n = 1.5, 0.470588 for n = 4.
 pub fn slab(bounces: u32) -> Vec<Case> {
     let case = |(n, published, seed): (f64, f64, u64)| {
@@ -26,7 +26,7 @@ pub fn slab(bounces: u32) -> Vec<Case> {
     [(1.5, 0.923077, 101), (4.0, 0.470588, 102)].map(case).into()
 }
 
-/// Wavelengths in nm of the lines F, d and C, and the index of N-BK7 there (VALIDATION 1.5).
+/// Wavelengths in nm of the lines F, d and C, and the index of N-BK7 there (Sellmeier's formula with Schott's constants).
 const LINES: [(f64, f64); 3] = [(486.13, 1.522376), (587.56, 1.516800), (656.27, 1.514322)];
 
 /// A prism of 60 degrees of N-BK7 at the d line's minimum deviation, and at the end of each line's ray a lamp 0.02 degrees

@@ -73,7 +73,7 @@ fn absorption(list: u32, kelvin: f32, quad: u32, s: SpectralSample) -> vec4<f32>
         let columns = volumes[at + 1u];
         let column = at + 2u;
         at = column + 2u * columns;
-        // Without a loop: iterations are scarce (KERNELS).
+        // Without a loop: an invocation may have 32,768 iterations in all, and the march takes them.
         var above = 0u;
 #repeat MOST_COLUMNS c
         above += select(0u, 1u, bitcast<f32>(volumes[column + 2u * min($cu, columns - 1u)]) < kelvin && $cu < columns);

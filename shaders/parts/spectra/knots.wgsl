@@ -4,7 +4,8 @@
 @group(1) @binding(10) var<storage, read> knot_starts: array<u32>;
 @group(1) @binding(11) var<storage, read> knots: array<vec2<u32>>;
 
-// Binary search without a loop: loop iterations are scarce (KERNELS), and its length is known.
+// Binary search without a loop: an invocation may have 32,768 iterations in all, which the walk along the records takes;
+// and its length is known.
 fn knot_value(spectrum: u32, channel: u32, mu: u32) -> f32 {
     let first = knot_starts[spectrum * CHANNELS_PADDED + channel];
     var low = first;

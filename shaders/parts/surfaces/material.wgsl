@@ -1,4 +1,5 @@
-// Materials of general scenes: lists of lobes, among which paths choose. `src/device/words.rs` holds the structures' Rust twins.
+// Materials of general scenes: lists of lobes, among which a path chooses (docs/METHOD.md, Decisions). `src/device/words.rs` holds
+// the structures' Rust twins.
 
 struct SurfaceMaterial {
     first_lobe: u32,

@@ -1,4 +1,4 @@
-//! Decision probabilities of next-event estimation (DESIGN section 6), common to all channels.
+//! Decision probabilities of next-event estimation, common to all channels (docs/METHOD.md, Decisions).
 
 use super::emission::{Emitted, area, radiance};
 use crate::device::accel::Accel;
@@ -71,7 +71,7 @@ fn intervals(environment: f64, weights: &[f64]) -> (Vec<f32>, Vec<f64>) {
 /// Random numbers on the device have 24 bits.
 pub(super) const STEPS: f64 = 16_777_216.0;
 
-/// q of DESIGN section 6 for `powers[light][channel]`.
+/// q by shares, see [`light_picks`], for `powers[light][channel]`.
 fn probabilities(powers: &[Vec<f64>]) -> Vec<f64> {
     let channels = powers.first().map_or(0, Vec::len);
     let totals: Vec<f64> = (0..channels).map(|k| powers.iter().map(|p| p[k]).sum()).collect();

@@ -96,8 +96,8 @@ fn solid_angle(map: &EnvironmentMap, texel: usize) -> f64 {
     TAU / f64::from(map.size[0]) * (top - bottom)
 }
 
-/// Importance of each texel, 1 at most, by DESIGN section 6: ½ mean over the wavelengths of its share + ½ its largest share, the latter
-/// normalised over all directions. `radiance(texel, i)` is that at wavelength `i`.
+/// Importance of each texel, 1 at most: ½ mean over the wavelengths of its share + ½ its largest share, the latter normalised over all
+/// directions (docs/METHOD.md, Decisions). `radiance(texel, i)` is that at wavelength `i`.
 fn importance(map: &EnvironmentMap, wavelengths: usize, radiance: impl Fn(usize, usize) -> f64) -> Vec<f32> {
     let texels = map.size[0] as usize * map.size[1] as usize;
     let total = |i: usize| (0..texels).map(|t| solid_angle(map, t) * radiance(t, i)).sum::<f64>();

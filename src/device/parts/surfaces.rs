@@ -568,7 +568,7 @@ fn mean_over_turns(albedo: &ReflectionAlbedo, cosine: f64) -> f64 {
     (0..turns).map(|i| albedo.loss(direction(i))).sum::<f64>() / turns as f64
 }
 
-/// q of DESIGN section 6 for the leaves at one cosine, and the largest albedo of all together.
+/// q by shares (docs/METHOD.md, Decisions) for the leaves at one cosine, and the largest albedo of all together.
 fn probabilities(leaves: &[Leaf], channels: usize, albedo: &dyn Fn(&Leaf, usize) -> f64) -> (Vec<f64>, f64) {
     let (mut mean, mut largest) = (vec![0.0; leaves.len()], vec![0.0f64; leaves.len()]);
     let (mut lit, mut most) = (0.0, 0.0f64);

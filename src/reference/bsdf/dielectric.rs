@@ -92,7 +92,7 @@ impl Boundary for Surface {
 }
 
 /// Ideal refraction. Where the live channels bend differently, one goes on in its direction and the others stop
-/// (degradation, section 3.4 of the method).
+/// (degradation: Hoarau et al. 2018, section 3.4, after Evans and McCool 1999).
 struct Refraction(Surface);
 
 impl Lobe for Refraction {
