@@ -3,9 +3,9 @@
 //! `scene` (parsed, checked, in metres and nanometres) → `device::prepared` → `gpu` → `render` (generate,
 //! evaluate, transfer, merge) → `cube` (a Zarr v3 store). `reference` is an independent f64 path tracer.
 
-pub mod accel;
 pub mod cli;
 pub mod cube;
+pub mod device;
 pub mod error;
 pub mod export;
 pub mod files;

@@ -11,8 +11,10 @@ use device::{Settings, render};
 use glam::{DVec2, DVec3};
 use scene_builder::*;
 use serde_json::Value;
+use spectile::device::part::{OnDevice, PARTS};
 use spectile::device::prepared::Prepared;
-use spectile::report::everything::with_everything;
+use spectile::device::windows::Windows;
+use spectile::device::example::with_everything;
 use spectile::scene::{Filter, Projection, Sides};
 use spectile::spectral::Channels;
 
@@ -103,28 +105,24 @@ fn everything_is_compiled_in_and_seen_by_nobody() {
         .lamp(sphere(DVec3::new(0.3, 0.6, 0.0), 0.2), 2.0, Sides::Front)
         .build();
     let all = with_everything(&scene);
-    let features = Prepared::new(&all, 0).expect("a scene that fits").features;
-    let general = features.general.expect("a general scene");
+    let prepared = Prepared::new(&all, 0).expect("a scene that fits");
+    let on_device = OnDevice { prepared: &prepared, windows: Windows::WHOLE };
+    for part in PARTS.iter().filter(|part| part.example.is_some()) {
+        assert!((part.used)(&on_device), "{}", part.name);
+    }
+    let surfaces = prepared.surfaces.as_ref().expect("a general scene");
+    let textures = surfaces.textures.as_ref().expect("textures");
     for (what, is_there) in [
-        ("knots", features.knots),
-        ("shapes", features.shapes),
-        ("a rough base", general.rough_base),
-        ("brushed metal", general.anisotropic),
-        ("dispersion", general.dispersion),
-        ("rough dispersion", general.spread),
-        ("textures", general.textured && general.textured_base && general.colours && general.mixtures),
-        ("masks", general.shares),
-        ("shading normals", general.smooth),
-        ("lamps", general.lamps && general.suns == 1),
-        ("heat by angle", general.hot),
-        ("heat by place", general.radiators.is_some_and(|r| r.textured && r.facets)),
-        ("a map", general.map.is_some()),
-        ("voxels", general.media.is_some_and(|media| media.grids.is_some())),
+        ("a rough base", surfaces.rough_base),
+        ("rough dispersion", surfaces.spread),
+        ("textures", surfaces.textured && surfaces.textured_base && textures.colours && textures.mixtures),
+        ("masks", textures.first_share.is_some()),
+        ("heat by place", prepared.radiators.as_ref().is_some_and(|r| r.features.textured && r.features.facets)),
     ] {
         assert!(is_there, "{what}");
     }
-    // All kinds of parts: one bit each without a gap.
-    assert_eq!(general.kinds.count_ones(), u32::BITS - general.kinds.leading_zeros(), "{:b}", general.kinds);
+    // All kinds of lobes: one bit each without a gap.
+    assert_eq!(surfaces.kinds.count_ones(), u32::BITS - surfaces.kinds.leading_zeros(), "{:b}", surfaces.kinds);
 
     let picture = |scene: &_, seed| {
         let rendered = render(scene, 16, 64, Settings { seed, ..Settings::default() });

@@ -7,9 +7,13 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use spectile::device::text::{Source, compose};
-use spectile::gpu::upload;
 use spectile::device::prepared::Prepared;
+use spectile::device::evaluator::EvaluateShape;
+use spectile::device::facts;
+use spectile::device::part::OnDevice;
+use spectile::device::windows::Windows;
+use spectile::gpu::buffer;
+use spectile::gpu::source::Source;
 use spectile::render::wave::{Budget, DeviceLimits, WavePlan};
 use spectile::scene;
 
@@ -27,26 +31,21 @@ fn the_cornell_box_pays_for_nothing_else() {
     let mut found = String::new();
     for software in [true, false] {
         let limits = DeviceLimits { binding: 128 << 20, uniform_alignment: 256, software };
-        let windows = upload::windows(&prepared, limits.binding).expect("windows");
+        let windows = Windows::of(&prepared.accel, limits.binding).expect("windows");
         let waves = WavePlan::new(&prepared, [64, 64], limits, Budget::default()).expect("waves");
-        let shape = prepared.evaluate_shape(software);
-        let defines = prepared.defines(&windows);
-        let passes = [
-            compose(&prepared.camera_modules(), &defines),
-            compose(&prepared.bounce_modules(), &defines),
-            compose(&prepared.evaluate_modules(), &prepared.evaluate_defines(shape)),
-        ];
+        let on_device = OnDevice { prepared: &prepared, windows };
+        let kernels = on_device.kernels(EvaluateShape::of(&prepared, software));
         let kind = if software { "software device" } else { "GPU" };
         writeln!(
             found,
             "==== {kind}: scene {} bytes, a path {} bytes, waves {} bytes",
-            upload::scene_bytes(&prepared, &windows),
+            facts::scene_bytes(&on_device, buffer::allocated),
             waves.path_bytes(),
             waves.wave_bytes()
         )
         .unwrap();
-        for pass in passes {
-            writeln!(found, "==== {kind}: {}\n{}", pass.label, code(&pass)).unwrap();
+        for pass in kernels.all() {
+            writeln!(found, "==== {kind}: {}.wgsl\n{}", pass.label, code(pass)).unwrap();
         }
     }
     let file = root.join("tests/data/cornell_kernels.txt");

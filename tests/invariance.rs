@@ -10,10 +10,11 @@ use std::sync::Arc;
 use device::{Settings, render};
 use glam::{DVec2, DVec3};
 use scene_builder::*;
-use spectile::gpu::adapter::Gpu;
-use spectile::gpu::{buffer, upload};
 use spectile::device::prepared::Prepared;
 use spectile::device::rng::hash;
+use spectile::gpu::adapter::Gpu;
+use spectile::device::windows::Windows;
+use spectile::gpu::buffer;
 use spectile::render::wave::Budget;
 use spectile::render::worker::Worker;
 use spectile::scene::{Filter, Mesh, Projection, Sampler, Scene, Shape, Sides};
@@ -128,7 +129,7 @@ fn windows_change_no_bit() {
     {
         let prepared = Prepared::new(&scene, 0).unwrap();
         let binding = prepared.accel.primitives.len().div_ceil(parts) as u64 * 48;
-        let windows = upload::windows(&prepared, binding).unwrap();
+        let windows = Windows::of(&prepared.accel, binding).unwrap();
         assert_eq!((windows.nodes.count, windows.primitives.count), (nodes, parts as u32));
         let expected = bits(&scene, 1, 4, base);
         assert!(expected.iter().collect::<std::collections::HashSet<_>>().len() > 30, "something is seen");
@@ -136,7 +137,7 @@ fn windows_change_no_bit() {
     }
     let prepared = Prepared::new(&everything(Sampler::Sobol), 0).unwrap();
     let bytes = prepared.accel.primitives.len() as u64 * 48;
-    assert!(upload::windows(&prepared, bytes / 5).is_err(), "more windows than bindings is an error");
+    assert!(Windows::of(&prepared.accel, bytes / 5).is_err(), "more windows than bindings is an error");
 }
 
 /// A crop shows the same bits as those pixels of the full film.

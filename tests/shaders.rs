@@ -6,10 +6,10 @@ mod scene_builder;
 use glam::{DMat3, DVec2, DVec3};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use scene_builder::*;
-use spectile::gpu::adapter::STORAGE_BUFFERS;
-use spectile::device::text::{Source, compose};
 use spectile::device::kernels::{EvaluateShape, WindowList, Windows};
 use spectile::device::prepared::{Features, Prepared};
+use spectile::device::text::{Source, compose};
+use spectile::gpu::adapter::STORAGE_BUFFERS;
 use spectile::scene::{
     Attributes, Evaluator, Field, Filter, Projection, Sampler, Scene, Shape, Sides, Texels, TextureKind,
 };
@@ -21,6 +21,11 @@ const MAX_PLAIN_BYTES: usize = 18 << 10;
 const MAX_BYTES: usize = 32 << 10;
 /// Of general scenes, by what their materials need.
 const MAX_GENERAL_BYTES: usize = 64 << 10;
+
+/// Storage buffers that the fullest scene's largest kernel binds, four windows each of nodes and primitives included; and a plain
+/// scene's with one of each. What devices offer: Metal 29 through wgpu-hal 30, Vulkan on GPUs thousands, lavapipe of Mesa 22.3 32.
+const MOST_STORAGE_BUFFERS: u32 = 32;
+const PLAIN_STORAGE_BUFFERS: u32 = 12;
 
 const EVALUATORS: [Evaluator; 4] =
     [Evaluator::DpeptPixel, Evaluator::DpeptPath, Evaluator::DpeptSpectral, Evaluator::Pt];
@@ -39,12 +44,8 @@ fn windows(nodes: u32, primitives: u32) -> Windows {
 
 /// The passes of `prepared`, as the worker composes them.
 fn passes(prepared: &Prepared, windows: &Windows, shape: EvaluateShape) -> Vec<Source> {
-    let defines = prepared.defines(windows);
-    let generate = [prepared.camera_modules(), prepared.bounce_modules()];
-    let evaluate = [Some(prepared.evaluate_modules()), prepared.update_modules()];
-    let generate = generate.iter().map(|modules| compose(modules, &defines));
-    let evaluate = evaluate.iter().flatten().map(|modules| compose(modules, &prepared.evaluate_defines(shape)));
-    generate.chain(evaluate).collect()
+    let kernels = OnDevice { prepared, windows: *windows }.kernels(shape);
+    kernels.all().cloned().collect()
 }
 
 /// All combinations of the features that change a pass's text; combinations that no scene has are left out.
@@ -64,7 +65,6 @@ fn combinations() -> Vec<Features> {
             knots: bit(i, 9),
             registers: bit(i, 10),
             few_triangles: bit(i, 11),
-            general: None,
         })
         .filter(|f| !(f.thin_lens && f.orthographic || f.knots && f.registers || f.shapes && f.few_triangles))
         .collect()
@@ -115,7 +115,7 @@ fn every_permutation_is_valid() {
     for ((what, source), most) in all {
         let module = validate(what, source);
         let names: Vec<&str> = module.entry_points.iter().map(|e| e.name.as_str()).collect();
-        assert_eq!(names, [source.label.trim_end_matches(".wgsl")], "{what}");
+        assert_eq!(names, [source.label], "{what}");
         assert!(code_bytes(&source.text) <= most, "{what}: {} bytes", code_bytes(&source.text));
     }
 }
@@ -129,9 +129,8 @@ fn pipelines_on_the_noop_backend() {
     let instance = wgpu::Instance::new(descriptor);
     let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default())).expect("noop");
     let (device, _queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
-        // No more than `gpu::adapter` asks of a device.
         required_limits: wgpu::Limits {
-            max_storage_buffers_per_shader_stage: STORAGE_BUFFERS,
+            max_storage_buffers_per_shader_stage: MOST_STORAGE_BUFFERS,
             ..wgpu::Limits::default()
         },
         ..Default::default()
@@ -153,6 +152,50 @@ fn pipelines_on_the_noop_backend() {
         });
         let error = pollster::block_on(scope.pop());
         assert!(error.is_none(), "{what}: {error:?}");
+    }
+}
+
+/// What scenes ask of devices: no kernel binds more than is said here, and the fullest as many.
+#[test]
+fn storage_buffers_are_counted() {
+    let count = |(what, source): &(String, Source)| (storage_buffers(source).expect("a valid text"), what.clone());
+    let all: Vec<_> = general_sources().iter().chain(&all_sources()).map(count).collect();
+    let full = Prepared::new(&with_everything(&plain_scene()), 0).expect("a scene that fits");
+    let fullest = passes(&full, &windows(4, 4), EvaluateShape::of(&full, true));
+    let fullest = fullest.iter().map(|source| storage_buffers(source).expect("a valid text")).max();
+    let (most, what) = all.into_iter().max().expect("texts");
+    assert!(most <= MOST_STORAGE_BUFFERS, "{most}: {what}");
+    assert_eq!(fullest, Some(MOST_STORAGE_BUFFERS));
+    let plain = Prepared::new(&Builder(plain_scene()).diffuse(disk(), 0.5).build(), 0).expect("a scene that fits");
+    let plain = passes(&plain, &windows(1, 1), EvaluateShape::of(&plain, true));
+    let plain = plain.iter().map(|source| storage_buffers(source).expect("a valid text")).max();
+    assert_eq!(plain, Some(PLAIN_STORAGE_BUFFERS));
+}
+
+/// Every row of the table: a scene with what it adds needs it, a scene without does not; and what it calls in a stage is there.
+#[test]
+fn parts_are_there_where_they_are_needed() {
+    let plain = Prepared::new(&plain_scene(), 0).expect("a scene that fits");
+    let used = |prepared: &Prepared, name: &str| {
+        let scene = OnDevice { prepared, windows: windows(1, 1) };
+        scene.parts().any(|part| part.name == name)
+    };
+    for part in PARTS {
+        if part.example.is_some() {
+            let with = Prepared::new(&with_parts(&plain_scene(), &[part]), 0).expect("a scene that fits");
+            assert!(used(&with, part.name), "{}", part.name);
+            let few = ["area lights"].contains(&part.name);
+            assert!(few || !used(&plain, part.name), "{}", part.name);
+        }
+    }
+    let names: std::collections::HashSet<_> = PARTS.iter().map(|part| part.name).collect();
+    assert_eq!(names.len(), PARTS.len(), "two rows of one name");
+
+    // Lines of a part for a place that no file has would be lost without a word.
+    let texts: String = PARTS.iter().flat_map(|part| part.modules).map(|(_, module)| module.text).collect();
+    let texts = texts + include_str!("../shaders/passes/generate.wgsl");
+    for (place, line) in PARTS.iter().flat_map(|part| part.lines) {
+        assert!(texts.contains(&format!("#lines {place}\n")), "{place}: {line}");
     }
 }
 
@@ -187,6 +230,14 @@ fn general_scenes() -> Vec<(String, Scene)> {
     scenes.extend(light_scenes());
     scenes.extend(media_scenes());
     scenes.extend(hot_scenes());
+    // Each row of the table by itself, and each with the one after it.
+    let with_example: Vec<_> = PARTS.iter().copied().filter(|part| part.example.is_some()).collect();
+    for (i, part) in with_example.iter().enumerate() {
+        let pair = [*part, with_example[(i + 1) % with_example.len()]];
+        scenes.push((part.name.to_owned(), with_parts(&plain_scene(), &pair[..1])));
+        scenes.push((format!("{} and {}", pair[0].name, pair[1].name), with_parts(&plain_scene(), &pair)));
+    }
+    scenes.push(("everything".to_owned(), with_everything(&plain_scene())));
     scenes
 }
 
@@ -330,7 +381,7 @@ fn general_sources() -> Vec<(String, Source)> {
     for (i, (what, scene)) in general_scenes().into_iter().enumerate() {
         let prepared = Prepared::for_evaluator(&scene, 0, EVALUATORS[i % EVALUATORS.len()]).unwrap();
         let windows = windows(1 + i as u32 % 4, 1 + i as u32 / 4 % 4);
-        for source in passes(&prepared, &windows, prepared.evaluate_shape(i % 2 == 0)) {
+        for source in passes(&prepared, &windows, EvaluateShape::of(&prepared, i % 2 == 0)) {
             found.entry(source.text.clone()).or_insert_with(|| (format!("{} for {what}", source.label), source));
         }
     }

@@ -12,7 +12,7 @@ use super::render::parse_time;
 use crate::gpu::adapter::{Gpu, Selection};
 use crate::render::worker::{Interrupt, check_interrupt};
 use crate::report::bench::{Frames, Part, Report, Row};
-use crate::report::everything::with_everything;
+use crate::device::example::with_everything;
 use crate::report::throughput::{Trial, frames, measure};
 use crate::report::{Circumstances, make_folder, write};
 use crate::scene::{self, Evaluator, Scene};

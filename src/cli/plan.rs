@@ -10,12 +10,15 @@ use super::output::say;
 use super::progress::short;
 use super::scene::SceneArgs;
 use crate::cube::Header;
+use crate::device::facts;
+use crate::device::part::OnDevice;
+use crate::device::prepared::Prepared;
+use crate::device::windows::Windows;
 use crate::files::format_bytes;
 use crate::gpu::adapter::{Gpu, Selection};
 use crate::render::job::StopRule;
 use crate::render::plan;
 use crate::render::pool::MERGE_THREADS;
-use crate::device::prepared::Prepared;
 use crate::render::wave::{Budget, WavePlan};
 use crate::render::worker::Worker;
 use crate::scene::Scene;
@@ -166,6 +169,12 @@ struct Plan<'a> {
 }
 
 impl Plan<'_> {
+    fn on_device(&self) -> OnDevice<'_> {
+        // Waves were planned with the same limit.
+        let windows = Windows::of(&self.prepared.accel, self.waves.limits.binding).unwrap_or(Windows::WHOLE);
+        OnDevice { prepared: self.prepared, windows }
+    }
+
     fn paths(&self) -> f64 {
         self.header.size.iter().map(|&s| f64::from(s)).product::<f64>() * f64::from(self.samples)
     }
@@ -193,7 +202,7 @@ impl Plan<'_> {
                 "paths_per_s": m.paths_per_s,
             })
         });
-        let features = plan::feature_lines(self.prepared, &self.waves);
+        let features = facts::parts(&self.on_device());
         let features = features.iter().map(|f| json!({ "name": f.name, "used": f.used, "effect": f.effect }));
         json!({
             "scene": self.args.scene.scene,
@@ -203,7 +212,7 @@ impl Plan<'_> {
             "tiles": self.header.grid().count(),
             "evaluator": self.prepared.evaluator.name(),
             "features": features.collect::<Vec<_>>(),
-            "spectra": plan::table_bounds(self.prepared),
+            "spectra": facts::table_bounds(self.prepared),
             "primitives": self.prepared.accel.primitives.len(),
             "bvh_nodes": self.prepared.accel.nodes.len(),
             "emitters": self.prepared.emitters.len(),
@@ -241,7 +250,7 @@ impl Plan<'_> {
             p.emitters.len()
         );
         text += &format!("evaluator {}\n", p.evaluator.name());
-        let lines = plan::feature_lines(p, &self.waves);
+        let lines = facts::parts(&self.on_device());
         for (title, used) in [("used", true), ("left out", false)] {
             for (i, line) in lines.iter().filter(|l| l.used == used).enumerate() {
                 text += &format!("{:9} {} ({})\n", if i == 0 { title } else { "" }, line.name, line.effect);

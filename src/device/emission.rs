@@ -2,8 +2,8 @@
 
 use std::borrow::Cow;
 
-use super::media::terms;
 use crate::device::accel::{Accel, bounds};
+use crate::device::parts::media::terms;
 use crate::scene::{Field, Light, Medium, Scene, Sides};
 use crate::spectral::{Curve, planck};
 

@@ -1,34 +1,38 @@
 //! What this scene needs on a device, and nothing else: features, spectra, materials, lights and geometry, flat.
 
+use std::f64::consts::PI;
+
+use glam::DVec3;
+
 use crate::device::accel::{Accel, MAX_MATERIALS};
-use crate::device::words::{
-    EMITS_BOTH_SIDES, EMITS_BY_ANGLE, EMITS_BY_PLACE, EMITTER_IS_LAMP, Emitter, Frame, LAMP_DIRECTIONAL, LAMP_POINT,
-    LAMP_SUN, Lamp, Material, NONE, Primitive,
-};
-use crate::device::words::LOOP_LIMIT;
 use crate::device::emission::Emitted;
-use crate::device::parts::heat;
+use crate::device::evaluator;
 use crate::device::integration::Integration;
+use crate::device::part::{OnDevice, Records};
+use crate::device::parts::geometry;
+use crate::device::parts::heat::{self, Heat};
 use crate::device::parts::lights::{LightPicks, STEPS, light_picks};
 use crate::device::parts::media::Media;
-use crate::device::parts::radiators::{self, Radiators};
+use crate::device::parts::radiators::Radiators;
 use crate::device::parts::sky::SkyMap;
-use crate::device::spectra::{MAX_REGISTER_SPECTRA, daylight, spectral_tables};
-use crate::device::parts::surfaces::{Kind, Needed, Surfaces};
+use crate::device::parts::surfaces::{Needed, Surfaces};
+use crate::device::spectra::{MAX_REGISTER_SPECTRA, SpectrumIds, daylight, spectral_tables};
+use crate::device::windows::Windows;
+use crate::device::words::{
+    EMITS_BOTH_SIDES, EMITS_BY_ANGLE, EMITS_BY_PLACE, EMITTER_IS_LAMP, Emitter, Frame, HOT_COSINES, LAMP_DIRECTIONAL,
+    LAMP_POINT, LAMP_SUN, LOOP_LIMIT, Lamp, Material, NONE,
+};
 use crate::scene::{Attributes, Bsdf, Evaluator, Filter, Light, Projection, Reflectance, Sampler, Scene, Sides};
 use crate::spectral::table::SpectralTables;
 use crate::spectral::warp::Warp;
 use crate::{Error, Result};
-use glam::DVec3;
-use std::f64::consts::PI;
 
 /// Evaluation walks the records of a path in one loop.
 const MAX_RECORDS: u32 = LOOP_LIMIT;
-/// Triangles up to which rays test them all. Measured on lavapipe: generating a path of the Cornell box, with 32 of them, takes 0.4 to
-/// 0.5 of the time that it takes with the BVH; kernels grow with every one.
-const FEW_TRIANGLES: usize = 48;
+/// Words of a path's state that every scene has: origin and density; direction, counts of records.
+const STATE_WORDS: u32 = 8;
 
-/// Parts of the renderer that a scene needs; what is false is left out of shaders and buffers.
+/// Settings, and how geometry, lights and spectra are held: what is false is left out of kernels and buffers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Features {
     pub thin_lens: bool,
@@ -47,95 +51,6 @@ pub struct Features {
     pub knots: bool,
     /// All spectra held in registers during evaluation.
     pub registers: bool,
-    /// Materials of several lobes, records of 16 bytes; `None` where diffuse surfaces are all there is.
-    pub general: Option<General>,
-}
-
-/// Parts of the renderer that only general scenes have.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct General {
-    /// Bit n for each [`Kind`] n that occurs.
-    pub kinds: u32,
-    /// A rough coat over a diffuse base.
-    pub rough_base: bool,
-    /// Roughness that differs along and across the surface.
-    pub anisotropic: bool,
-    /// Refraction that may leave one channel of a path.
-    pub dispersion: bool,
-    /// Rough refraction that bends each channel by itself.
-    pub spread: bool,
-    /// Textures of any kind; which of them, and of what, the rest says.
-    pub textures: bool,
-    pub textured: bool,
-    pub textured_base: bool,
-    pub colours: bool,
-    pub mixtures: bool,
-    /// Blends with a texture for weight.
-    pub shares: bool,
-    /// Texture coordinates, normals or axes on surfaces.
-    pub attributes: bool,
-    /// Shading normals.
-    pub smooth: bool,
-    /// Lights without a surface, and how many of them are suns.
-    pub lamps: bool,
-    pub suns: u32,
-    /// Surfaces that emit by angle.
-    pub hot: bool,
-    /// And by place.
-    pub radiators: Option<radiators::Features>,
-    /// Id of the wavelength's spectrum, where evaluation works out Planck's law.
-    pub wavelength: Option<u32>,
-    pub map: Option<Map>,
-    pub media: Option<MediaShape>,
-}
-
-/// Media, as shaders are composed for them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct MediaShape {
-    pub outer: u32,
-    /// Whether camera rays start in different ones.
-    pub camera_is_cut: bool,
-    pub stretches: u32,
-    /// The most columns of an absorber, where there are grids.
-    pub grids: Option<u32>,
-}
-
-/// An environment map, as shaders are composed for it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Map {
-    pub size: [u32; 2],
-    /// Of a spectral one.
-    pub bands: Option<u32>,
-    /// Ids of the spectra that tell a wavelength's place, and that multiply all texels.
-    pub axis: u32,
-    pub source: u32,
-}
-
-impl General {
-    fn of(surfaces: &Surfaces, scene: &Scene) -> General {
-        let textures = surfaces.textures.as_ref();
-        let carries = |f: &dyn Fn(&Attributes) -> bool| scene.objects.iter().any(|object| f(&object.attributes));
-        General {
-            textures: textures.is_some(),
-            textured: surfaces.textured,
-            textured_base: surfaces.textured_base,
-            colours: textures.is_some_and(|t| t.colours),
-            mixtures: textures.is_some_and(|t| t.mixtures),
-            shares: textures.is_some_and(|t| t.first_share.is_some()),
-            attributes: carries(&|attributes| *attributes != Attributes::default()),
-            smooth: carries(&|attributes| attributes.normals.is_some()),
-            kinds: surfaces.kinds,
-            rough_base: surfaces.rough_base,
-            anisotropic: surfaces.anisotropic,
-            dispersion: surfaces.dispersion,
-            spread: surfaces.spread,
-            ..General::default()
-        }
-    }
-
-    pub(super) fn has(&self, kinds: &[Kind]) -> bool {
-        kinds.iter().any(|&kind| self.kinds >> kind as u32 & 1 == 1)
-    }
 }
 
 /// A scene as every device gets it.
@@ -144,17 +59,24 @@ pub struct Prepared {
     pub evaluator: Evaluator,
     pub features: Features,
     pub frame: Frame,
+    /// Of plain scenes, where diffuse surfaces and lamps are all there is.
     pub materials: Vec<Material>,
-    /// In general scenes, instead of `materials`.
+    /// Of general scenes, instead: their records have 16 bytes.
     pub surfaces: Option<Surfaces>,
     pub media: Option<Media>,
-    /// Emitting primitives, then lamps.
+    /// Emitting primitives, then lamps, then the spectra of what emits by angle.
     pub emitters: Vec<Emitter>,
     pub lamps: Vec<Lamp>,
+    /// The last so many of the lamps, which are met too.
+    pub suns: u32,
+    /// Whether some surface emits by angle.
+    pub emits_by_angle: bool,
     /// What emits by place.
     pub radiators: Option<Radiators>,
     /// The environment, where it is a map.
     pub sky: Option<SkyMap>,
+    /// Id of the wavelength's spectrum, where evaluation works out Planck's law.
+    pub wavelength: Option<u32>,
     pub picks: LightPicks,
     pub accel: Accel,
     pub tables: SpectralTables,
@@ -178,10 +100,10 @@ impl Prepared {
     /// Flattens `scene`. Errors: materials that no shader knows; more materials, spectra or bounces than ids and
     /// counters have bits for.
     pub fn new(scene: &Scene, seed: u64) -> Result<Prepared> {
-        Prepared::for_evaluator(scene, seed, scene.integrator.evaluator.on(true, scene.channels.len()))
+        Prepared::for_evaluator(scene, seed, evaluator::resolve(scene, true))
     }
 
-    /// As [`Prepared::new`], for the evaluator chosen ([`plan::evaluator`](super::plan::evaluator)).
+    /// As [`Prepared::new`], for the evaluator chosen.
     pub fn for_evaluator(scene: &Scene, seed: u64, evaluator: Evaluator) -> Result<Prepared> {
         match Integration::of(&scene.channels) {
             None => Prepared::flatten(scene, seed, evaluator, None),
@@ -200,128 +122,55 @@ impl Prepared {
         if scene.materials.len() > MAX_MATERIALS {
             return Err(Error::input(&scene.file, format!("more than {MAX_MATERIALS} materials")));
         }
-        let sky = scene.environment.as_ref().and_then(|e| e.map()).map(|map| SkyMap::new(scene, map));
-        let carries = scene.objects.iter().any(|object| object.attributes != Attributes::default());
-        let general = scene.materials.iter().any(|m| !matches!(m.bsdf, Bsdf::Diffuse { .. } | Bsdf::Black))
-            || carries
-            || !scene.textures.is_empty()
-            || !scene.lights.is_empty()
-            || sky.is_some()
-            || !scene.media.is_empty()
-            || !heat.by_angle.is_empty()
-            || !heat.radiating.is_empty();
-        let mut media = Media::new(scene, &accel)?;
-        let mut surfaces = general.then(|| Surfaces::new(scene));
-        let mut radiators = match &mut surfaces {
-            Some(surfaces) if !heat.radiating.is_empty() => Some(Radiators::new(scene, &heat.radiating, surfaces)?),
-            _ => None,
-        };
-        let axis = surfaces.as_mut().zip(sky.as_ref()).map(|(surfaces, sky)| {
-            surfaces.spectra.push(Needed::Exact("places in the environment map".into(), sky.axis.clone()));
-            surfaces.spectra.len() - 1
-        });
+        let General { mut surfaces, mut media, mut radiators, mut sky } = General::of(scene, &heat, &accel)?;
+        let is_general = surfaces.is_some();
+
         // General scenes meet a uniform environment by sampling the BSDF, and do not aim at it.
         let uniform = scene.environment.as_ref().and_then(|e| e.uniform());
-        let uniform = uniform.map(|radiance| scene.spectra[radiance].curve.scaled(4.0 * PI));
-        let aimed_at = uniform.as_ref().filter(|_| !general).or(sky.as_ref().map(|sky| &sky.flux));
+        let flux = uniform.map(|radiance| scene.spectra[radiance].curve.scaled(4.0 * PI));
+        let aimed_at = flux.as_ref().filter(|_| !is_general).or(sky.as_ref().map(|sky| &sky.flux));
         let picks = light_picks(scene, &accel, aimed_at);
-        let media_spectra = surfaces.as_ref().map_or(0, |s| s.spectra.len());
-        if let (Some(surfaces), Some(media)) = (&mut surfaces, &mut media) {
-            surfaces.spectra.append(&mut media.spectra);
-        }
+
+        // A pixel's paths share the registers; who takes a path at a time would fill them for each.
+        let in_registers = !is_general && integration.is_none() && evaluator == Evaluator::DpeptPixel;
         let weights = integration.as_ref().map(|integration| integration.weights.as_slice());
-        let environment = uniform.as_ref().or(sky.as_ref().map(|sky| &sky.flux));
+        let environment = flux.as_ref().or(sky.as_ref().map(|sky| &sky.flux));
         let emitted = || Emitted::of(scene, &accel, &picks.lamps, environment).shares(scene, &accel);
         let needed = surfaces.as_ref().map_or(&[][..], |s| &s.spectra);
-        // A pixel's paths share them; who takes a path at a time would fill them for each.
-        let in_registers = !general && integration.is_none() && evaluator == Evaluator::DpeptPixel;
         let (tables, ids, warp) = spectral_tables(scene, &heat, needed, in_registers, weights, emitted)?;
-        if let Some(surfaces) = &mut surfaces {
-            surfaces.name_spectra(|position| tables.ids[ids.needed[position]]);
-        }
-        if let Some(radiators) = &mut radiators {
-            radiators.name_spectra(|position| tables.ids[ids.needed[position]]);
-        }
-        if let Some(media) = &mut media {
-            media.name_spectra(|position| tables.ids[ids.needed[media_spectra + position]]);
-        }
-        let media_shape = media.as_ref().map(|m| MediaShape {
-            outer: m.outer,
-            camera_is_cut: m.camera_is_cut,
-            stretches: m.stretches,
-            grids: m.wavelength.map(|_| m.most_columns),
-        });
-        let of_grids = media.as_ref().and_then(|m| m.wavelength).map(|w| tables.ids[ids.needed[media_spectra + w]]);
-        let wavelength = of_grids.or(radiators.as_ref().map(|r| r.wavelength));
-
         let factor = |s: usize| tables.ids[ids.factors[&s]];
         let source = |s: usize| tables.ids[ids.sources[&s]];
+        let id = |position: usize| tables.ids[ids.needed[position]];
+        surfaces.iter_mut().for_each(|surfaces| surfaces.name_spectra(id));
+        radiators.iter_mut().for_each(|radiators| radiators.name_spectra(id));
+        media.iter_mut().for_each(|media| media.name_spectra(id));
+        if let Some(sky) = &mut sky {
+            sky.axis_id = id(sky.axis_id as usize);
+            sky.source_id = scene.environment.as_ref().and_then(daylight).map_or(0, source);
+        }
+
         let materials = match surfaces {
             None => scene.materials.iter().map(|m| material(scene, m, factor)).collect(),
             Some(_) => Vec::new(),
         };
-        let map = sky.as_ref().zip(axis).map(|(sky, axis)| Map {
-            size: sky.size,
-            bands: sky.bands,
-            axis: tables.ids[ids.needed[axis]],
-            source: scene.environment.as_ref().and_then(daylight).map_or(0, source),
-        });
-        let (lamps, lamp_emitters) = lamps(scene, &accel, &picks, source);
-        // Behind all that can be chosen: the spectra of what emits by angle.
-        let first_row = accel.emitters.len() + lamp_emitters.len();
-        let rows = heat.by_angle.iter().flatten().flatten();
-        let rows = rows.map(|&spectrum| Emitter { primitive: source(spectrum), ..Emitter::default() });
-        let emitters = accel
-            .emitters
-            .iter()
-            .zip(&picks.emitters)
-            .map(|(&(primitive, object, area), &pick)| {
-                let emission = scene.objects[object].emission.as_ref().expect("emitters come from emitting objects");
-                let sides = if emission.sides == Sides::Both { EMITS_BOTH_SIDES } else { 0 };
-                let spectrum = match (heat.kinds[object], &radiators) {
-                    (heat::Kind::ByAngle(group), _) => (first_row + 2 * group * heat::COSINES) as u32 | EMITS_BY_ANGLE,
-                    (heat::Kind::ByPlace(place), Some(radiators)) => radiators.words[place] | EMITS_BY_PLACE,
-                    _ => source(emission.radiance),
-                };
-                Emitter { primitive, spectrum: spectrum | sides, pick: pick as f32, area: area as f32 }
-            })
-            .chain(lamp_emitters)
-            .chain(rows)
-            .collect();
-        let environment_spectrum = scene.environment.as_ref().and_then(|e| e.uniform()).map_or(0, source);
-        let mut features = features(scene, &accel, &tables, ids.factors.len() + ids.sources.len());
+        let (lamps, of_lamps) = lamps(scene, &accel, &picks, source);
+        let emitters = emitters(scene, &accel, &picks, &heat, radiators.as_ref(), of_lamps, source);
+        let features =
+            Features { registers: in_registers && fit_registers(&tables, &ids), ..features(scene, &accel, &tables) };
         let suns = scene.lights.iter().filter(|light| matches!(light, Light::Sun { .. })).count() as u32;
-        let of = |surfaces: &Surfaces| General {
-            hot: !heat.by_angle.is_empty(),
-            radiators: radiators.as_ref().map(|r| r.features),
-            wavelength,
-            lamps: !lamps.is_empty(),
-            suns,
-            map,
-            media: media_shape,
-            ..General::of(surfaces, scene)
-        };
-        features.general = surfaces.as_ref().map(of);
-        features.registers &= in_registers;
-        let frame = frame(scene, seed, &accel, &picks, environment_spectrum, tables.stratum_bits);
-        let max_records = max_records(vertices_at_once(evaluator, &frame), features, surfaces.as_ref(), media.as_ref());
-        if max_records >= MAX_RECORDS {
-            let message = format!(
-                "a path of {} bounces may take {max_records} records in this scene, at most {MAX_RECORDS} are supported: \
-                 lower integrator.max_bounces",
-                frame.max_bounces
-            );
-            return Err(Error::input(&scene.file, message));
-        }
-        let prepared = Prepared {
+        let frame = frame(scene, seed, &accel, &picks, uniform.map_or(0, source), tables.stratum_bits);
+        let mut prepared = Prepared {
             evaluator,
             features,
-            frame: Frame { max_records, ..frame },
+            frame,
             materials,
+            wavelength: media.as_ref().and_then(|m| m.wavelength).or(radiators.as_ref().map(|r| r.wavelength)),
             surfaces,
             media,
             emitters,
             lamps,
+            suns,
+            emits_by_angle: !heat.by_angle.is_empty(),
             radiators,
             sky,
             picks,
@@ -335,22 +184,53 @@ impl Prepared {
             accel,
             tables,
         };
-        if prepared.path_iterations() > LOOP_LIMIT {
+        prepared.plan_records(scene)?;
+        Ok(prepared)
+    }
+
+    /// Sets the most records of a path. Errors: more of them, or of the voxels on its ways, than one evaluation can walk through.
+    fn plan_records(&mut self, scene: &Scene) -> Result<()> {
+        let bounces = self.frame.max_bounces;
+        let records: Records = self.whole().parts().map(|part| (part.records)(&self.whole())).sum();
+        let most = records.of(self.vertices_at_once());
+        if most >= MAX_RECORDS {
             let message = format!(
-                "a path of {} bounces may go through {} voxels on each of its ways, more than one evaluation can: lower \
-                 integrator.max_bounces or use coarser grids",
-                prepared.frame.max_bounces,
-                prepared.media.as_ref().map_or(0, |media| media.cells)
+                "a path of {bounces} bounces may take {most} records in this scene, at most {MAX_RECORDS} are supported: \
+                 lower integrator.max_bounces"
             );
             return Err(Error::input(&scene.file, message));
         }
-        Ok(prepared)
+        self.frame.max_records = most;
+        if self.path_iterations() > LOOP_LIMIT {
+            let message = format!(
+                "a path of {bounces} bounces may go through {} voxels on each of its ways, more than one evaluation can: lower \
+                 integrator.max_bounces or use coarser grids",
+                self.media.as_ref().map_or(0, |media| media.cells)
+            );
+            return Err(Error::input(&scene.file, message));
+        }
+        Ok(())
+    }
+
+    /// On a device that binds each array as a whole.
+    fn whole(&self) -> OnDevice<'_> {
+        OnDevice { prepared: self, windows: Windows::WHOLE }
+    }
+
+    /// Whether there is more than diffuse surfaces and lamps.
+    pub fn is_general(&self) -> bool {
+        self.surfaces.is_some()
+    }
+
+    /// Scattering events that are saved before they are evaluated: a path's, or one.
+    fn vertices_at_once(&self) -> u32 {
+        if self.evaluator == Evaluator::Pt { 1 } else { self.frame.max_bounces }
     }
 
     /// Iterations that evaluation may take for one path: its records, and the voxels on its ways with the absorbers in each.
     pub fn path_iterations(&self) -> u32 {
         let cells = self.media.as_ref().map_or(0, |media| media.cells.saturating_mul(1 + media.most_absorbers));
-        let ways = vertices_at_once(self.evaluator, &self.frame).saturating_mul(2) + 1;
+        let ways = self.vertices_at_once().saturating_mul(2) + 1;
         (self.frame.max_records + 1).saturating_add(ways.saturating_mul(cells))
     }
 
@@ -366,13 +246,81 @@ impl Prepared {
 
     /// Bytes of a record.
     pub fn record_bytes(&self) -> u32 {
-        if self.features.general.is_some() { 16 } else { 8 }
+        if self.is_general() { 16 } else { 8 }
     }
 
-    /// Bytes of a path's state between two bounces.
+    /// Bytes of a path's state between two bounces: whole vectors of four words.
     pub fn state_bytes(&self) -> u32 {
-        if self.features.general.is_some_and(|g| g.dispersion || g.media.is_some()) { 48 } else { 32 }
+        let words: u32 = self.whole().parts().map(|part| part.state_words).sum();
+        4 * (STATE_WORDS + words).next_multiple_of(4)
     }
+}
+
+/// What makes a scene general. Spectrum ids are positions in `surfaces.spectra` until the tables have given them.
+#[derive(Default)]
+struct General {
+    surfaces: Option<Surfaces>,
+    media: Option<Media>,
+    radiators: Option<Radiators>,
+    sky: Option<SkyMap>,
+}
+
+impl General {
+    /// Nothing where diffuse surfaces and lamps are all there is.
+    fn of(scene: &Scene, heat: &Heat, accel: &Accel) -> Result<General> {
+        let sky = scene.environment.as_ref().and_then(|e| e.map()).map(|map| SkyMap::new(scene, map));
+        let is_general = scene.materials.iter().any(|m| !matches!(m.bsdf, Bsdf::Diffuse { .. } | Bsdf::Black))
+            || scene.objects.iter().any(|object| object.attributes != Attributes::default())
+            || !scene.textures.is_empty()
+            || !scene.lights.is_empty()
+            || sky.is_some()
+            || !scene.media.is_empty()
+            || !heat.by_angle.is_empty()
+            || !heat.radiating.is_empty();
+        if !is_general {
+            return Ok(General::default());
+        }
+        let mut media = Media::new(scene, accel)?;
+        let mut surfaces = Surfaces::new(scene);
+        let radiators = match heat.radiating.is_empty() {
+            true => None,
+            false => Some(Radiators::new(scene, &heat.radiating, &mut surfaces)?),
+        };
+        let sky = sky.map(|sky| {
+            let axis = Needed::Exact("places in the environment map".into(), sky.axis.clone());
+            SkyMap { axis_id: surfaces.need(axis), ..sky }
+        });
+        if let Some(media) = &mut media {
+            media.move_spectra(&mut surfaces.spectra);
+        }
+        Ok(General { surfaces: Some(surfaces), media, radiators, sky })
+    }
+}
+
+/// Emitting primitives, then lamps, then the spectra of what emits by angle, behind all that can be chosen.
+fn emitters(
+    scene: &Scene,
+    accel: &Accel,
+    picks: &LightPicks,
+    heat: &Heat,
+    radiators: Option<&Radiators>,
+    lamps: Vec<Emitter>,
+    source: impl Fn(usize) -> u32,
+) -> Vec<Emitter> {
+    let first_row = accel.emitters.len() + lamps.len();
+    let rows = heat.by_angle.iter().flatten().flatten();
+    let rows = rows.map(|&spectrum| Emitter { primitive: source(spectrum), ..Emitter::default() });
+    let primitives = accel.emitters.iter().zip(&picks.emitters).map(|(&(primitive, object, area), &pick)| {
+        let emission = scene.objects[object].emission.as_ref().expect("emitters come from emitting objects");
+        let sides = if emission.sides == Sides::Both { EMITS_BOTH_SIDES } else { 0 };
+        let spectrum = match (heat.kinds[object], radiators) {
+            (heat::Kind::ByAngle(group), _) => (first_row as u32 + 2 * group as u32 * HOT_COSINES) | EMITS_BY_ANGLE,
+            (heat::Kind::ByPlace(place), Some(radiators)) => radiators.words[place] | EMITS_BY_PLACE,
+            _ => source(emission.radiance),
+        };
+        Emitter { primitive, spectrum: spectrum | sides, pick: pick as f32, area: area as f32 }
+    });
+    primitives.chain(lamps).chain(rows).collect()
 }
 
 /// The scene's lights as the device has them, and their places among the emitters.
@@ -416,7 +364,7 @@ fn material(scene: &Scene, m: &crate::scene::Material, factor: impl Fn(usize) ->
     Material { factor, two_sided: u32::from(m.two_sided), albedo: survival as f32, unused: 0 }
 }
 
-fn features(scene: &Scene, accel: &Accel, tables: &SpectralTables, spectra: usize) -> Features {
+fn features(scene: &Scene, accel: &Accel, tables: &SpectralTables) -> Features {
     Features {
         thin_lens: matches!(scene.camera.projection, Projection::ThinLens { .. }),
         orthographic: matches!(scene.camera.projection, Projection::Orthographic { .. }),
@@ -425,43 +373,17 @@ fn features(scene: &Scene, accel: &Accel, tables: &SpectralTables, spectra: usiz
         emitters: !accel.emitters.is_empty(),
         environment: scene.environment.as_ref().is_some_and(|e| e.uniform().is_some()),
         shapes: accel.has_shapes,
-        few_triangles: !accel.has_shapes && scene.media.is_empty() && are_few(&accel.primitives),
+        few_triangles: !accel.has_shapes && scene.media.is_empty() && geometry::are_few(&accel.primitives),
         roulette: scene.integrator.russian_roulette_start > 0,
         strata: tables.stratum_bits > 0,
         knots: tables.has_knots(),
-        registers: !tables.has_knots() && spectra <= MAX_REGISTER_SPECTRA,
-        general: None,
+        registers: false,
     }
 }
 
-/// Whether these triangles may be constants of a shader, whose text has no subnormal numbers.
-fn are_few(triangles: &[Primitive]) -> bool {
-    let plain = |v: &f32| *v == 0.0 || v.is_normal();
-    (1..=FEW_TRIANGLES).contains(&triangles.len())
-        && triangles.iter().all(|p| [p.a, p.b, p.c].as_flattened().iter().all(plain))
-}
-
-/// Scattering events that are saved before they are evaluated: a path's, or one.
-fn vertices_at_once(evaluator: Evaluator, frame: &Frame) -> u32 {
-    if evaluator == Evaluator::Pt { 1 } else { frame.max_bounces }
-}
-
-/// Most records of `bounces` scattering events of a path and of what it meets after them: at every one what materials take, and
-/// emission where a surface or the sky emits.
-fn max_records(bounces: u32, features: Features, surfaces: Option<&Surfaces>, media: Option<&Media>) -> u32 {
-    let general = features.general.unwrap_or_default();
-    // Where a path leaves the scene: the environment, and suns that may cover one another.
-    let hot = general.radiators.map_or(0, |radiators| radiators.records);
-    let emission = if features.emitters { (bounces + 1).saturating_mul(hot.max(1)) } else { 1 } + general.suns;
-    // A direction in a map is an instruction of its own, and parts a diffuse vertex in two.
-    let aimed = if general.map.is_some() { 2 } else { 0 };
-    // The way to each vertex, and from each to a light; a vertex that aims through a medium has no record for both.
-    let way = media.map_or(0, Media::way_records);
-    let through = if media.is_some() { way + 2 } else { 0 };
-    // What is aimed at may be hot: its records, put aside and back, and a diffuse vertex in two.
-    let aimed = aimed + if hot > 0 { hot + 3 } else { 0 };
-    let vertex = surfaces.map_or(1, |s| s.vertex_records) + aimed + way + through;
-    (emission + way).saturating_add(bounces.saturating_mul(vertex))
+/// Whether all spectra of a plain scene may be held in registers.
+fn fit_registers(tables: &SpectralTables, ids: &SpectrumIds) -> bool {
+    !tables.has_knots() && ids.factors.len() + ids.sources.len() <= MAX_REGISTER_SPECTRA
 }
 
 fn frame(

@@ -34,7 +34,10 @@ impl Module {
 /// The module that a file in `shaders/` is.
 macro_rules! module {
     ($path:literal) => {
-        $crate::device::text::Module { name: $path, text: include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/shaders/", $path)) }
+        $crate::device::text::Module {
+            name: $path,
+            text: include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/shaders/", $path)),
+        }
     };
 }
 pub(crate) use module;
@@ -138,7 +141,8 @@ fn emit(lines: &[(usize, &str)], module: &Module, defines: &Defines, counts: &Co
         } else if let Some(names) = directive.strip_prefix("#constants ") {
             for name in names.split_whitespace() {
                 let declared = words::declarations(name).or_else(|| instructions::declarations(name));
-                let declared = declared.unwrap_or_else(|| panic!("shaders/{}:{number}: no constants {name}", module.name));
+                let declared =
+                    declared.unwrap_or_else(|| panic!("shaders/{}:{number}: no constants {name}", module.name));
                 declared.iter().for_each(|line| out.push(line, (module.name, number)));
             }
             at += 1;

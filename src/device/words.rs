@@ -156,8 +156,8 @@ constants! {
     }
 }
 
-/// The most loop iterations that one invocation of any kernel may run: a driver in use ends loops after 65,535 of them, silently.
-/// The self-test at start-up checks this many.
+/// The most loop iterations, of all its loops, that one invocation of any kernel may run: Mesa 22.3's lavapipe ends loops at 65,535
+/// without a word. The self-test at start-up checks this many.
 pub const LOOP_LIMIT: u32 = 32_768;
 
 /// Declarations in WGSL of the group of constants `name`, or of the one constant; `None` where there is neither.
@@ -369,24 +369,25 @@ impl Counters {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::device::text::{Defines, compose, module};
     use std::mem::{offset_of, size_of};
 
     /// What naga says about the struct `name` in types.wgsl: its size, and its members' names and offsets.
     fn wgsl_struct(name: &str) -> (u32, Vec<(String, u32)>) {
         let sources = [
-            include_str!("../../shaders/common/types.wgsl"),
-            include_str!("../../shaders/common/tables.wgsl"),
-            include_str!("../../shaders/common/material.wgsl"),
-            include_str!("../../shaders/common/radiator.wgsl"),
+            module!("common/types.wgsl"),
+            module!("common/tables.wgsl"),
+            module!("parts/surfaces/material.wgsl"),
+            module!("parts/heat/radiator.wgsl"),
         ];
-        let module = naga::front::wgsl::parse_str(&sources.concat()).unwrap();
+        let module = compose(&sources, &Defines::default()).parse().unwrap();
         let found = module.types.iter().find_map(|(_, t)| match &t.inner {
             naga::TypeInner::Struct { members, span } if t.name.as_deref() == Some(name) => {
                 Some((*span, members.iter().map(|m| (m.name.clone().unwrap(), m.offset)).collect()))
             }
             _ => None,
         });
-        found.unwrap_or_else(|| panic!("no struct {name} in types.wgsl or material.wgsl"))
+        found.unwrap_or_else(|| panic!("no struct {name} in types.wgsl or the parts"))
     }
 
     macro_rules! same_layout {
@@ -453,20 +454,21 @@ mod tests {
         });
         same_layout!(Radiator { kind, spectra, inner, weight, alpha, kelvin, temperature, reflectance, shares });
         assert_eq!(size_of::<Primitive>(), 48);
-        let constants = [
-            ("COUNTER_OVERFLOW", offset_of!(Counters, overflow)),
-            ("COUNTER_NON_FINITE", offset_of!(Counters, non_finite)),
-            ("COUNTER_NEGATIVE", offset_of!(Counters, negative)),
-            ("COUNTER_BAD_SLOT", offset_of!(Counters, bad_slot)),
-            ("COUNTER_BAD_SAMPLE", offset_of!(Counters, bad_sample)),
-            ("COUNTER_RAYS", offset_of!(Counters, rays_low)),
-            ("COUNTER_RAYS_HIGH", offset_of!(Counters, rays_high)),
-            ("COUNTER_FOLDED", offset_of!(Counters, folded)),
-            ("COUNTER_SEQUENCE", offset_of!(Counters, sequence)),
+        let counters = [
+            (COUNTER_OVERFLOW, offset_of!(Counters, overflow)),
+            (COUNTER_NON_FINITE, offset_of!(Counters, non_finite)),
+            (COUNTER_NEGATIVE, offset_of!(Counters, negative)),
+            (COUNTER_BAD_SLOT, offset_of!(Counters, bad_slot)),
+            (COUNTER_BAD_SAMPLE, offset_of!(Counters, bad_sample)),
+            (COUNTER_RAYS, offset_of!(Counters, rays_low)),
+            (COUNTER_RAYS_HIGH, offset_of!(Counters, rays_high)),
+            (COUNTER_FOLDED, offset_of!(Counters, folded)),
+            (COUNTER_SEQUENCE, offset_of!(Counters, sequence)),
+            (COUNTER_RECORDS, offset_of!(Counters, records)),
         ];
-        for (name, offset) in constants {
-            let declared = format!("const {name}: u32 = {}u;", offset / 4);
-            assert!(include_str!("../../shaders/common/types.wgsl").contains(&declared), "{declared}");
+        assert_eq!(size_of::<Counters>(), 4 * counters.len());
+        for (place, offset) in counters {
+            assert_eq!(4 * place as usize, offset);
         }
     }
 
@@ -481,5 +483,26 @@ mod tests {
         assert!(missing(Counters { sequence: 6, ..done }).contains("number 6"));
         assert!(missing(Counters { folded: 64, ..done }).contains("64 samples have paths that ended, not 128"));
         assert!(missing(Counters { rays_low: 99, ..done }).contains("99 rays"));
+    }
+
+    /// No WGSL file declares what the host has a name for.
+    #[test]
+    fn no_constant_is_typed_twice() {
+        fn files(folder: &std::path::Path) -> Vec<std::path::PathBuf> {
+            let entries = std::fs::read_dir(folder).expect("shaders").map(|entry| entry.expect("an entry").path());
+            entries.flat_map(|path| if path.is_dir() { files(&path) } else { vec![path] }).collect()
+        }
+        let ours: Vec<&str> = GROUPS.iter().flat_map(|(_, all)| all.iter().map(|(name, _)| *name)).collect();
+        let ops = crate::device::instructions::INSTRUCTIONS.iter().map(|instruction| instruction.name);
+        let ours: Vec<&str> = ours.into_iter().chain(ops).collect();
+        let all = files(&std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders"));
+        assert!(all.len() > 40);
+        for file in all {
+            let text = std::fs::read_to_string(&file).expect("a shader");
+            for line in text.lines().filter_map(|line| line.trim().strip_prefix("const ")) {
+                let name = line.split(':').next().expect("a name");
+                assert!(!ours.contains(&name), "{}: {name} is in words.rs or instructions.rs", file.display());
+            }
+        }
     }
 }

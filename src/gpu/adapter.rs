@@ -22,6 +22,8 @@ pub struct AdapterFacts {
     /// Largest buffer that one binding can show, bytes.
     pub max_binding: u64,
     pub max_buffer: u64,
+    /// Storage buffers that one kernel can bind; how many a scene needs, `spectile plan` says.
+    pub storage_buffers: u32,
     pub timestamps: bool,
     pub is_software: bool,
     /// Why Spectile cannot use it.
@@ -56,10 +58,6 @@ pub(crate) enum Trouble {
     Other(String),
 }
 
-/// Storage buffers that the largest pass may bind at once, generate_vertex: what every scene has (3 of the scene, 4 windows
-/// each of nodes and primitives, 8 of the wave), and what materials, lights and media of general scenes add.
-pub const STORAGE_BUFFERS: u32 = 30;
-
 fn instance() -> wgpu::Instance {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
     descriptor.backends = wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12;
@@ -83,16 +81,8 @@ fn rank(info: &wgpu::AdapterInfo) -> u32 {
 
 fn facts(adapter: &wgpu::Adapter) -> AdapterFacts {
     let (info, limits) = (adapter.get_info(), adapter.limits());
-    let unusable = if limits.max_storage_buffers_per_shader_stage < STORAGE_BUFFERS {
-        Some(format!(
-            "binds {} storage buffers, {STORAGE_BUFFERS} are needed",
-            limits.max_storage_buffers_per_shader_stage
-        ))
-    } else if limits.max_compute_invocations_per_workgroup < 256 {
-        Some("its compute workgroups are smaller than 256".to_owned())
-    } else {
-        None
-    };
+    let unusable = (limits.max_compute_invocations_per_workgroup < 256)
+        .then(|| "its compute workgroups are smaller than 256".to_owned());
     AdapterFacts {
         name: info.name,
         backend: info.backend.to_string(),
@@ -108,6 +98,7 @@ fn facts(adapter: &wgpu::Adapter) -> AdapterFacts {
         pci: Some(info.device_pci_bus_id).filter(|address| !address.is_empty()),
         max_binding: limits.max_storage_buffer_binding_size,
         max_buffer: limits.max_buffer_size,
+        storage_buffers: limits.max_storage_buffers_per_shader_stage,
         timestamps: adapter.features().contains(wgpu::Features::TIMESTAMP_QUERY),
         is_software: info.device_type == wgpu::DeviceType::Cpu,
         unusable,

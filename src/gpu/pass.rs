@@ -1,7 +1,7 @@
 //! A compute pass: a composed shader, its pipeline, and bindings found by the names they have in the WGSL.
 
 use crate::gpu::adapter::Gpu;
-use crate::device::text::Source;
+use crate::gpu::source::Source;
 use crate::{Error, Result};
 
 /// A compute pipeline whose bind groups are made from the shader's own declarations.
@@ -26,12 +26,22 @@ struct Binding {
 const DYNAMIC: &str = "step";
 
 impl Pass {
-    /// Compiles `source`, whose entry point is called like its file.
+    /// Compiles `source`, whose entry point is called like its file. Errors: a defect of the text; more storage buffers than the device
+    /// binds.
     pub fn new(gpu: &Gpu, source: &Source) -> Result<Pass> {
         let module = source.parse()?;
         let entry = module.entry_points.first().map(|e| e.name.clone());
         let entry = entry.ok_or_else(|| Error::Internal(format!("{} has no entry point", source.label)))?;
         let bindings = bindings(&module);
+        let needed = bindings.iter().filter(|b| !b.uniform).count() as u32;
+        let most = gpu.limits.max_storage_buffers_per_shader_stage;
+        if needed > most {
+            return Err(Error::NoDevice(format!(
+                "{}: {} binds {needed} storage buffers for this scene, and this device {most} at most: use another device, or a \
+                 scene with fewer kinds of materials, lights, textures or media",
+                gpu.name, source.label
+            )));
+        }
         let groups = bindings.iter().map(|b| b.group + 1).max().unwrap_or(0);
         let device = &gpu.device;
         let layouts: Vec<_> = (0..groups)
@@ -93,6 +103,11 @@ impl Pass {
             entries: &entries,
         }))
     }
+}
+
+/// Storage buffers that a kernel binds.
+pub fn storage_buffers(source: &Source) -> Result<u32> {
+    Ok(bindings(&source.parse()?).iter().filter(|b| !b.uniform).count() as u32)
 }
 
 fn bindings(module: &naga::Module) -> Vec<Binding> {

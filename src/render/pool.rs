@@ -8,16 +8,16 @@ use std::thread;
 use std::time::Instant;
 
 use crate::cube::{Look, Writer, epoch_samples, merge_means, samples_before};
+use crate::device::prepared::Prepared;
+use crate::device::words::Counters;
 use crate::files::format_bytes;
 use crate::gpu::adapter::Gpu;
 use crate::gpu::buffer::{self, WARM_UP};
 #[cfg(test)]
 use crate::gpu::fault::Phase;
-use crate::device::words::Counters;
-use crate::render::self_test;
 use crate::preview::Source;
-use crate::device::prepared::Prepared;
 use crate::render::queue::{Group, Next, Queue};
+use crate::render::self_test;
 use crate::render::watch::{Device, Reports};
 use crate::render::wave::{Budget, WavePlan};
 use crate::render::worker::{Collected, Interrupt, Profile, UnitRect, Worker, device_limits};

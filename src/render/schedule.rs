@@ -9,11 +9,11 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 
 use crate::cube::{Run, RunFile, Writer, check_target, epoch_samples, epochs_in, reduction, samples_before};
+use crate::device::prepared::Prepared;
 use crate::gpu::adapter::Gpu;
 use crate::render::job::{Job, SURE_EPOCHS};
 use crate::render::plan;
 use crate::render::pool::{Merged, Pool, Report, Tally};
-use crate::device::prepared::Prepared;
 use crate::render::queue::Queue;
 use crate::render::watch::{Polled, Reports};
 use crate::render::worker::{Interrupt, Profile, check_interrupt};

@@ -1,24 +1,23 @@
 //! The start-up self-test: catches drivers that cut loops short or compute wrong before they spoil a cube.
 
+use crate::device::rng;
+use crate::device::text::{Defines, compose, module};
+use crate::device::words::LOOP_LIMIT;
 use crate::gpu::adapter::Gpu;
 use crate::gpu::buffer;
 use crate::gpu::pass::Pass;
-use crate::device::text::{self, Defines};
-use crate::device::rng;
 use crate::{Error, Result};
 
 const LANES: u32 = 64;
 const WORDS: usize = 6;
-/// The most loop iterations, of all its loops, that one invocation of any kernel may run: Mesa 22.3's lavapipe ends loops at 65,535
-/// without a word.
-pub const LOOP_LIMIT: u32 = 32_768;
 const NAN_BITS: u32 = 0x7fc0_0000;
 const SEED: u64 = 0x0123_4567_89ab_cdef;
 
 /// Runs the kernel and compares every word with what it must be.
 pub fn run(gpu: &Gpu) -> Result<()> {
     let _watched = gpu.deadline.watch(buffer::WARM_UP);
-    let source = shader::compose(&[shader::RNG, shader::SELF_TEST], &Defines::default());
+    let modules = [module!("common/rng.wgsl"), module!("passes/self_test.wgsl")];
+    let source = compose(&modules, Defines::default().set("SOBOL", true));
     let pass = Pass::new(gpu, &source)?;
     let input = buffer::storage(gpu, "self-test input", &[LOOP_LIMIT, SEED as u32, (SEED >> 32) as u32, NAN_BITS])?;
     let size = u64::from(LANES) * WORDS as u64 * 4;

@@ -5,18 +5,21 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
+use crate::device::evaluator::EvaluateShape;
+use crate::device::facts;
+use crate::device::part::OnDevice;
+use crate::device::prepared::Prepared;
+use crate::device::windows::Windows;
+use crate::device::words::{Counters, Proof, Wave};
 use crate::gpu::adapter::Gpu;
 use crate::gpu::buffer;
 #[cfg(test)]
-use crate::gpu::fault::Phase;
-use crate::device::words::{Counters, Proof, Wave};
+use crate::gpu::fault::{self, Phase};
 use crate::gpu::pass::Pass;
-use crate::device::text;
+use crate::gpu::source::Source;
 use crate::gpu::timestamps::Timestamps;
-use crate::gpu::upload::{self, SceneBuffers};
-use crate::device::kernels::EvaluateShape;
+use crate::gpu::upload::NamedBuffers;
 use crate::render::patience::Patience;
-use crate::device::prepared::Prepared;
 use crate::render::wave::{Budget, DeviceLimits, WavePlan};
 use crate::{Error, Result};
 
@@ -149,8 +152,9 @@ impl Worker {
     /// As [`Worker::new`], with waves as planned.
     pub fn with_waves(gpu: Arc<Gpu>, prepared: Arc<Prepared>, plan: WavePlan) -> Result<Worker> {
         let _watched = gpu.deadline.watch(buffer::WARM_UP);
-        let windows = upload::windows(&prepared, plan.limits.binding)?;
-        let scene = SceneBuffers::new(&gpu, &prepared, &windows)?;
+        let windows = Windows::of(&prepared.accel, plan.limits.binding)?;
+        let on_device = OnDevice { prepared: &prepared, windows };
+        let scene = upload(&gpu, &on_device)?;
         let path_buffers = PathBuffers::new(&gpu, &plan);
         let slots = (0..SLOTS)
             .map(|_| {
@@ -163,20 +167,19 @@ impl Worker {
         // Before shaders are compiled in vain.
         gpu.check()?;
 
-        let shape = prepared.evaluate_shape(gpu.is_software);
-        let defines = prepared.defines(&windows);
-        let stage = |modules: &[shader::Module], defines: &shader::Defines| {
-            let pass = Pass::new(&gpu, &shader::compose(modules, defines))?;
+        let shape = EvaluateShape::of(&prepared, gpu.is_software);
+        let kernels = on_device.kernels(shape);
+        let stage = |source: &Source| {
+            let pass = Pass::new(&gpu, source)?;
             let groups = (0..2)
                 .map(|group| pass.bind(&gpu, group, |name| scene.find(name).or_else(|| path_buffers.find(name))))
                 .collect::<Result<_>>()?;
             Ok::<_, Error>(Stage { pass, groups })
         };
-        let camera = stage(&prepared.camera_modules(), &defines)?;
-        let bounce = stage(&prepared.bounce_modules(), &defines)?;
-        let defines = prepared.evaluate_defines(shape);
-        let update = prepared.update_modules().map(|modules| stage(&modules, &defines)).transpose()?;
-        let evaluate = stage(&prepared.evaluate_modules(), &defines)?;
+        let camera = stage(&kernels.camera)?;
+        let bounce = stage(&kernels.bounce)?;
+        let update = kernels.update.as_ref().map(stage).transpose()?;
+        let evaluate = stage(&kernels.evaluate)?;
         gpu.check()?;
         let profile = Profile::default();
         let timestamps = None;
@@ -244,7 +247,7 @@ impl Worker {
                 self.wait_for_wave()?;
             }
             #[cfg(test)]
-            self.gpu.faults.reach(Phase::of(&wave), &self.gpu);
+            self.gpu.faults.reach(phase(&wave), &self.gpu);
             self.submit_wave(wave)?;
         }
 
@@ -323,6 +326,12 @@ impl Worker {
                 let what = format!("{}: a unit came back incomplete: {what}", self.gpu.name);
                 return Err(Error::DevicesLost(what));
             }
+            if counters.records > self.plan.max_records {
+                return Err(Error::Internal(format!(
+                    "a path took {} records where {} were planned for: its unit was not merged",
+                    counters.records, self.plan.max_records
+                )));
+            }
             collected(Collected {
                 #[cfg(test)]
                 gpu: &self.gpu,
@@ -372,7 +381,11 @@ impl Worker {
         let paths = wave.path_count;
         let [groups, pixel_groups] = [paths.div_ceil(64), wave.pixel_count.div_ceil(self.shape.pixels)];
         #[cfg(test)]
-        self.gpu.faults.silence(&mut wave);
+        match self.gpu.faults.silence() {
+            Some(fault::Kind::SilentGenerate) => wave.path_count = 0,
+            Some(_) => wave.pixel_count = 0,
+            None => {}
+        }
 
         let _watched = self.gpu.deadline.watch(self.limit());
         self.gpu.queue.write_buffer(&self.path_buffers.wave, 0, bytemuck::bytes_of(&wave));
@@ -454,6 +467,20 @@ impl Worker {
             timestamp_writes: self.timestamps.as_ref().map(|timestamps| timestamps.writes(index)),
         })
     }
+}
+
+/// When a fault planned for `wave` happens.
+#[cfg(test)]
+fn phase(wave: &Wave) -> Phase {
+    if wave.pixel_begin + wave.sample_begin == 0 { Phase::FirstWave } else { Phase::LaterWave }
+}
+
+/// The scene's buffers on a device. Errors: one that exceeds a binding; a device that is lost, or whose memory does not hold them.
+pub fn upload(gpu: &Gpu, scene: &OnDevice) -> Result<NamedBuffers> {
+    let limits = gpu.device.limits();
+    facts::check_bindings(scene, limits.max_storage_buffer_binding_size.min(limits.max_buffer_size))?;
+    let storage = scene.buffers().into_iter().map(|buffer| (buffer.name, buffer.bytes));
+    NamedBuffers::new(gpu, ("frame", bytemuck::bytes_of(&scene.frame)), storage)
 }
 
 /// What `gpu` allows. A binding shows no more than 1 GiB, so that offsets stay within 32 bits of words, and leaves room

@@ -4,10 +4,10 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::cube::{Cube, epoch_samples};
-use crate::gpu::adapter::Gpu;
-use crate::device::words::Counters;
-use crate::render::plan;
 use crate::device::prepared::Prepared;
+use crate::device::words::Counters;
+use crate::gpu::adapter::Gpu;
+use crate::render::plan;
 use crate::render::wave::Budget;
 use crate::render::worker::{Interrupt, UnitRect, Worker, check_interrupt};
 use crate::scene::Scene;

@@ -4,7 +4,6 @@ pub mod bench;
 pub mod chart;
 pub mod converge;
 pub mod convergence;
-pub mod everything;
 pub mod page;
 pub mod throughput;
 

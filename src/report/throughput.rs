@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use crate::Result;
-use crate::gpu::adapter::Gpu;
 use crate::device::prepared::Prepared;
+use crate::gpu::adapter::Gpu;
 use crate::render::wave::{Budget, WavePlan};
 use crate::render::worker::{Interrupt, UnitRect, Worker};
 use crate::scene::Scene;

@@ -147,7 +147,7 @@ pub struct Integrator {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Evaluator {
-    /// What is fastest on the device, by a fixed rule of its kind and the number of channels ([`Evaluator::on`]).
+    /// What is fastest on the device, by a fixed rule of its kind and the number of channels (`device::evaluator`).
     Auto,
     /// Deferred: a thread takes some channels of a pixel along all its saved paths.
     DpeptPixel,
@@ -162,20 +162,6 @@ pub enum Evaluator {
 impl Evaluator {
     pub const ALL: [Evaluator; 5] =
         [Evaluator::Auto, Evaluator::DpeptPixel, Evaluator::DpeptPath, Evaluator::DpeptSpectral, Evaluator::Pt];
-
-    /// Channels up to which `auto` is the conventional path tracer on GPUs. Measured with `spectile bench` on an H200 (docs/reports):
-    /// its paths per second over those of `dpept-pixel`, geometric mean of four scenes, were 1.43 at 8 channels, 0.86 at 32 and 0.36 at
-    /// 128. On software devices `dpept-pixel` was the fastest in all of them, or one percent from it.
-    pub const MOST_PT_CHANNELS: usize = 16;
-
-    /// What to use on a software device or a GPU: this evaluator, or what `auto` stands for.
-    pub fn on(self, software: bool, channels: usize) -> Evaluator {
-        match self {
-            Evaluator::Auto if !software && channels <= Evaluator::MOST_PT_CHANNELS => Evaluator::Pt,
-            Evaluator::Auto => Evaluator::DpeptPixel,
-            chosen => chosen,
-        }
-    }
 
     /// Whether a dispatch takes one sample of every pixel, instead of all that are there.
     pub fn takes_one_sample(self) -> bool {

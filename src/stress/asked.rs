@@ -3,14 +3,16 @@
 use glam::DVec3;
 
 use crate::Result;
+use crate::device::part::OnDevice;
+use crate::device::prepared::Prepared;
+use crate::device::rng::hash;
+use crate::device::text::{Module, module};
+use crate::device::windows::Windows;
 use crate::gpu::adapter::Gpu;
 use crate::gpu::buffer;
 use crate::gpu::pass::Pass;
-use crate::device::text::{self, Module};
-use crate::gpu::upload::{self, SceneBuffers};
-use crate::device::prepared::Prepared;
-use crate::device::rng::hash;
-use crate::render::worker::device_limits;
+use crate::gpu::upload::NamedBuffers;
+use crate::render::worker::{device_limits, upload};
 
 /// Random numbers of each question.
 pub const SAMPLES: u32 = 60_000;
@@ -30,7 +32,7 @@ pub fn random<const N: usize>(count: u32, seed: u32) -> Vec<[f32; N]> {
 pub struct Kernel<'a> {
     gpu: &'a Gpu,
     pass: Pass,
-    scene: SceneBuffers,
+    scene: NamedBuffers,
     /// For what the modules declare and the kernel does not use.
     unused: wgpu::Buffer,
 }
@@ -38,12 +40,9 @@ pub struct Kernel<'a> {
 impl<'a> Kernel<'a> {
     /// `module` in the place of the pass that follows paths, after all that it is made of.
     pub fn around(gpu: &'a Gpu, prepared: &Prepared, module: Module) -> Result<Kernel<'a>> {
-        let mut modules = prepared.bounce_modules();
-        modules.pop();
-        modules.push(module);
-        let windows = upload::windows(prepared, device_limits(gpu).binding)?;
-        let scene = SceneBuffers::new(gpu, prepared, &windows)?;
-        let pass = Pass::new(gpu, &shader::compose(&modules, &prepared.defines(&windows)))?;
+        let scene = OnDevice { prepared, windows: Windows::of(&prepared.accel, device_limits(gpu).binding)? };
+        let pass = Pass::new(gpu, &scene.around_tracing(module))?;
+        let scene = upload(gpu, &scene)?;
         let unused = buffer::empty(gpu, "unused", 256, wgpu::BufferUsages::STORAGE);
         Ok(Kernel { gpu, pass, scene, unused })
     }
@@ -96,7 +95,7 @@ pub struct Scattering<'a>(Kernel<'a>);
 
 impl<'a> Scattering<'a> {
     pub fn new(gpu: &'a Gpu, prepared: &Prepared) -> Result<Scattering<'a>> {
-        Ok(Scattering(Kernel::around(gpu, prepared, shader::CHOOSE)?))
+        Ok(Scattering(Kernel::around(gpu, prepared, module!("probes/choose.wgsl"))?))
     }
 
     /// Directions for random numbers (two for the direction, two for the part), light arriving along `o`.
@@ -132,7 +131,7 @@ pub struct Aiming<'a>(Kernel<'a>);
 
 impl<'a> Aiming<'a> {
     pub fn new(gpu: &'a Gpu, prepared: &Prepared) -> Result<Aiming<'a>> {
-        Ok(Aiming(Kernel::around(gpu, prepared, shader::AIM)?))
+        Ok(Aiming(Kernel::around(gpu, prepared, module!("probes/aim.wgsl"))?))
     }
 
     /// From `origin` (device units), for pairs of random numbers.

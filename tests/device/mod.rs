@@ -4,10 +4,10 @@
 
 use std::sync::{Arc, Mutex, MutexGuard};
 
-use spectile::gpu::adapter::Gpu;
-use spectile::device::words::Counters;
-use spectile::reference;
 use spectile::device::prepared::Prepared;
+use spectile::device::words::Counters;
+use spectile::gpu::adapter::Gpu;
+use spectile::reference;
 use spectile::render::wave::Budget;
 use spectile::render::worker::{UnitRect, Worker};
 use spectile::scene::Scene;

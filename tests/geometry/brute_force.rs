@@ -1,8 +1,8 @@
 //! The device's traversal and triangle test against a loop over all triangles in f64.
 
 use glam::DVec3;
-use spectile::device::words::Primitive;
 use spectile::device::prepared::Prepared;
+use spectile::device::words::Primitive;
 use spectile::scene::Mesh;
 
 use crate::tracer::{Ray, trace};

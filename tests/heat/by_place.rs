@@ -2,8 +2,8 @@
 //! metals. Closed forms through the reference and through devices, and one against the other.
 
 use glam::{DMat3, DVec2, DVec3};
-use spectile::reference;
 use spectile::device::prepared::Prepared;
+use spectile::reference;
 use spectile::scene::{Attributes, Camera, Filter, Projection, Scene, Shape, Sides, TextureKind};
 use spectile::spectral::{Channels, Curve, Outside, planck as law};
 
@@ -247,6 +247,5 @@ fn textured_heat_agrees_with_the_reference() {
 fn other_heat_pays_nothing() {
     let scene = Builder::new().plastic(unit_square(), 0.5, 1.5, 0.1).at_kelvin(300.0).build();
     let prepared = Prepared::new(&scene, 0).unwrap_or_else(|e| panic!("{e}"));
-    let general = prepared.features.general.expect("plastic is general");
-    assert!(prepared.radiators.is_none() && general.radiators.is_none() && general.wavelength.is_none());
+    assert!(prepared.is_general() && prepared.radiators.is_none() && prepared.wavelength.is_none());
 }

@@ -1,8 +1,8 @@
 //! Heat on devices: closed forms, and against the f64 path tracer (docs/METHOD.md, Closed forms).
 
 use glam::{DVec2, DVec3};
-use spectile::device::words::{Emitter, Material};
 use spectile::device::prepared::Prepared;
+use spectile::device::words::{Emitter, Material};
 use spectile::scene::{Attributes, Filter, Projection, Scene, Sides, Temperature};
 use spectile::spectral::{Channels, Curve, Outside, planck as law};
 

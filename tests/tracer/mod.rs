@@ -1,9 +1,9 @@
 //! Rays of a test's own choice through the renderer's traversal and intersections on the first device.
 
-use spectile::gpu::adapter::Gpu;
-use spectile::device::words::NONE;
-use spectile::device::text::Module;
 use spectile::device::prepared::Prepared;
+use spectile::device::text::Module;
+use spectile::device::words::NONE;
+use spectile::gpu::adapter::Gpu;
 use spectile::stress::asked::Kernel;
 
 const TRACE: Module = Module { name: "tests/tracer/trace.wgsl", text: include_str!("trace.wgsl") };

@@ -95,32 +95,6 @@ fn walk(ray: Ray, limit: f32, around: ptr<function, vec2<u32>>, way: ptr<functio
     return walked;
 }
 
-#if CAMERA_CUT
-// The volumes around `start`, where a camera ray begins: those of a place in the same lens or window, but for what the straight way
-// from there enters and leaves.
-fn volumes_at(start: vec3<f32>, overflow: ptr<function, bool>) -> vec2<u32> {
-    var around = vec2<u32>(volumes[1], volumes[2]);
-    let place = volume_vector(volumes[3]);
-    var ray = Ray(place, start - place);
-    let length2 = max(dot(ray.direction, ray.direction), 1.0e-37);
-    for (var n = 0u; n < MOST_CROSSINGS; n += 1u) {
-        let hit = traverse(ray, dot(start - ray.origin, ray.direction) / length2, false, overflow);
-        if (hit.primitive == NONE || *overflow) {
-            return around;
-        }
-        let surface = surface_at(ray, hit);
-        let entering = dot(surface.normal, ray.direction) < 0.0;
-        let number = boundaries[hit.primitive] & 0xffu;
-        if (number != 0u && !cross_boundary(&around, number, entering)) {
-            *overflow = true;
-        }
-        ray.origin = offset_origin(surface.position, select(surface.normal, -surface.normal, entering));
-    }
-    *overflow = true;
-    return around;
-}
-#endif
-
 // Records of the way along `ray`; the outer medium, volume OUTER_VOLUME, is left out where the way leads to infinity: what arrives
 // from there has been measured at the scene. With `mode` 0 they act on the path, and the media emit `scale`; with MODE_ON_F on
 // what next-event estimation found.

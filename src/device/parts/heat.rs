@@ -11,7 +11,11 @@ use std::rc::Rc;
 
 use glam::DVec3;
 
+use crate::device::part::{Part, Place, Records, SceneBuffer};
+use crate::device::parts::geometry::{FEWER_MATERIALS, MATERIALS};
 use crate::device::parts::textures::{self, Share};
+use crate::device::text::module;
+use crate::device::words::HOT_COSINES;
 use crate::scattering::fresnel::{conductor, dielectric, mean_conductor, mean_dielectric};
 use crate::scattering::{DielectricAlbedo, FACET_COSINES, FacetCosines, ReflectionAlbedo, facet_cosine, index_range};
 use crate::scene::{
@@ -22,7 +26,74 @@ use crate::spectral::{Channels, Curve, planck};
 /// The mean over a hemisphere by projected solid angle.
 const TYPICAL_COSINE: f64 = 2.0 / 3.0;
 /// Cosines (j / (n - 1))³ at which the emission of a side is known; between them it is linear in j.
-pub const COSINES: usize = 128;
+const COSINES: usize = HOT_COSINES as usize;
+
+pub const BY_ANGLE: Part = Part {
+    name: "heat that depends on the angle",
+    used: |scene| scene.emits_by_angle,
+    effect: |_| "256 spectra for each hot material that is not diffuse".into(),
+    is_planned: true,
+    modules: &[(Place::Stage, module!("parts/heat/angle.wgsl"))],
+    lines: &[
+        ("EMITTED", "if (emits_by_angle(list, path, site, v, emitter, weight)) { return; }"),
+        ("AIMED_AT_SURFACE", "aim_by_angle(aim, path, emitter, point);"),
+    ],
+    example: Some(|exhibit| exhibit.add_hot_metal()),
+    ..Part::NOTHING
+};
+
+pub const BY_PLACE: Part = Part {
+    name: "heat that differs by place",
+    used: |scene| scene.radiators.is_some(),
+    effect: |scene| {
+        let most = scene.radiators.as_ref().map_or(0, |radiators| radiators.features.records);
+        format!("up to {most} records where a path meets it")
+    },
+    is_planned: true,
+    modules: &[(Place::Stage, module!("parts/heat/radiator.wgsl")), (Place::Stage, module!("parts/heat/place.wgsl"))],
+    lines: &[
+        ("EMITTED", "if (emits_by_place(list, path.number, v, emitter, weight)) { return; }"),
+        ("AIMED_AT_SURFACE", "aim_by_place(aim, emitter, point);"),
+        ("LIGHT_TAKES_RECORDS", "if (aim.hot != 0u) { return true; }"),
+        (
+            "LIGHT_RECORDS",
+            "if (aim.hot != 0u) { append_heat_aimed_at(list, aim.hot, aim.hot_vertex, facet_numbers(path, SALT_AIMED)); }",
+        ),
+    ],
+    defines: |scene, _, defines| {
+        let Some(features) = scene.radiators.as_ref().map(|radiators| radiators.features) else { return };
+        defines.set("RADIATORS", true).set("HOT_LAMPS", features.lamps);
+        defines.set("HOT_FACETS", features.facets).set("HOT_MIRRORS", features.mirrors);
+        defines.set("HOT_VARNISH", features.varnish).set("HOT_COATS", features.coats);
+        defines.set("HOT_TEXTURED", features.textured).set("HOT_NUMBERS", features.numbers);
+    },
+    buffers: |scene| {
+        let radiators = scene.prepared.radiators.as_ref().map(|radiators| &radiators.all);
+        radiators.map(|all| SceneBuffer::new("radiators", all, MATERIALS, FEWER_MATERIALS)).into_iter().collect()
+    },
+    // What is met, beside the one record of every emitter; and what is aimed at: those records, put aside and back, and a diffuse
+    // vertex in two.
+    records: |scene| {
+        let most = scene.radiators.as_ref().map_or(0, |radiators| radiators.features.records);
+        Records { way: most.max(1) - 1, vertex: most + 3, path: 0 }
+    },
+    example: Some(|exhibit| exhibit.add_hot_textures()),
+    ..Part::NOTHING
+};
+
+/// What both have in common.
+pub const EITHER: Part = Part {
+    name: "hot surfaces",
+    used: |scene| scene.emits_by_angle || scene.radiators.is_some(),
+    modules: &[(Place::Stage, module!("parts/heat/heat.wgsl"))],
+    defines: |scene, _, defines| {
+        let features = scene.radiators.as_ref().map(|radiators| radiators.features);
+        let smooth = scene.surfaces.as_ref().is_some_and(|surfaces| surfaces.smooth);
+        defines.set("HOT_RANDOM", scene.emits_by_angle || features.is_some_and(|features| features.facets));
+        defines.set("HOT_VERTICES", features.is_some() || smooth);
+    },
+    ..Part::NOTHING
+};
 
 /// A scene whose heat is emission of its objects.
 pub struct Heat<'a> {
@@ -51,13 +122,13 @@ type OfLamp = Option<(SpectrumId, bool)>;
 
 /// A surface of hot parts, and its lamp.
 pub struct Radiating {
-    pub parts: Vec<HotPart>,
+    pub parts: Vec<HotLeaf>,
     pub lamp: OfLamp,
 }
 
 /// A hot part of a material, at the end of its blends.
 #[derive(Debug, Clone)]
-pub struct HotPart {
+pub struct HotLeaf {
     pub material: MaterialId,
     pub weight: f64,
     /// What blend textures leave of it.
@@ -257,7 +328,7 @@ fn collect(
     weight: f64,
     shares: &[Share],
     temperature: Option<Temperature>,
-    out: &mut Vec<HotPart>,
+    out: &mut Vec<HotLeaf>,
 ) {
     let material = &scene.materials[id];
     let temperature = material.temperature.or(temperature);
@@ -274,13 +345,13 @@ fn collect(
         // Absorbs nothing.
         (Bsdf::Dielectric { .. }, _) | (_, None) => {}
         (_, Some(temperature)) if weight > 0.0 => {
-            out.push(HotPart { material: id, weight, shares: shares.to_vec(), temperature });
+            out.push(HotLeaf { material: id, weight, shares: shares.to_vec(), temperature });
         }
         _ => {}
     }
 }
 
-impl HotPart {
+impl HotLeaf {
     /// Whether what it emits depends on more than the cosine.
     fn differs_by_place(&self, scene: &Scene) -> bool {
         let bsdf = &scene.materials[self.material].bsdf;

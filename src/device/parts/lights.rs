@@ -1,9 +1,92 @@
 //! Decision probabilities of next-event estimation, common to all channels (docs/METHOD.md, Decisions).
 
-use super::emission::{Emitted, area, radiance};
 use crate::device::accel::Accel;
+use crate::device::emission::{Emitted, area, radiance};
+use crate::device::part::{OnDevice, Part, Place, Records, SceneBuffer};
+use crate::device::text::module;
 use crate::scene::{Light, Scene};
 use crate::spectral::Curve;
+
+pub const AREA_LIGHTS: Part = Part {
+    name: "area lights",
+    used: |scene| scene.features.emitters,
+    effect: |scene| format!("{} records of {} bytes a path", scene.frame.max_bounces + 1, scene.record_bytes()),
+    is_planned: true,
+    modules: &[(Place::Stage, module!("stages/emit.wgsl"))],
+    lines: &[("EMIT", "emit(&list, path, meeting, site, v);")],
+    defines: |_, _, defines| _ = defines.set("EMITTERS", true),
+    records: |_| Records { way: 1, ..Records::NONE },
+    example: Some(|exhibit| exhibit.add_lamp()),
+    ..Part::NOTHING
+};
+
+pub const NEXT_EVENT: Part = Part {
+    name: "next-event estimation",
+    used: |scene| scene.features.environment || aims(scene),
+    effect: |_| "a shadow ray a bounce".into(),
+    is_planned: true,
+    modules: &[(Place::Generate, module!("parts/lights/next_event.wgsl"))],
+    defines: |_, _, defines| _ = defines.set("LIGHTS", true),
+    ..Part::NOTHING
+};
+
+/// Whether there is a light that general scenes aim at.
+fn aims(scene: &OnDevice) -> bool {
+    scene.features.emitters || !scene.lamps.is_empty() || scene.sky.is_some()
+}
+
+pub const AIMS: Part = Part {
+    name: "aiming at lights",
+    used: |scene| scene.is_general() && aims(scene),
+    modules: &[(Place::Stage, module!("stages/aim/light.wgsl"))],
+    lines: &[
+        ("AIM", "aim = aim_at_light(number, site, v, u_choice.x, draw(from_path, dimension + DIMENSION_LIGHT_POINT));"),
+        ("LIGHT_WEIGHT", "weight = path.scale * light_weight(aim, chance);"),
+    ],
+    defines: |scene, _, defines| {
+        defines.set("CHOOSES", scene.features.emitters || !scene.lamps.is_empty());
+    },
+    ..Part::NOTHING
+};
+
+pub const LAMPS: Part = Part {
+    name: "point, directional, sun lights",
+    used: |scene| !scene.lamps.is_empty(),
+    effect: |_| "32 bytes a light".into(),
+    is_planned: true,
+    modules: &[
+        (Place::Generate, module!("parts/lights/lamp.wgsl")),
+        (Place::Stage, module!("parts/lights/aim_at_lamp.wgsl")),
+    ],
+    lines: &[("AIM_AT_EMITTER", "if (aims_at_lamp(&aim, emitter, seen_from, u)) { return aim; }")],
+    defines: |_, _, defines| _ = defines.set("LAMPS", true),
+    buffers: |scene| vec![SceneBuffer::new("lamps", &scene.prepared.lamps, "the lights of the scene", "fewer of them")],
+    example: Some(|exhibit| exhibit.add_lights()),
+    ..Part::NOTHING
+};
+
+pub const SUNS: Part = Part {
+    name: "suns",
+    used: |scene| scene.suns > 0,
+    modules: &[
+        (Place::Generate, module!("parts/lights/sun.wgsl")),
+        (Place::Stage, module!("parts/lights/arrive_from_suns.wgsl")),
+    ],
+    lines: &[("BEYOND", "arrive_from_suns(&list, path);")],
+    defines: |scene, _, defines| _ = defines.constant("SUNS", scene.suns),
+    // They may cover one another.
+    records: |scene| Records { path: scene.suns, ..Records::NONE },
+    ..Part::NOTHING
+};
+
+/// Emitting surfaces among what general scenes aim at; after lights without one.
+pub const SURFACES: Part = Part {
+    name: "aiming at surfaces",
+    used: |scene| scene.is_general() && scene.features.emitters,
+    modules: &[(Place::Stage, module!("stages/aim/surface.wgsl"))],
+    lines: &[("AIM_AT_EMITTER", "aim_at_surface(&aim, path, emitter, seen_from, u);")],
+    ..Part::NOTHING
+};
 
 /// With which probability next-event estimation asks which light.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -69,7 +152,7 @@ fn intervals(environment: f64, weights: &[f64]) -> (Vec<f32>, Vec<f64>) {
 }
 
 /// Random numbers on the device have 24 bits.
-pub(super) const STEPS: f64 = 16_777_216.0;
+pub const STEPS: f64 = 16_777_216.0;
 
 /// q by shares, see [`light_picks`], for `powers[light][channel]`.
 fn probabilities(powers: &[Vec<f64>]) -> Vec<f64> {

@@ -3,25 +3,112 @@
 use glam::{DAffine3, DVec3};
 
 use crate::device::accel::Accel;
-use crate::device::words::{NONE, Primitive};
+use crate::device::part::{Part, Place, Records, SceneBuffer};
+use crate::device::parts::origins::{Cut, Origins};
+use crate::device::parts::surfaces::{Needed, wavelength};
+use crate::device::text::{Module, module};
+use crate::device::words::{NONE, NULL_BOUNDARY, Primitive, VOLUME_EMITS, VOLUME_GRID, VOLUME_WORDS, VOLUMES_HEAD};
 use crate::scene::{Bsdf, Field, Interior, MaterialId, Medium, Scene, SpectrumId};
 use crate::spectral::{Curve, planck};
 use crate::{Error, Result};
 
-use super::origins::{Cut, Origins};
-use super::surfaces::{Needed, wavelength};
-
 /// Numbers of volumes have 8 bits in a path's state, of which 0 is none.
 const MOST_VOLUMES: usize = 254;
-/// Words before the first volume, and of each: `shaders/common/volume.wgsl`.
-const HEAD: usize = 4;
-const WORDS: usize = 24;
-const GRID: u32 = 1;
-const EMITS: u32 = 2;
-/// Bit of a boundary without material.
-const NULL_BOUNDARY: u32 = 0x8000_0000;
+const HEAD: usize = VOLUMES_HEAD as usize;
+const WORDS: usize = VOLUME_WORDS as usize;
 /// Stretches through media that one straight way may have.
 const MOST_STRETCHES: u32 = 16;
+
+pub const MEDIA: Part = Part {
+    name: "media",
+    used: |scene| scene.media.is_some(),
+    effect: |_| "16 bytes a path, a record for each stretch of a way".into(),
+    is_planned: true,
+    modules: &[
+        (Place::Generate, VOLUME),
+        (Place::Generate, module!("parts/media/medium.wgsl")),
+        (Place::Stage, module!("stages/meet/media.wgsl")),
+        (Place::Evaluate, module!("parts/media/extinction.wgsl")),
+    ],
+    lines: &[
+        ("LIGHT_TAKES_RECORDS", "if (light_is_dimmed(way)) { return true; }"),
+        ("LIGHT_RECORDS", "append_light_way(list, way, aim);"),
+        ("PASSED", "pass_surface(&path, site, choice.direction, &overflow);"),
+    ],
+    defines: |scene, _, defines| {
+        let Some(media) = &scene.media else { return };
+        defines.set("MEDIA", true);
+        defines.constant("OUTER_VOLUME", media.outer).constant("MOST_STRETCHES", media.stretches);
+    },
+    buffers: |scene| {
+        let buffers = scene.prepared.media.as_ref().map(|media| {
+            [
+                SceneBuffer::new("volumes", &media.volumes, CONTENT, "smaller grids"),
+                SceneBuffer::new("boundaries", &media.boundaries, "the geometry of the scene", "fewer triangles"),
+            ]
+        });
+        buffers.into_iter().flatten().collect()
+    },
+    // The way to each vertex, and from each to a light; a vertex that aims through a medium has no record for both.
+    records: |scene| {
+        let way = scene.media.as_ref().map_or(0, Media::way_records);
+        Records { way, vertex: way + 2, path: 0 }
+    },
+    state_words: 2,
+    example: Some(|exhibit| exhibit.add_gas()),
+    ..Part::NOTHING
+};
+
+const VOLUME: Module = module!("parts/media/volume.wgsl");
+const CONTENT: &str = "the media of the scene";
+
+/// In the place of media, in general scenes.
+pub const VACUUM: Part = Part {
+    name: "vacuum",
+    used: |scene| scene.is_general() && scene.media.is_none(),
+    modules: &[(Place::Stage, module!("stages/meet/vacuum.wgsl"))],
+    ..Part::NOTHING
+};
+
+pub const CAMERA_CUT: Part = Part {
+    name: "camera rays that start in different media",
+    used: |scene| scene.media.as_ref().is_some_and(|media| media.camera_is_cut),
+    effect: |_| "a way through the lens or window for each path".into(),
+    is_planned: true,
+    modules: &[(Place::Generate, module!("parts/media/camera_cut.wgsl"))],
+    lines: &[("CAMERA_STARTS", "    nested = volumes_at(ray.origin, overflow);")],
+    ..Part::NOTHING
+};
+
+pub const VOXELS: Part = Part {
+    name: "media of voxels",
+    used: |scene| scene.media.as_ref().is_some_and(Media::has_grids),
+    effect: |_| "a march through its cells for each stretch and channel".into(),
+    is_planned: true,
+    modules: &[(Place::Evaluate, VOLUME)],
+    defines: |scene, _, defines| {
+        defines.set("GRIDS", true).set("MOST_COLUMNS", scene.media.as_ref().map_or(0, |media| media.most_columns));
+    },
+    buffers: |scene| {
+        let voxels = scene.prepared.media.as_ref().map(|media| &media.voxels);
+        voxels.map(|voxels| SceneBuffer::new("voxels", voxels, CONTENT, "smaller grids")).into_iter().collect()
+    },
+    example: Some(|exhibit| exhibit.add_voxels()),
+    ..Part::NOTHING
+};
+
+/// Absorption and emission that evaluation works out.
+pub const PLANCK: Part = Part {
+    name: "emission where paths are evaluated",
+    used: |scene| scene.media.is_some() || scene.wavelength.is_some(),
+    modules: &[(Place::Evaluate, module!("common/planck.wgsl"))],
+    defines: |scene, _, defines| {
+        if let Some(wavelength) = scene.wavelength {
+            defines.set("PLANCK", true).constant("WAVELENGTH", wavelength);
+        }
+    },
+    ..Part::NOTHING
+};
 
 /// Everything about media that a device needs. Spectra are positions in `spectra` until [`Media::name_spectra`].
 pub struct Media {
@@ -40,7 +127,7 @@ pub struct Media {
     pub stretches: u32,
     pub cells: u32,
     /// Position of the wavelength among `spectra`, where there are grids.
-    pub wavelength: Option<usize>,
+    pub wavelength: Option<u32>,
     /// Words of `volumes` that are positions in `spectra`.
     spectrum_words: Vec<usize>,
 }
@@ -121,11 +208,19 @@ impl Media {
         self.stretches * if self.has_grids() { 3 } else { 1 }
     }
 
-    /// Replaces positions in `spectra` by the ids that the device's tables gave them.
+    /// Moves its spectra to the end of `all`; positions are then those there.
+    pub fn move_spectra(&mut self, all: &mut Vec<Needed>) {
+        let first = all.len();
+        all.append(&mut self.spectra);
+        self.name_spectra(|position| (first + position) as u32);
+    }
+
+    /// Replaces positions of spectra by the ids that the device's tables gave them.
     pub fn name_spectra(&mut self, id: impl Fn(usize) -> u32) {
         for &word in &self.spectrum_words {
             self.volumes[word] = id(self.volumes[word] as usize);
         }
+        self.wavelength = self.wavelength.map(|position| id(position as usize));
     }
 
     fn fill(&mut self, scene: &Scene, accel: &Accel, index: usize, volume: &Volume) {
@@ -137,7 +232,7 @@ impl Media {
         };
         let mut words = [0u32; WORDS];
         words[2] = NONE;
-        words[0] = if medium.temperature.is_some() { EMITS } else { 0 };
+        words[0] = if medium.temperature.is_some() { VOLUME_EMITS } else { 0 };
         let Some(size) = medium.grid_size() else {
             let kelvin = medium.temperature.as_ref().and_then(constant);
             let density = constant(&medium.density).unwrap_or(1.0);
@@ -153,7 +248,7 @@ impl Media {
             self.volumes[first..first + WORDS].copy_from_slice(&words);
             return;
         };
-        words[0] |= GRID;
+        words[0] |= VOLUME_GRID;
         let mut grid = |field: Option<&Field>| match field {
             Some(Field::Grid(grid)) => {
                 self.voxels.extend_from_slice(&grid.values);
@@ -196,7 +291,7 @@ impl Media {
         self.most_absorbers = self.most_absorbers.max(medium.absorbers.len() as u32);
         self.cells += size.iter().sum::<u32>() + 3;
         if self.wavelength.is_none() {
-            self.wavelength = Some(self.spectra.len());
+            self.wavelength = Some(self.spectra.len() as u32);
             self.spectra.push(wavelength(scene));
         }
     }
@@ -318,7 +413,7 @@ fn source(scene: &Scene, kelvin: f64, index: Option<&Curve>) -> Curve {
 }
 
 /// Spectra and factors whose sum is the absorption of a homogeneous medium, m⁻¹.
-pub(super) fn terms(medium: &Medium, kelvin: Option<f64>, density: f64) -> (Vec<SpectrumId>, Vec<f64>) {
+pub fn terms(medium: &Medium, kelvin: Option<f64>, density: f64) -> (Vec<SpectrumId>, Vec<f64>) {
     let mut all = Vec::new();
     for absorber in &medium.absorbers {
         let (columns, strength) = (&absorber.columns, absorber.strength * density);

@@ -1,41 +1,35 @@
 //! Hot surfaces that emit otherwise at every place (temperatures, reflectances or shares from textures) or by azimuth (brushed
-//! metals), as devices get them: `shaders/common/radiator.wgsl` turns each part into instructions where a path meets it.
+//! metals), as devices get them: `shaders/parts/heat/place.wgsl` turns each into instructions where a path meets it.
 
-use crate::device::words::{NONE, Radiator};
-use crate::device::parts::heat::{HotPart, Radiating};
+use crate::device::parts::heat::{HotLeaf, Radiating};
 use crate::device::parts::surfaces::{self, Surfaces, texture_records};
+use crate::device::words::{
+    HOT_FACET_COUNT, NONE, RADIATOR_ABSORBS, RADIATOR_COAT, RADIATOR_FACETS, RADIATOR_LAMP, RADIATOR_MIRROR,
+    RADIATOR_OPEN, RADIATOR_TWO_SIDED, RADIATOR_VARNISH, Radiator,
+};
 use crate::scattering::fresnel::{mean_conductor, mean_dielectric};
 use crate::scattering::{ReflectionAlbedo, index_range};
 use crate::scene::{Bsdf, Reflectance, SMOOTH, Scene, Temperature};
 use crate::spectral::Curve;
 use crate::{Error, Result};
 
-/// What the surface of a part does: the `RADIATOR_…` of the shader.
+/// What the surface of a radiator does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u32)]
 enum Kind {
-    /// Nothing: what is inside is black or reflects diffusely.
-    Open = 0,
-    /// A smooth metal, and one of facets.
-    Mirror = 1,
-    Facets = 2,
-    /// A smooth or rough coat.
-    Varnish = 3,
-    Coat = 4,
-    /// A lamp, which no temperature decides.
-    Lamp = 5,
+    Open = RADIATOR_OPEN,
+    Mirror = RADIATOR_MIRROR,
+    Facets = RADIATOR_FACETS,
+    Varnish = RADIATOR_VARNISH,
+    Coat = RADIATOR_COAT,
+    Lamp = RADIATOR_LAMP,
 }
 
-const TWO_SIDED: u32 = 0x100;
-/// What is inside absorbs as spectrum `inner` says: below a coat, or what facets have scattered more than once.
-const ABSORBS: u32 = 0x200;
 /// Of [`Emitter::spectrum`](crate::device::words::Emitter): first radiator and their number, 16 and 12 bits.
 const COUNT_SHIFT: u32 = 16;
 const MOST: usize = 1 << 16;
-/// Facets that a rough metal shows at once.
-const FACETS: u32 = 5;
 
-/// Parts of all surfaces that emit by place. Spectra are positions among those that materials need until
+/// Radiators of all surfaces that emit by place. Spectra are positions among those that materials need until
 /// [`Radiators::name_spectra`].
 #[derive(Debug, Clone, Default)]
 pub struct Radiators {
@@ -73,7 +67,7 @@ impl Radiators {
             }
             if let Some((spectrum, both)) = surface.lamp {
                 radiators.features.lamps = true;
-                let kind = Kind::Lamp as u32 | if both { TWO_SIDED } else { 0 };
+                let kind = Kind::Lamp as u32 | if both { RADIATOR_TWO_SIDED } else { 0 };
                 radiators.all.push(Radiator { spectra: surfaces.spectrum(spectrum), ..blank(kind) });
                 records += 1;
             }
@@ -101,10 +95,10 @@ impl Radiators {
     }
 
     /// Adds a part, and gives the records that it takes.
-    fn add(&mut self, scene: &Scene, part: &HotPart, surfaces: &mut Surfaces) -> u32 {
+    fn add(&mut self, scene: &Scene, part: &HotLeaf, surfaces: &mut Surfaces) -> u32 {
         let material = &scene.materials[part.material];
         let name = &material.name;
-        let mut radiator = blank(if material.two_sided { TWO_SIDED } else { 0 });
+        let mut radiator = blank(if material.two_sided { RADIATOR_TWO_SIDED } else { 0 });
         radiator.weight = part.weight as f32;
         match part.temperature {
             Temperature::Constant(kelvin) => radiator.kelvin = kelvin as f32,
@@ -125,7 +119,7 @@ impl Radiators {
                     Reflectance::Spectrum(spectrum) => {
                         let absorbed = Curve::derived(&[curve(spectrum)], &scene.channels, |v| 1.0 - v[0]);
                         radiator.inner = surfaces.derived(format!("{name}, absorbed"), absorbed);
-                        radiator.kind |= ABSORBS;
+                        radiator.kind |= RADIATOR_ABSORBS;
                     }
                     Reflectance::Texture(texture) => radiator.reflectance = texture as u32,
                 }
@@ -148,10 +142,10 @@ impl Radiators {
                     };
                     let stays = Curve::derived(&[curve(eta), curve(k)], &scene.channels, stays);
                     radiator.inner = surfaces.derived(format!("{name}, absorbed later"), stays);
-                    radiator.kind |= ABSORBS;
+                    radiator.kind |= RADIATOR_ABSORBS;
                 }
                 self.features.facets = true;
-                (Kind::Facets, 2 * FACETS + 2)
+                (Kind::Facets, 2 * HOT_FACET_COUNT + 2)
             }
             Bsdf::Plastic { reflectance, eta, roughness } => {
                 radiator.spectra = surfaces.spectrum(eta);
@@ -168,7 +162,7 @@ impl Radiators {
                     Reflectance::Spectrum(spectrum) => {
                         let kept = |v: &[f64]| (1.0 - v[0]) / (1.0 - v[0] * back(v[1]));
                         let kept = Curve::derived(&[curve(spectrum), curve(eta)], &scene.channels, kept);
-                        radiator.kind |= ABSORBS;
+                        radiator.kind |= RADIATOR_ABSORBS;
                         surfaces.derived(format!("{name}, kept by the base"), kept)
                     }
                     Reflectance::Texture(texture) => {

@@ -1,11 +1,64 @@
-//! An environment map as devices get it: texels, and tables by which directions are chosen (shaders/common/map.wgsl).
+//! An environment map as devices get it: texels, and tables by which directions are chosen (shaders/parts/sky/map.wgsl).
 
 use std::f64::consts::{PI, TAU};
 
+use crate::device::part::{Part, Place, Records, SceneBuffer};
 use crate::device::parts::lights::STEPS;
+use crate::device::text::module;
 use crate::scene::{EnvironmentMap, Scene, Texels};
 use crate::spectral::skylight;
 use crate::spectral::{Channels, Curve, Outside, upsample};
+
+pub const UNIFORM: Part = Part {
+    name: "environment",
+    used: |scene| scene.features.environment,
+    effect: |_| "one light to choose from".into(),
+    is_planned: true,
+    modules: &[(Place::Stage, module!("parts/sky/uniform.wgsl"))],
+    lines: &[("BEYOND", "arrive_from_uniform_sky(&list, path.scale);")],
+    defines: |_, _, defines| _ = defines.set("ENVIRONMENT", true),
+    ..Part::NOTHING
+};
+
+pub const MAP: Part = Part {
+    name: "environment map",
+    used: |scene| scene.sky.is_some(),
+    effect: |_| "two records a bounce".into(),
+    is_planned: true,
+    modules: &[
+        (Place::Generate, module!("parts/sky/map.wgsl")),
+        (Place::Stage, module!("parts/sky/append_map.wgsl")),
+        (Place::Evaluate, module!("parts/sky/map_value.wgsl")),
+    ],
+    lines: &[
+        ("BEYOND", "arrive_from_map(&list, path);"),
+        ("AIM_AT_MAP", "if (aim_at_map(&aim, choice, u)) { return aim; }"),
+        ("LIGHT_TAKES_RECORDS", "if (aim.from_map) { return true; }"),
+        ("LIGHT_RECORDS", "if (aim.from_map) { append_map(list, MODE_ON_F, aim.map_place, 1.0); }"),
+    ],
+    defines: |scene, _, defines| {
+        let Some(map) = &scene.sky else { return };
+        defines.set("MAP", true).set("OP_MAP", true).constant("MAP_SOURCE", map.source_id);
+        defines.constant("MAP_AXIS", map.axis_id);
+        defines.constant("MAP_WIDTH", map.size[0]).constant("MAP_HEIGHT", map.size[1]);
+        if let Some(bands) = map.bands {
+            defines.set("MAP_SPECTRAL", true).constant("MAP_BANDS", bands);
+        }
+    },
+    buffers: |scene| {
+        let buffers = scene.prepared.sky.as_ref().map(|map| {
+            [
+                SceneBuffer::new("map_table", &map.table, "the environment map", "a smaller one"),
+                SceneBuffer::new("map_texels", &map.texels, "the environment map", "a smaller one"),
+            ]
+        });
+        buffers.into_iter().flatten().collect()
+    },
+    // A direction in a map is an instruction of its own, and parts a diffuse vertex in two.
+    records: |_| Records { vertex: 2, ..Records::NONE },
+    example: Some(|exhibit| exhibit.add_map()),
+    ..Part::NOTHING
+};
 
 /// Wavelengths at which colours are compared: they are smooth.
 const RGB_POINTS: usize = 12;
@@ -19,6 +72,9 @@ pub struct SkyMap {
     pub bands: Option<u32>,
     /// Place of a wavelength: t of a smooth spectrum; or among the bands, the first at 1, and 0 outside.
     pub axis: Curve,
+    /// Ids of its spectrum, and of the one that multiplies all texels.
+    pub axis_id: u32,
+    pub source_id: u32,
     /// Rotation, row and column intervals, importance.
     pub table: Vec<f32>,
     /// ∫ radiance over all directions, W m⁻² nm⁻¹; of RGB maps that of their mean colour.
@@ -63,7 +119,7 @@ impl SkyMap {
                 (texels, Some(count as u32), axis, flux, importance)
             }
         };
-        SkyMap { size: map.size, texels, bands, axis, table: table(map, &importance), flux }
+        SkyMap { size: map.size, texels, bands, axis, axis_id: 0, source_id: 0, table: table(map, &importance), flux }
     }
 }
 

@@ -1,45 +1,49 @@
-//! Materials of general scenes as devices get them: lists of parts (lobes), tables, and the spectra that these need.
+//! Materials of general scenes as devices get them: lists of lobes, tables, and the spectra that these need.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use glam::DVec3;
 
-use crate::device::words::{MATERIAL_DIFFUSE, MATERIAL_TRANSMITS, Part, SurfaceMaterial};
+use crate::device::part::{Part, Place, Records, SceneBuffer};
+use crate::device::parts::geometry::{FEWER_MATERIALS, MATERIALS};
 use crate::device::parts::lights::STEPS;
 use crate::device::parts::textures::{self, Share, Textures};
+use crate::device::text::{Module, module};
+use crate::device::words::{
+    ALBEDO_ROW, COSINE_INTERVALS, LOBE_BASE, LOBE_BEYOND_AGAIN, LOBE_BOUNDARY_AGAIN, LOBE_CONDUCTOR,
+    LOBE_CONDUCTOR_AGAIN, LOBE_DISPERSES, LOBE_LAMBERT, LOBE_MIRROR, LOBE_NARROW, LOBE_OPAQUE, LOBE_REFRACTION,
+    LOBE_ROUGH_BOUNDARY, LOBE_ROUGH_COAT, LOBE_ROUGH_CONDUCTOR, LOBE_TEXTURED, LOBE_TWO_SIDED, Lobe, MATERIAL_DIFFUSE,
+    MATERIAL_TRANSMITS, SurfaceMaterial,
+};
 use crate::scattering::fresnel::{self, mean_conductor, mean_dielectric};
 use crate::scattering::{DielectricAlbedo, ReflectionAlbedo, ReflectionProbability, index_range};
-use crate::scene::{Bsdf, MaterialId, Reflectance, SMOOTH, Scene, SpectrumId, Texture, TextureKind, Weight};
+use crate::scene::{
+    Attributes, Bsdf, MaterialId, Reflectance, SMOOTH, Scene, SpectrumId, Texture, TextureKind, Weight,
+};
 use crate::spectral::{Curve, Outside};
 
-/// What a part is: the `KIND_…` of `shaders/common/material.wgsl`.
+/// What a lobe does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Kind {
-    Lambert = 0,
-    Conductor = 1,
-    RoughConductor = 2,
-    ConductorAgain = 3,
-    Mirror = 4,
-    Refraction = 5,
-    RoughBoundary = 6,
-    BoundaryAgain = 7,
-    BeyondAgain = 8,
-    RoughCoat = 9,
-    Base = 10,
+    Lambert = LOBE_LAMBERT,
+    Conductor = LOBE_CONDUCTOR,
+    RoughConductor = LOBE_ROUGH_CONDUCTOR,
+    ConductorAgain = LOBE_CONDUCTOR_AGAIN,
+    Mirror = LOBE_MIRROR,
+    Refraction = LOBE_REFRACTION,
+    RoughBoundary = LOBE_ROUGH_BOUNDARY,
+    BoundaryAgain = LOBE_BOUNDARY_AGAIN,
+    BeyondAgain = LOBE_BEYOND_AGAIN,
+    RoughCoat = LOBE_ROUGH_COAT,
+    Base = LOBE_BASE,
 }
 
-const OPAQUE: u32 = 0x100;
-const TWO_SIDED: u32 = 0x200;
-const DISPERSES: u32 = 0x400;
-const NARROW: u32 = 0x800;
-const TEXTURED: u32 = 0x1000;
-
 /// Intervals of the device's tables over the cosine.
-const INTERVALS: usize = 256;
+const INTERVALS: usize = COSINE_INTERVALS as usize;
 /// Values in a row of a table of albedos; what the numbers of tables over index and cosine count in.
-const ROW: usize = 128;
+const ROW: usize = ALBEDO_ROW as usize;
 /// Boundaries whose indices are this near to 1 bend by an index this far from it where they are rough (`reference`).
 const MATCHED: f64 = 1e-4;
 
@@ -54,11 +58,11 @@ pub enum Needed {
     Exact(String, Curve),
 }
 
-/// The materials of a scene, flat. Spectra of parts are positions in `spectra` until [`Surfaces::name_spectra`].
+/// The materials of a scene, flat. Spectra of lobes are positions in `spectra` until [`Surfaces::name_spectra`].
 #[derive(Default)]
 pub struct Surfaces {
     pub materials: Vec<SurfaceMaterial>,
-    pub parts: Vec<Part>,
+    pub lobes: Vec<Lobe>,
     pub tables: Vec<f32>,
     pub spectra: Vec<Needed>,
     /// Bit `kind` for each [`Kind`] that occurs.
@@ -76,19 +80,127 @@ pub struct Surfaces {
     pub textured_base: bool,
     /// Where textures are colours: the spectrum that says where in the visible a wavelength is.
     pub visible_place: Option<u32>,
-    /// What blend textures leave of each part.
+    /// What blend textures leave of each lobe.
     shares: Vec<Vec<Share>>,
+    /// Some surface carries texture coordinates, normals or axes; some of them shading normals.
+    pub attributes: bool,
+    pub smooth: bool,
     /// Most records of a scattering event.
     pub vertex_records: u32,
     albedos: BTreeMap<[u64; 3], Arc<DielectricAlbedo>>,
 }
 
-/// Flux that a part scatters per flux arriving: (from behind, cosine, channel).
+/// Lists of lobes, and records that are instructions of a small program.
+pub const LOBES: Part = Part {
+    name: "materials of several lobes",
+    used: |scene| scene.is_general(),
+    effect: |_| "records of 16 bytes instead of 8".into(),
+    is_planned: true,
+    modules: &[
+        (Place::Generate, module!("common/record.wgsl")),
+        (Place::Generate, module!("common/append.wgsl")),
+        (Place::Generate, TABLES),
+        (Place::Generate, module!("parts/surfaces/material.wgsl")),
+        (Place::Generate, module!("parts/surfaces/ggx.wgsl")),
+        (Place::Generate, module!("parts/surfaces/bsdf.wgsl")),
+        (Place::Generate, module!("parts/surfaces/choice.wgsl")),
+        (Place::Evaluate, module!("common/record.wgsl")),
+        (Place::Evaluate, module!("common/program.wgsl")),
+    ],
+    defines: |scene, _, defines| {
+        let Some(surfaces) = &scene.surfaces else { return };
+        defines.set("GENERAL", true).constant("STATE_WORDS", scene.state_bytes() / 16);
+        defines.set("THIRD_STATE", scene.state_bytes() > 32);
+        for (name, kinds) in LOBES_OF_CODE {
+            defines.set(name, kinds.iter().any(|kind| surfaces.has(*kind)));
+        }
+        defines.set("ROUGH_BASE", surfaces.rough_base);
+        defines.set("OP_ETA_TABLE", surfaces.has(Kind::RoughBoundary) || surfaces.rough_base);
+    },
+    buffers: |scene| {
+        let Some(surfaces) = &scene.prepared.surfaces else { return Vec::new() };
+        vec![
+            SceneBuffer::new("surface_materials", &surfaces.materials, MATERIALS, FEWER_MATERIALS),
+            SceneBuffer::new("lobes", &surfaces.lobes, MATERIALS, FEWER_MATERIALS),
+            SceneBuffer::new("tables", &surfaces.tables, MATERIALS, FEWER_MATERIALS),
+        ]
+    },
+    records: |scene| Records { vertex: scene.surfaces.as_ref().map_or(0, |s| s.vertex_records), ..Records::NONE },
+    example: Some(|exhibit| exhibit.add_surfaces()),
+    ..Part::NOTHING
+};
+
+const TABLES: Module = module!("common/tables.wgsl");
+
+/// Code that some kinds of lobes share, by its switch.
+const LOBES_OF_CODE: [(&str, &[Kind]); 13] = [
+    ("MIRRORS", &[Kind::Conductor, Kind::Mirror, Kind::Refraction]),
+    ("MICROFACETS", &[Kind::RoughConductor, Kind::RoughCoat, Kind::RoughBoundary]),
+    ("GLASS", &[Kind::Mirror, Kind::RoughBoundary]),
+    ("CONDUCTOR", &[Kind::Conductor]),
+    ("ROUGH_CONDUCTOR", &[Kind::RoughConductor]),
+    ("CONDUCTOR_AGAIN", &[Kind::ConductorAgain]),
+    ("MIRROR", &[Kind::Mirror]),
+    ("REFRACTION", &[Kind::Refraction]),
+    ("ROUGH_GLASS", &[Kind::RoughBoundary]),
+    ("ROUGH_COAT", &[Kind::RoughCoat]),
+    ("BASE", &[Kind::Base]),
+    ("OP_CONDUCTOR", &[Kind::Conductor, Kind::RoughConductor]),
+    ("OP_FRESNEL", &[Kind::Mirror, Kind::Refraction, Kind::RoughBoundary, Kind::RoughCoat, Kind::Base]),
+];
+
+pub const BRUSHED: Part = Part {
+    name: "roughness along and across",
+    used: |scene| scene.surfaces.as_ref().is_some_and(|surfaces| surfaces.anisotropic),
+    modules: &[(Place::Generate, module!("parts/surfaces/tangent.wgsl"))],
+    defines: |_, _, defines| _ = defines.set("ANISOTROPIC", true),
+    example: Some(|exhibit| exhibit.add_brushed_metal()),
+    ..Part::NOTHING
+};
+
+/// Rough boundaries whose losses evaluation looks up, for each channel's index.
+pub const TABLES_IN_EVALUATION: Part = Part {
+    name: "tables over index and cosine",
+    used: |scene| scene.surfaces.as_ref().is_some_and(|s| s.has(Kind::BoundaryAgain) || s.rough_base),
+    modules: &[(Place::Evaluate, TABLES)],
+    example: Some(|exhibit| exhibit.add_rough_glass()),
+    ..Part::NOTHING
+};
+
+pub const DISPERSION: Part = Part {
+    name: "dispersion",
+    used: |scene| scene.surfaces.as_ref().is_some_and(|surfaces| surfaces.dispersion),
+    effect: |_| "16 bytes a path".into(),
+    is_planned: true,
+    modules: &[
+        (Place::Generate, module!("parts/spectra/channel.wgsl")),
+        (Place::Stage, module!("stages/leave_one_channel.wgsl")),
+    ],
+    lines: &[("ONLY_DIRECTION", "leave_one_channel(&list, &path, choice);")],
+    defines: |scene, _, defines| {
+        let spread = scene.surfaces.as_ref().is_some_and(|surfaces| surfaces.spread);
+        defines.set("DISPERSION", true).set("OP_ONLY", true);
+        defines.set("OP_ROUGH_TRANSMIT", spread).set("RAW_RECORDS", spread);
+    },
+    state_words: 1,
+    example: Some(|exhibit| exhibit.add_glass()),
+    ..Part::NOTHING
+};
+
+/// The one channel's index may have knots.
+pub const KNOTS_OF_ONE_CHANNEL: Part = Part {
+    name: "dispersion by exact knots",
+    used: |scene| scene.features.knots && (DISPERSION.used)(scene),
+    modules: &[(Place::Generate, super::spectra::KNOT_VALUES)],
+    ..Part::NOTHING
+};
+
+/// Flux that a lobe scatters per flux arriving: (from behind, cosine, channel).
 type Albedo = Box<dyn Fn(bool, f64, usize) -> f64>;
 
-/// A part under construction.
+/// A lobe under construction.
 struct Leaf {
-    part: Part,
+    lobe: Lobe,
     /// Whether it scatters what comes from before, from behind.
     active: [bool; 2],
     albedo: Albedo,
@@ -101,7 +213,12 @@ struct Leaf {
 impl Surfaces {
     /// Parts and tables of all materials of `scene`.
     pub fn new(scene: &Scene) -> Surfaces {
-        let mut surfaces = Surfaces::default();
+        let carries = |f: &dyn Fn(&Attributes) -> bool| scene.objects.iter().any(|object| f(&object.attributes));
+        let mut surfaces = Surfaces {
+            attributes: carries(&|attributes| *attributes != Attributes::default()),
+            smooth: carries(&|attributes| attributes.normals.is_some()),
+            ..Surfaces::default()
+        };
         for material in 0..scene.materials.len() {
             let mut leaves = Vec::new();
             surfaces.collect(scene, material, 1.0, &[], &mut leaves);
@@ -131,25 +248,25 @@ impl Surfaces {
         if let Some(textures) = &mut self.textures {
             textures.name_spectra(&id);
         }
-        for part in &mut self.parts {
-            match part.kind & 0xff {
+        for lobe in &mut self.lobes {
+            match lobe.kind & 0xff {
                 // A texture has its own.
-                k if k == Kind::Lambert as u32 && part.kind & TEXTURED != 0 => {}
-                k if k == Kind::Conductor as u32 || k == Kind::RoughConductor as u32 => part.ab = both(part.ab),
-                k if k == Kind::Base as u32 && part.kind & TEXTURED != 0 => {
-                    (part.ab, part.cd) = (low(part.ab), both(part.cd));
+                k if k == Kind::Lambert as u32 && lobe.kind & LOBE_TEXTURED != 0 => {}
+                k if k == Kind::Conductor as u32 || k == Kind::RoughConductor as u32 => lobe.ab = both(lobe.ab),
+                k if k == Kind::Base as u32 && lobe.kind & LOBE_TEXTURED != 0 => {
+                    (lobe.ab, lobe.cd) = (low(lobe.ab), both(lobe.cd));
                 }
-                k if k == Kind::Base as u32 => (part.ab, part.cd) = (low(part.ab), low(part.cd)),
+                k if k == Kind::Base as u32 => (lobe.ab, lobe.cd) = (low(lobe.ab), low(lobe.cd)),
                 k if k == Kind::BoundaryAgain as u32 || k == Kind::BeyondAgain as u32 => {
-                    (part.ab, part.cd) = (low(part.ab), both(part.cd));
+                    (lobe.ab, lobe.cd) = (low(lobe.ab), both(lobe.cd));
                 }
-                _ => part.ab = low(part.ab),
+                _ => lobe.ab = low(lobe.ab),
             }
         }
         self.albedos.clear();
-        // Where nothing scatters, shaders still bind a part.
-        if self.parts.is_empty() {
-            self.parts.push(Part::default());
+        // Where nothing scatters, shaders still bind a lobe.
+        if self.lobes.is_empty() {
+            self.lobes.push(Lobe::default());
         }
     }
 
@@ -162,7 +279,7 @@ impl Surfaces {
             for node in 0..=INTERVALS {
                 let cosine = node as f64 / INTERVALS as f64;
                 let albedo = |leaf: &Leaf, k: usize| match leaf.active[side] {
-                    true => f64::from(leaf.part.weight) * (leaf.albedo)(side == 1, cosine, k).max(0.0),
+                    true => f64::from(leaf.lobe.weight) * (leaf.albedo)(side == 1, cosine, k).max(0.0),
                     false => 0.0,
                 };
                 let (q, largest) = probabilities(&leaves, channels, &albedo);
@@ -172,22 +289,22 @@ impl Surfaces {
                 }
             }
         }
-        let diffuse = leaves.len() == 1 && leaves[0].part.kind & 0xff == Kind::Lambert as u32 && leaves[0].active[0];
-        let diffuse = diffuse && leaves[0].part.weight == 1.0 && leaves[0].part.kind & TEXTURED == 0;
+        let diffuse = leaves.len() == 1 && leaves[0].lobe.kind & 0xff == Kind::Lambert as u32 && leaves[0].active[0];
+        let diffuse = diffuse && leaves[0].lobe.weight == 1.0 && leaves[0].lobe.kind & LOBE_TEXTURED == 0;
         let diffuse = diffuse && leaves[0].shares.is_empty();
-        let transmits = leaves.iter().any(|leaf| leaf.part.kind & OPAQUE == 0);
+        let transmits = leaves.iter().any(|leaf| leaf.lobe.kind & LOBE_OPAQUE == 0);
         self.materials.push(SurfaceMaterial {
-            first_part: self.parts.len() as u32,
-            part_count: leaves.len() as u32,
+            first_lobe: self.lobes.len() as u32,
+            lobe_count: leaves.len() as u32,
             flags: if transmits { MATERIAL_TRANSMITS } else { 0 } | if diffuse { MATERIAL_DIFFUSE } else { 0 },
             survival: ((survival.min(1.0) * STEPS).ceil() / STEPS) as f32,
         });
         let spread: u32 = leaves.iter().map(|leaf| leaf.records).sum();
         self.vertex_records = self.vertex_records.max(spread + spread.max(2));
         for (leaf, picks) in leaves.into_iter().zip(picks) {
-            self.kinds |= 1 << (leaf.part.kind & 0xff);
+            self.kinds |= 1 << (leaf.lobe.kind & 0xff);
             let picks = self.table(&picks);
-            self.parts.push(Part { picks, ..leaf.part });
+            self.lobes.push(Lobe { picks, ..leaf.lobe });
             self.shares.push(leaf.shares);
         }
     }
@@ -230,9 +347,9 @@ impl Surfaces {
         };
         let two_sided = description.two_sided;
         for mut leaf in leaves {
-            leaf.part.weight = weight as f32;
+            leaf.lobe.weight = weight as f32;
             leaf.shares = shares.to_vec();
-            leaf.part.kind |= if opaque { OPAQUE } else { 0 } | if two_sided { TWO_SIDED } else { 0 };
+            leaf.lobe.kind |= if opaque { LOBE_OPAQUE } else { 0 } | if two_sided { LOBE_TWO_SIDED } else { 0 };
             leaf.active = [true, !opaque || two_sided];
             if opaque {
                 // The back of an opaque surface is as its front.
@@ -252,15 +369,15 @@ impl Surfaces {
         if means.iter().all(|m| *m <= 0.0) {
             return Vec::new();
         }
-        let (part, records) = match reflectance {
-            Reflectance::Spectrum(spectrum) => (Part { ab: self.spectrum(spectrum), ..part(Kind::Lambert) }, 1),
+        let (lobe, records) = match reflectance {
+            Reflectance::Spectrum(spectrum) => (Lobe { ab: self.spectrum(spectrum), ..lobe_of(Kind::Lambert) }, 1),
             Reflectance::Texture(texture) => {
                 self.textured = true;
-                let part = Part { kind: Kind::Lambert as u32 | TEXTURED, loss: texture as u32, ..Part::default() };
-                (part, texture_records(&scene.textures[texture]))
+                let lobe = Lobe { kind: Kind::Lambert as u32 | LOBE_TEXTURED, loss: texture as u32, ..Lobe::default() };
+                (lobe, texture_records(&scene.textures[texture]))
             }
         };
-        vec![leaf(part, records, move |_, _, k| means[k])]
+        vec![leaf(lobe, records, move |_, _, k| means[k])]
     }
 
     fn conductor(
@@ -275,12 +392,12 @@ impl Surfaces {
         let ab = self.spectrum(eta) | self.spectrum(k) << 16;
         let reflectance = move |cosine: f64, k: usize| fresnel::conductor(cosine, n[k], kappa[k]);
         let Some(alpha) = roughness else {
-            let part = Part { ab, ..part(Kind::Conductor) };
-            return vec![leaf(part, 0, move |_, cosine, k| reflectance(cosine, k))];
+            let lobe = Lobe { ab, ..lobe_of(Kind::Conductor) };
+            return vec![leaf(lobe, 0, move |_, cosine, k| reflectance(cosine, k))];
         };
         self.anisotropic |= alpha[0] != alpha[1];
         let albedo = Arc::new(ReflectionAlbedo::new(alpha));
-        let once = Part { ab, alpha: alpha.map(|a| a as f32), ..part(Kind::RoughConductor) };
+        let once = Lobe { ab, alpha: alpha.map(|a| a as f32), ..lobe_of(Kind::RoughConductor) };
         let single = Arc::clone(&albedo);
         let mut leaves =
             vec![leaf(once, 1, move |_, cosine, k| reflectance(cosine, k) * (1.0 - mean_over_turns(&single, cosine)))];
@@ -294,15 +411,15 @@ impl Surfaces {
             let curve = Curve::derived(&[&scene.spectra[eta].curve, &scene.spectra[k].curve], &scene.channels, again);
             let means = means_of(scene, &curve);
             let rows: Vec<f32> = albedo.rows().iter().flatten().map(|v| *v as f32).collect();
-            let part = Part {
+            let lobe = Lobe {
                 ab: self.derived(format!("{name}, scattered again"), curve),
                 alpha: alpha.map(|a| a as f32),
                 loss: self.table(&rows),
                 rows: albedo.rows().len() as u32,
                 mean_loss: lost as f32,
-                ..part(Kind::ConductorAgain)
+                ..lobe_of(Kind::ConductorAgain)
             };
-            leaves.push(leaf(part, 1, move |_, cosine, k| means[k] * mean_over_turns(&albedo, cosine)));
+            leaves.push(leaf(lobe, 1, move |_, cosine, k| means[k] * mean_over_turns(&albedo, cosine)));
         }
         leaves
     }
@@ -312,8 +429,8 @@ impl Surfaces {
         self.dispersion |= index.disperses;
         let decision = Arc::new(ReflectionProbability::new(&scene.spectra[eta].curve, &scene.channels));
         let ab = self.spectrum(eta);
-        let kind = if index.disperses { DISPERSES } else { 0 };
-        let with = |k: Kind| Part { ab, kind: k as u32 | kind, eta: index.bending as f32, ..Part::default() };
+        let kind = if index.disperses { LOBE_DISPERSES } else { 0 };
+        let with = |k: Kind| Lobe { ab, kind: k as u32 | kind, eta: index.bending as f32, ..Lobe::default() };
         let through = Arc::clone(&decision);
         vec![
             leaf(with(Kind::Mirror), 0, move |behind, cosine, _| decision.at(behind, cosine)),
@@ -339,17 +456,17 @@ impl Surfaces {
         let narrow = index.disperses && bends_apart(range, index.bending, alpha);
         self.dispersion |= index.disperses;
         self.spread |= index.disperses && !narrow;
-        let boundary = Part {
+        let boundary = Lobe {
             kind: Kind::RoughBoundary as u32
-                | if index.disperses { DISPERSES } else { 0 }
-                | if narrow { NARROW } else { 0 },
+                | if index.disperses { LOBE_DISPERSES } else { 0 }
+                | if narrow { LOBE_NARROW } else { 0 },
             ab: id,
             alpha: [alpha as f32; 2],
             decision: self.table(&decisions),
             eta: apart(index.bending) as f32,
             eta_least: apart(range[0]) as f32,
             eta_greatest: apart(range[1]) as f32,
-            ..Part::default()
+            ..Lobe::default()
         };
         let (table, indices) = (Arc::clone(&albedo), n.clone());
         let mut leaves = vec![leaf(boundary, 2, move |behind, cosine, k| 1.0 - table.loss(indices[k], behind, cosine))];
@@ -380,9 +497,9 @@ impl Surfaces {
             };
             let cd = of_side(false) | of_side(true) << 16;
             let kind = if passes { Kind::BeyondAgain } else { Kind::BoundaryAgain };
-            let part = Part { ab: id | number << 16, cd, alpha: [alpha as f32; 2], ..part(kind) };
+            let lobe = Lobe { ab: id | number << 16, cd, alpha: [alpha as f32; 2], ..lobe_of(kind) };
             let (table, indices) = (Arc::clone(&albedo), n.clone());
-            leaves.push(leaf(part, 3, move |behind, cosine, k| {
+            leaves.push(leaf(lobe, 3, move |behind, cosine, k| {
                 let eta = indices[k];
                 let mean = table.mean_loss(eta, behind != passes);
                 share(&table, eta, behind, passes) * mean * table.loss(eta, behind, cosine)
@@ -418,7 +535,7 @@ impl Surfaces {
             Reflectance::Spectrum(spectrum) => {
                 let curve = Curve::derived(&[&scene.spectra[spectrum].curve, of_index], &scene.channels, inner);
                 let means = means_of(scene, &curve);
-                (self.derived(format!("{name}, base"), curve), means, Part::default(), 3)
+                (self.derived(format!("{name}, base"), curve), means, Lobe::default(), 3)
             }
             Reflectance::Texture(id) => {
                 (self.textured, self.textured_base) = (true, true);
@@ -430,18 +547,18 @@ impl Surfaces {
                 let square = Curve::derived(&[of_index], &scene.channels, |v| (v[0] * v[0]).recip());
                 let back = self.derived(format!("{name}, back to the base"), back);
                 let square = self.derived(format!("{name}, out of the base"), square);
-                let part = Part { kind: TEXTURED, loss: id as u32, ..Part::default() };
-                (back | square << 16, means, part, texture_records(&scene.textures[id]) + 4)
+                let lobe = Lobe { kind: LOBE_TEXTURED, loss: id as u32, ..Lobe::default() };
+                (back | square << 16, means, lobe, texture_records(&scene.textures[id]) + 4)
             }
         };
         let alpha = [roughness.unwrap_or(0.0) as f32; 2];
         // Seen from outside nothing is totally reflected, whatever the index.
         let coat_kind = if roughness.is_some() { Kind::RoughCoat } else { Kind::Mirror };
-        let coat = Part { kind: coat_kind as u32 | DISPERSES, ab: id, alpha, eta: 1.0, ..Part::default() };
+        let coat = Lobe { kind: coat_kind as u32 | LOBE_DISPERSES, ab: id, alpha, eta: 1.0, ..Lobe::default() };
         let number = rough.as_ref().map_or(0, |table| self.eta_table(table));
         self.rough_base |= rough.is_some();
         let kind = Kind::Base as u32 | textured.kind;
-        let base = Part { kind, ab: id | number << 16, cd, alpha, ..textured };
+        let base = Lobe { kind, ab: id | number << 16, cd, alpha, ..textured };
         let mean: Vec<f64> = n.iter().map(|&eta| 1.0 - mean_reflected(eta)).collect();
         let reflected = Arc::new(move |cosine: f64, k: usize| match &rough {
             None => fresnel::dielectric(cosine, n[k]),
@@ -467,7 +584,7 @@ impl Surfaces {
         self.need(Needed::Derived(name, curve))
     }
 
-    pub(super) fn need(&mut self, spectrum: Needed) -> u32 {
+    pub fn need(&mut self, spectrum: Needed) -> u32 {
         self.spectra.push(spectrum);
         self.spectra.len() as u32 - 1
     }
@@ -540,12 +657,12 @@ fn bends_apart(range: [f64; 2], eta: f64, alpha: f64) -> bool {
     (refracted(range[0]) - refracted(range[1])).abs() > alpha * (1.0 - 1.0 / eta).abs()
 }
 
-fn part(kind: Kind) -> Part {
-    Part { kind: kind as u32, ..Part::default() }
+fn lobe_of(kind: Kind) -> Lobe {
+    Lobe { kind: kind as u32, ..Lobe::default() }
 }
 
-fn leaf(part: Part, records: u32, albedo: impl Fn(bool, f64, usize) -> f64 + 'static) -> Leaf {
-    Leaf { part, active: [true; 2], albedo: Box::new(albedo), shares: Vec::new(), records }
+fn leaf(lobe: Lobe, records: u32, albedo: impl Fn(bool, f64, usize) -> f64 + 'static) -> Leaf {
+    Leaf { lobe, active: [true; 2], albedo: Box::new(albedo), shares: Vec::new(), records }
 }
 
 /// The mean of `curve` over each channel.

@@ -1,19 +1,59 @@
-//! Textures as devices get them (`shaders/common/texture.wgsl`), and bounds of what they reflect.
+//! Textures as devices get them (`shaders/parts/textures/texture.wgsl`), and bounds of what they reflect.
 
 use std::collections::HashSet;
 
-use crate::device::words::NONE;
+use crate::device::part::{Part, Place, SceneBuffer};
+use crate::device::text::module;
+use crate::device::words::{NONE, TEXTURE_WORDS};
 use crate::scene::{Scene, SpectrumId, Texture, TextureId, TextureKind};
 use crate::spectral::upsample::{self, smooth_of};
 use crate::spectral::{Curve, Outside};
 
 /// Words of a texture at the head of [`Textures::words`].
-const HEAD: usize = 5;
+const HEAD: usize = TEXTURE_WORDS as usize;
 /// Wavelengths at which the spectra of colours are bounded: they are smooth.
 const BOUNDS: usize = 48;
 
-/// Number of a texture, and whether what is missing of it to 1 counts: a factor of a part's share.
+/// Number of a texture, and whether what is missing of it to 1 counts: a factor of a lobe's share.
 pub type Share = (usize, bool);
+
+pub const TEXTURES: Part = Part {
+    name: "textures",
+    used: |scene| scene.surfaces.as_ref().is_some_and(|surfaces| surfaces.textures.is_some()),
+    effect: |_| "a record for each spectrum that a texture mixes".into(),
+    is_planned: true,
+    modules: &[(Place::Generate, module!("parts/textures/texture.wgsl"))],
+    defines: |scene, _, defines| {
+        let Some((surfaces, textures)) = scene.surfaces.as_ref().and_then(|s| Some((s, s.textures.as_ref()?))) else {
+            return;
+        };
+        let hot = scene.radiators.as_ref().map(|radiators| radiators.features).unwrap_or_default();
+        let shares = textures.first_share.is_some();
+        defines.set("TEXTURES", true).set("TEXTURED", surfaces.textured || hot.textured);
+        defines.set("KEPT", surfaces.textured_base || hot.textured);
+        defines.set("COLOURS", textures.colours).set("MIXTURES", textures.mixtures).set("SHARES", shares);
+        defines.set("TEXEL_NUMBERS", textures.mixtures || shares || hot.numbers);
+        defines.set("PRODUCTS", shares || hot.numbers);
+        if let Some(first) = textures.first_share {
+            defines.constant("FIRST_SHARE", first);
+        }
+        if let Some(place) = surfaces.visible_place {
+            defines.constant("VISIBLE_PLACE", place);
+        }
+    },
+    buffers: |scene| {
+        let textures = scene.prepared.surfaces.as_ref().and_then(|surfaces| surfaces.textures.as_ref());
+        let buffers = textures.map(|textures| {
+            [
+                SceneBuffer::new("textures", &textures.words, "the textures of the scene", "smaller ones"),
+                SceneBuffer::new("texels", &textures.texels, "the textures of the scene", "smaller ones"),
+            ]
+        });
+        buffers.into_iter().flatten().collect()
+    },
+    example: Some(|exhibit| exhibit.add_textures()),
+    ..Part::NOTHING
+};
 
 /// The textures of a scene, flat.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -23,7 +63,7 @@ pub struct Textures {
     pub words: Vec<u32>,
     /// Three coefficients for each texel of colours, the numbers of others.
     pub texels: Vec<f32>,
-    /// Where the shares of parts start in `words`, where any part has some.
+    /// Where the shares of lobes start in `words`, where any lobe has some.
     pub first_share: Option<u32>,
     /// Where ids of spectra stand in `words`.
     ids: Vec<usize>,
@@ -62,15 +102,15 @@ impl Textures {
         textures
     }
 
-    /// Appends the shares of all parts, if any part has some.
-    pub fn add_shares(&mut self, of_parts: &[Vec<Share>]) {
-        if of_parts.iter().all(Vec::is_empty) {
+    /// Appends the shares of all lobes, if any lobe has some.
+    pub fn add_shares(&mut self, of_lobes: &[Vec<Share>]) {
+        if of_lobes.iter().all(Vec::is_empty) {
             return;
         }
         let first = self.words.len();
         self.first_share = Some(first as u32);
-        self.words.resize(first + of_parts.len(), 0);
-        for (p, shares) in of_parts.iter().enumerate() {
+        self.words.resize(first + of_lobes.len(), 0);
+        for (p, shares) in of_lobes.iter().enumerate() {
             self.words[first + p] = self.append_shares(shares);
         }
     }
