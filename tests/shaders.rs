@@ -6,10 +6,13 @@ mod scene_builder;
 use glam::{DMat3, DVec2, DVec3};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use scene_builder::*;
-use spectile::device::kernels::{EvaluateShape, WindowList, Windows};
+use spectile::device::evaluator::EvaluateShape;
+use spectile::device::example::{with_everything, with_parts};
+use spectile::device::part::{OnDevice, PARTS};
 use spectile::device::prepared::{Features, Prepared};
-use spectile::device::text::{Source, compose};
-use spectile::gpu::adapter::STORAGE_BUFFERS;
+use spectile::device::windows::{WindowList, Windows};
+use spectile::gpu::pass::storage_buffers;
+use spectile::gpu::source::Source;
 use spectile::scene::{
     Attributes, Evaluator, Field, Filter, Projection, Sampler, Scene, Shape, Sides, Texels, TextureKind,
 };

@@ -31,7 +31,8 @@ fn find_light(path: u32, seen_from: vec3<f32>, choice: f32, u: vec2<f32>) -> Aim
     return aim;
 }
 
-// What a light's radiance counts where its direction would otherwise be chosen with density `chance`.
-fn light_weight(aim: Aim, chance: f32) -> f32 {
-    return aim.strength * select(1.0, power_heuristic(aim.density, chance), aim.is_met) / aim.density;
+// What a light's radiance counts, times `scale`, where its direction would otherwise be chosen with density `chance`.
+fn light_weight(aim: Aim, chance: f32, scale: f32) -> f32 {
+    let met = scale * power_heuristic(aim.density, chance) / aim.density;
+    return aim.strength * select(scale / aim.density, met, aim.is_met);
 }

@@ -41,7 +41,7 @@ pub const AIMS: Part = Part {
     modules: &[(Place::Stage, module!("stages/aim/light.wgsl"))],
     lines: &[
         ("AIM", "aim = aim_at_light(number, site, v, u_choice.x, draw(from_path, dimension + DIMENSION_LIGHT_POINT));"),
-        ("LIGHT_WEIGHT", "weight = path.scale * light_weight(aim, chance);"),
+        ("LIGHT_WEIGHT", "weight = light_weight(aim, chance, path.scale);"),
     ],
     defines: |scene, _, defines| {
         defines.set("CHOOSES", scene.features.emitters || !scene.lamps.is_empty());
