@@ -6,6 +6,7 @@ mod emission;
 mod fault_tests;
 mod heat;
 pub mod integration;
+pub mod interrupt;
 pub mod job;
 pub mod lights;
 pub mod media;
