@@ -58,8 +58,8 @@ fn speed(scene: &Scene, rounds: usize, samples: u32) -> Result<()> {
     let prepared = Arc::new(Prepared::new(scene, 0)?);
     let mut worker = Worker::new(Gpu::open()?, prepared, [64, 64], Budget::default())?;
     let epoch = |worker: &mut Worker, index: u32| -> Result<()> {
-        worker.submit(&[[0, 0, 64, 64]], index, samples, &mut |_| Ok(()))?;
-        worker.collect(&mut |_| Ok(()))
+        worker.submit(&[[0, 0, 64, 64]], index, samples)?;
+        worker.collect().map(drop)
     };
     epoch(&mut worker, 0)?;
     let paths = 64.0 * 64.0 * f64::from(samples);

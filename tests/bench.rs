@@ -11,10 +11,10 @@ use device::{Settings, render};
 use glam::{DVec2, DVec3};
 use scene_builder::*;
 use serde_json::Value;
+use spectile::device::example::with_everything;
 use spectile::device::part::{OnDevice, PARTS};
 use spectile::device::prepared::Prepared;
 use spectile::device::windows::Windows;
-use spectile::device::example::with_everything;
 use spectile::scene::{Filter, Projection, Sides};
 use spectile::spectral::Channels;
 

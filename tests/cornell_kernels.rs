@@ -7,10 +7,10 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use spectile::device::prepared::Prepared;
 use spectile::device::evaluator::EvaluateShape;
 use spectile::device::facts;
 use spectile::device::part::OnDevice;
+use spectile::device::prepared::Prepared;
 use spectile::device::windows::Windows;
 use spectile::gpu::buffer;
 use spectile::gpu::source::Source;

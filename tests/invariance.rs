@@ -12,8 +12,8 @@ use glam::{DVec2, DVec3};
 use scene_builder::*;
 use spectile::device::prepared::Prepared;
 use spectile::device::rng::hash;
-use spectile::gpu::adapter::Gpu;
 use spectile::device::windows::Windows;
+use spectile::gpu::adapter::Gpu;
 use spectile::gpu::buffer;
 use spectile::render::wave::Budget;
 use spectile::render::worker::Worker;
@@ -252,8 +252,8 @@ fn memory_changes_no_bit_and_is_kept() {
     let mut sizes = Vec::new();
     for memory in [least, least + (all - least) / 50, all / 2, 2 * all] {
         let mut worker = worker(Some(memory)).expect("enough");
-        worker.submit(&[[0, 0, 16, 13]], 3, 64, &mut |_| Ok(())).expect("submitted");
-        worker.collect(&mut |_| Ok(())).expect("rendered");
+        worker.submit(&[[0, 0, 16, 13]], 3, 64).expect("submitted");
+        worker.collect().expect("rendered");
         let allocated = worker.gpu.device.generate_allocator_report().expect("a report").total_allocated_bytes;
         // wgpu's own: a buffer of zeros (512 KiB) and small change.
         assert!(allocated <= memory, "{allocated} bytes allocated of {memory}");

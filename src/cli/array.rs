@@ -4,7 +4,6 @@
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use std::thread;
 use std::time::{Duration, Instant};
 
 use super::Output;
@@ -14,9 +13,9 @@ use super::progress::{Reporter, short};
 use super::scene::SceneArgs;
 use super::submit::submit_array;
 use crate::cube::{Cube, Existing, Run, RunFile, RunState, SlurmTask, Stand, Verification, Work, node_name, now_s};
+use crate::render::interrupt::Interrupt;
 use crate::render::job::{self, StopRule};
 use crate::render::schedule;
-use crate::render::worker::{Interrupt, check_interrupt};
 use crate::scene::Scene;
 use crate::slurm::{self, Job, client};
 use crate::{Error, Result, files};
@@ -179,8 +178,7 @@ fn wait_until_free(cube: &Cube, tiles: &std::ops::Range<u32>, interrupt: &Interr
             say(&format!("another worker is at the tiles {}..{}; waiting for it", held.start, held.end));
             said = true;
         }
-        check_interrupt(interrupt)?;
-        thread::sleep(Duration::from_secs(1));
+        interrupt.sleep(Duration::from_secs(1))?;
     }
 }
 

@@ -9,10 +9,10 @@ use serde_json::json;
 use super::Output;
 use super::output::say;
 use super::render::parse_time;
-use crate::gpu::adapter::{Gpu, Selection};
-use crate::render::worker::{Interrupt, check_interrupt};
-use crate::report::bench::{Frames, Part, Report, Row};
 use crate::device::example::with_everything;
+use crate::gpu::adapter::{Gpu, Selection};
+use crate::render::interrupt::Interrupt;
+use crate::report::bench::{Frames, Part, Report, Row};
 use crate::report::throughput::{Trial, frames, measure};
 use crate::report::{Circumstances, make_folder, write};
 use crate::scene::{self, Evaluator, Scene};
@@ -118,7 +118,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
             (Part::LeftOut, _) => format!("{name}, its own kernels and all of them"),
             _ => format!("{name}, {} channels", step.channels),
         };
-        check_interrupt(&interrupt)?;
+        interrupt.check()?;
         if began.elapsed() > args.budget {
             report.missing.push(format!("{what}: the time of --budget was over"));
         } else {
@@ -130,7 +130,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     for (file, side) in files.iter().flat_map(|file| args.frames.iter().map(move |&side| (file, side))) {
         let name = name_of(file);
         let what = format!("{name}, frames of {side} x {side} pixels");
-        check_interrupt(&interrupt)?;
+        interrupt.check()?;
         if began.elapsed() > args.budget {
             report.missing.push(format!("{what}: the time of --budget was over"));
         } else {
@@ -184,7 +184,7 @@ fn measure_step(
     };
     let (mut trials, mut measured) = (Vec::new(), Vec::new());
     for (evaluator, everything, scene) in ways {
-        check_interrupt(interrupt)?;
+        interrupt.check()?;
         match Trial::new(&scene, gpu, step.pool, interrupt) {
             Ok(trial) => {
                 trials.push(trial);

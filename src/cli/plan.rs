@@ -143,8 +143,8 @@ fn measure(gpu: Gpu, prepared: &Arc<Prepared>, scene: &Scene, tile: [u32; 2], bu
     let [x, y] = [(width - tile[0]) / 2 + scene.film.crop[0], (height - tile[1]) / 2 + scene.film.crop[1]];
     let unit = [x, y, x + tile[0], y + tile[1]];
     let mut epoch = |samples: u32, index: u32| -> Result<()> {
-        worker.submit(&[unit], index, samples, &mut |_| Ok(()))?;
-        worker.collect(&mut |_| Ok(()))
+        worker.submit(&[unit], index, samples)?;
+        worker.collect().map(drop)
     };
     epoch(1, 0)?;
     let setup_s = started.elapsed().as_secs_f64();

@@ -13,7 +13,6 @@ use crate::files::format_bytes;
 use crate::render::job::Job;
 use crate::render::plan;
 use crate::render::schedule::{Event, PREVIEW_PIXELS, Status, Summary};
-use crate::render::worker::check_interrupt;
 use crate::{Error, Result};
 
 /// Epochs below which an error estimate is only rough: it is itself one from so few values.
@@ -38,7 +37,7 @@ pub fn watched<T>(json: bool, work: impl FnOnce(Steps) -> Result<T>) -> Result<T
             bar.set_length(all);
             bar.set_position(done);
         }
-        check_interrupt(&interrupt)
+        interrupt.check()
     });
     if let Some(bar) = &bar {
         bar.finish_and_clear();

@@ -172,7 +172,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     for warning in &scene.warnings {
         reporter.warn(warning)?;
     }
-    let sinks = Sinks::start(args, &interrupt, &mut reporter)?;
+    let sinks = Sinks::start(args, &mut reporter)?;
     let job = Job {
         output: args.output.clone(),
         existing: match (args.resume, args.overwrite, &args.tiles) {

@@ -45,7 +45,6 @@ pub fn name_of(cube: &std::path::Path) -> String {
 
 #[cfg(feature = "web")]
 pub fn run(args: &Args, output: &Output) -> Result<()> {
-    use std::sync::atomic::Ordering;
     use std::time::Duration;
 
     use serde_json::json;
@@ -60,12 +59,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     let server = web::Server::start(args.listen, feed, about)?;
     output.event("listening", json!({ "url": server.url(), "token": server.token() }))?;
     output.text(&format!("{}: look at {} (Ctrl-C ends it)\n", args.cube.display(), server.url()))?;
-    loop {
-        match interrupt.end.load(Ordering::SeqCst) {
-            0 => std::thread::sleep(Duration::from_millis(50)),
-            signal => return Err(crate::Error::Interrupted { signal: signal as i32 }),
-        }
-    }
+    interrupt.sleep(Duration::MAX)
 }
 
 #[cfg(not(feature = "web"))]

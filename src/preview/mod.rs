@@ -10,5 +10,5 @@ mod tev;
 pub mod web;
 
 pub use disk::follow;
-pub use feed::{ErrorPoint, Feed, Progress, Snapshot, Source, Stage, Work};
+pub use feed::{Control, ErrorPoint, Feed, Progress, Snapshot, Source, Stage, Work};
 pub use tev::Tev;

@@ -2,6 +2,7 @@
 
 #[cfg(test)]
 mod fault_tests;
+pub mod interrupt;
 pub mod job;
 pub mod patience;
 pub mod plan;

@@ -2,10 +2,11 @@
 
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::mpsc::{self, Sender};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError, Weak};
 use std::thread;
 use std::time::Instant;
+
+use crossbeam_channel::{Sender, unbounded};
 
 use crate::cube::{Look, Writer, epoch_samples, merge_means, samples_before};
 use crate::device::prepared::Prepared;
@@ -16,11 +17,12 @@ use crate::gpu::buffer::{self, WARM_UP};
 #[cfg(test)]
 use crate::gpu::fault::Phase;
 use crate::preview::Source;
+use crate::render::interrupt::Interrupt;
 use crate::render::queue::{Group, Next, Queue};
 use crate::render::self_test;
 use crate::render::watch::{Device, Reports};
 use crate::render::wave::{Budget, WavePlan};
-use crate::render::worker::{Collected, Interrupt, Profile, UnitRect, Worker, device_limits};
+use crate::render::worker::{Collected, Profile, UnitRect, Worker, device_limits};
 use crate::{Error, Result};
 
 /// Most threads that merge what one device brings back. A tile of a GPU comes back faster than one core merges it: on an H200 at 400
@@ -133,7 +135,7 @@ impl Post<'_> {
 impl Pool {
     /// Sets every device to work on a thread of its own.
     pub fn start(self: &Arc<Self>, gpus: Vec<Gpu>) -> Result<Reports> {
-        let (sender, receiver) = mpsc::channel();
+        let (sender, receiver) = unbounded();
         let mut devices = Vec::new();
         let cores = thread::available_parallelism().map_or(1, usize::from);
         let cores_each = (cores / gpus.len().max(1)).clamp(1, MERGE_THREADS);
@@ -241,13 +243,14 @@ impl Pool {
                     post.taken.push_back(Taken::new(group));
                     for epoch in epochs {
                         let samples = epoch_samples(epoch, self.full_epoch);
-                        worker.submit(&units, epoch, samples, &mut |c| self.merge(&c, post))?;
+                        let before = worker.submit(&units, epoch, samples)?;
+                        before.map_or(Ok(()), |before| self.merge(&before, post))?;
                     }
                 }
-                // What this device holds back may be what others, or it itself, wait for.
                 Next::Later if worker.is_idle() => self.queue.wait(),
-                Next::Later => worker.collect(&mut |c| self.merge(&c, post))?,
-                Next::Never => return worker.collect(&mut |c| self.merge(&c, post)),
+                // What this device holds back may be what others, or it itself, wait for.
+                Next::Later => worker.collect()?.map_or(Ok(()), |last| self.merge(&last, post))?,
+                Next::Never => return worker.collect()?.map_or(Ok(()), |last| self.merge(&last, post)),
             }
         }
     }
@@ -295,8 +298,8 @@ impl Pool {
         oldest.note(counters, epoch, || self.bad_sample(collected));
         let (n_before, samples) = (samples_before(epoch, self.full_epoch), epoch_samples(epoch, self.full_epoch));
         // With responses the device has rendered parts of the channels.
-        let sums = self.prepared.integration.as_ref().map(|integration| integration.sums(collected.means));
-        let means: &[f32] = sums.as_deref().unwrap_or(collected.means);
+        let sums = self.prepared.integration.as_ref().map(|integration| integration.sums(collected.means()));
+        let means: &[f32] = sums.as_deref().unwrap_or(collected.means());
         let units = means.chunks(means.len() / collected.units.len());
         if oldest.group.epochs > 1 {
             // The same arithmetic as in the cube, but nothing is written before the last of these epochs.

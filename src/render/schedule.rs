@@ -1,22 +1,24 @@
 //! The render: epochs of the whole image, decided one after the other; devices that pull their units; what is known so far.
 
 use std::collections::{BTreeMap, VecDeque};
-use std::sync::atomic::Ordering;
 use std::sync::{Arc, OnceLock};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
+use signal_hook::consts::SIGINT;
 
 use crate::cube::{Run, RunFile, Writer, check_target, epoch_samples, epochs_in, reduction, samples_before};
 use crate::device::prepared::Prepared;
 use crate::gpu::adapter::Gpu;
+use crate::preview::Control;
+use crate::render::interrupt::Interrupt;
 use crate::render::job::{Job, SURE_EPOCHS};
 use crate::render::plan;
 use crate::render::pool::{Merged, Pool, Report, Tally};
 use crate::render::queue::Queue;
-use crate::render::watch::{Polled, Reports};
-use crate::render::worker::{Interrupt, Profile, check_interrupt};
+use crate::render::watch::{Heard, Reports, Requests};
+use crate::render::worker::Profile;
 use crate::{Error, Result, files, format};
 
 /// The preview file is rewritten at most this often, and takes at most this share of the time.
@@ -129,7 +131,7 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
     let mut reports = pool.start(gpus)?;
     let (mut committer, mut run) = (None, None);
     let result = render.wait_for_devices(&mut reports, observe).and_then(|()| {
-        check_interrupt(interrupt)?;
+        interrupt.check()?;
         // Only now is anything written: whatever can be refused has been.
         let mut warnings = Vec::new();
         let opened = Writer::open(&job.output, &header, job.existing, tiles, &mut |what| warnings.push(what));
@@ -191,6 +193,7 @@ fn no_cube() -> Error {
 struct Render<'a> {
     job: &'a Job,
     interrupt: &'a Interrupt,
+    requests: Requests,
     /// Samples per pixel at which to stop, the end of an epoch.
     samples_limit: Option<u32>,
     /// Paths to trace until the limit.
@@ -201,6 +204,9 @@ struct Render<'a> {
     device_bytes: u64,
     profile: Option<Profile>,
     status: Status,
+    /// Whether somebody has asked how far it is, and whether it should rest.
+    asked: bool,
+    rest_wanted: bool,
     /// Since when the render rests, and how long it has before.
     resting: Option<Instant>,
     rested: Duration,
@@ -230,6 +236,7 @@ impl<'a> Render<'a> {
         Render {
             job,
             interrupt,
+            requests: Requests::new(interrupt, job.feed.as_ref().map(|feed| feed.controls())),
             samples_limit,
             paths_needed: None,
             started,
@@ -237,6 +244,8 @@ impl<'a> Render<'a> {
             merge_s: 0.0,
             device_bytes: 0,
             profile: None,
+            asked: false,
+            rest_wanted: false,
             resting: None,
             rested: Duration::ZERO,
             active: devices.len(),
@@ -291,18 +300,23 @@ impl<'a> Render<'a> {
         Ok(())
     }
 
-    /// What a device has to tell, if one has soon. An interrupt is noticed meanwhile.
-    fn hear(&self, reports: &mut Reports) -> Result<Option<(usize, Report)>> {
-        match reports.poll() {
-            Polled::Said(device, report) => Ok(Some((device, report))),
-            Polled::Silence => check_interrupt(self.interrupt).map(|()| None),
-            Polled::End => Err(no_cube()),
+    /// What a device has to tell, or nothing where users have asked for something: the end is an error, all else is noted.
+    fn hear(&mut self, reports: &mut Reports) -> Result<Option<(usize, Report)>> {
+        match reports.hear(&self.requests) {
+            Heard::Report(device, report) => return Ok(Some((device, report))),
+            Heard::End => self.interrupt.check()?,
+            // As if by Ctrl-C: devices look at the interrupt too.
+            Heard::Control(Control::Stop) => self.interrupt.stop(SIGINT),
+            Heard::Asked | Heard::Control(Control::Save) => self.asked = true,
+            Heard::Control(Control::Rest(rests)) => self.rest_wanted = rests,
+            Heard::AllLeft => return Err(no_cube()),
         }
+        Ok(None)
     }
 
     /// Commits and tells how far the render is, if somebody has asked.
-    fn answer(&self, cube: &Writer, observe: &mut dyn FnMut(Event) -> Result<()>) -> Result<()> {
-        if self.interrupt.report.swap(false, Ordering::SeqCst) {
+    fn answer(&mut self, cube: &Writer, observe: &mut dyn FnMut(Event) -> Result<()>) -> Result<()> {
+        if std::mem::take(&mut self.asked) {
             cube.flush()?;
             observe(Event::Asked(&self.status))?;
         }
@@ -312,7 +326,7 @@ impl<'a> Render<'a> {
     /// Rests, or goes on, as whoever watches has asked.
     fn rest_if_asked(&mut self, queue: &Queue, observe: &mut dyn FnMut(Event) -> Result<()>) -> Result<()> {
         let Some(feed) = &self.job.feed else { return Ok(()) };
-        let rests = feed.is_pause_wanted();
+        let rests = self.rest_wanted;
         if rests == self.resting.is_some() {
             return Ok(());
         }

@@ -2,7 +2,6 @@
 
 use std::collections::VecDeque;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use crate::device::evaluator::EvaluateShape;
@@ -19,6 +18,7 @@ use crate::gpu::pass::Pass;
 use crate::gpu::source::Source;
 use crate::gpu::timestamps::Timestamps;
 use crate::gpu::upload::NamedBuffers;
+use crate::render::interrupt::Interrupt;
 use crate::render::patience::Patience;
 use crate::render::wave::{Budget, DeviceLimits, WavePlan};
 use crate::{Error, Result};
@@ -37,23 +37,6 @@ const SLOTS: usize = 2;
 /// processor one takes up to a second, and whoever interrupts waits for all of them.
 const WAVES_AHEAD: usize = 32;
 const WAVES_AHEAD_SOFTWARE: usize = 2;
-
-/// What signal handlers set.
-#[derive(Debug, Default)]
-pub struct Interrupt {
-    /// The number of the signal that asks for an orderly end, or 0.
-    pub end: Arc<AtomicUsize>,
-    /// Whether somebody asks how far the render is, with everything so far on disk.
-    pub report: Arc<AtomicBool>,
-}
-
-/// [`Error::Interrupted`] once a signal has asked for the end.
-pub fn check_interrupt(interrupt: &Interrupt) -> Result<()> {
-    match interrupt.end.load(Ordering::SeqCst) {
-        0 => Ok(()),
-        signal => Err(Error::Interrupted { signal: signal as i32 }),
-    }
-}
 
 /// Time of the passes, seconds: the device's own where it has timestamps, else that of waiting for each.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -85,8 +68,10 @@ pub struct Worker {
     timestamps: Option<Timestamps>,
     /// Whether passes are measured by waiting for them.
     clocked: bool,
-    slots: Vec<Slot>,
+    slots: [Slot; SLOTS],
     next_slot: usize,
+    /// The units submitted last, until they are collected.
+    pending: Option<Pending>,
     /// Waves under way, the oldest first.
     waves: VecDeque<InFlight>,
     /// Waves submitted so far.
@@ -115,30 +100,39 @@ struct Stage {
     groups: Vec<wgpu::BindGroup>,
 }
 
-/// A staging buffer and the units whose means it will hold.
+/// A staging buffer and the units whose means it holds, or will.
 struct Slot {
     staging: wgpu::Buffer,
-    pending: Option<Pending>,
+    units: Vec<UnitRect>,
+    /// Whether the host sees it, and the device must not touch it.
+    is_mapped: bool,
 }
 
+/// Units on their way into a slot.
 struct Pending {
-    units: Vec<UnitRect>,
+    slot: usize,
     submission: wgpu::SubmissionIndex,
     /// The number of its last wave.
     last_wave: u64,
     proof: Proof,
 }
 
-/// What a group of units brought back.
+/// What a group of units brought back, as it lies in its staging buffer.
 pub struct Collected<'a> {
     #[cfg(test)]
     pub gpu: &'a Gpu,
     pub units: &'a [UnitRect],
-    /// [unit][row of the full tile][column][channel]; slots outside a unit's rectangle hold zeros.
-    pub means: &'a [f32],
+    view: wgpu::BufferView,
     pub counters: Counters,
     /// Seconds in which the device had nothing to do, so far.
     pub idle_s: f64,
+}
+
+impl Collected<'_> {
+    /// [unit][row of the full tile][column][channel]; slots outside a unit's rectangle hold zeros.
+    pub fn means(&self) -> &[f32] {
+        bytemuck::cast_slice(&self.view[..self.view.len() - size_of::<Counters>()])
+    }
 }
 
 impl Worker {
@@ -156,12 +150,11 @@ impl Worker {
         let on_device = OnDevice { prepared: &prepared, windows };
         let scene = upload(&gpu, &on_device)?;
         let path_buffers = PathBuffers::new(&gpu, &plan);
-        let slots = (0..SLOTS)
-            .map(|_| {
-                let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
-                Slot { staging: buffer::empty(&gpu, "staging", plan.staging_bytes(), usage), pending: None }
-            })
-            .collect();
+        let slots = std::array::from_fn(|_| {
+            let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
+            let staging = buffer::empty(&gpu, "staging", plan.staging_bytes(), usage);
+            Slot { staging, units: Vec::new(), is_mapped: false }
+        });
         #[cfg(test)]
         gpu.faults.reach(Phase::Start, &gpu);
         // Before shaders are compiled in vain.
@@ -198,6 +191,7 @@ impl Worker {
             clocked: false,
             slots,
             next_slot: 0,
+            pending: None,
             waves: VecDeque::new(),
             submitted: 0,
             patience: Patience::default(),
@@ -220,18 +214,11 @@ impl Worker {
         self.interrupt = Arc::clone(interrupt);
     }
 
-    /// Starts one epoch of `units`; their means arrive through [`Worker::collect`]. Collects what used the same staging
-    /// buffer before, if anything, and returns when all but the last waves are done.
-    pub fn submit(
-        &mut self,
-        units: &[UnitRect],
-        epoch: u32,
-        epoch_samples: u32,
-        collected: &mut dyn FnMut(Collected) -> Result<()>,
-    ) -> Result<()> {
+    /// Starts one epoch of `units` and returns what came of those submitted before, if they were not collected yet: to be
+    /// merged while the new ones compute. All but the last waves of these are done then.
+    pub fn submit(&mut self, units: &[UnitRect], epoch: u32, epoch_samples: u32) -> Result<Option<Collected<'_>>> {
         let slot = self.next_slot;
         self.next_slot = (slot + 1) % SLOTS;
-        self.collect_slot(slot, collected)?;
         if let Some(since) = self.idle_since.take() {
             self.idle_s += since.elapsed().as_secs_f64();
         }
@@ -242,7 +229,7 @@ impl Worker {
         }
         let ahead = if self.gpu.is_software { WAVES_AHEAD_SOFTWARE } else { WAVES_AHEAD };
         for wave in self.plan.waves(units.len() as u32, epoch, epoch_samples) {
-            check_interrupt(&self.interrupt)?;
+            self.interrupt.check()?;
             while self.waves.len() >= ahead {
                 self.wait_for_wave()?;
             }
@@ -251,21 +238,29 @@ impl Worker {
             self.submit_wave(wave)?;
         }
 
-        let _watched = self.gpu.deadline.watch(self.limit());
+        let watched = self.gpu.deadline.watch(self.limit());
         let mut encoder = self.encoder("transfer");
         let buffers = &self.path_buffers;
         let size = self.unit_bytes() * units.len() as u64;
-        let staging = &self.slots[slot].staging;
+        let Slot { staging, units: of_slot, is_mapped } = &mut self.slots[slot];
+        if std::mem::take(is_mapped) {
+            staging.unmap();
+        }
         encoder.copy_buffer_to_buffer(&buffers.means, 0, staging, 0, size);
         encoder.copy_buffer_to_buffer(&buffers.counters, 0, staging, size, size_of::<Counters>() as u64);
         encoder.clear_buffer(&buffers.counters, 0, None);
         let submission = self.gpu.queue.submit([encoder.finish()]);
         buffer::map(staging);
+        *of_slot = units.to_vec();
         let (last_wave, proof) = (self.submitted, self.proof(units, epoch_samples));
-        self.slots[slot].pending = Some(Pending { units: units.to_vec(), submission, last_wave, proof });
+        let before = self.pending.replace(Pending { slot, submission, last_wave, proof });
         #[cfg(test)]
         self.gpu.faults.reach(Phase::Transfer, &self.gpu);
-        Ok(())
+        drop(watched);
+        match before {
+            Some(before) => self.receive(before).map(Some),
+            None => Ok(None),
+        }
     }
 
     /// How long whatever is under way may take.
@@ -294,61 +289,56 @@ impl Worker {
         Ok(())
     }
 
-    /// Waits for everything that is under way, in the order of submission.
-    pub fn collect(&mut self, collected: &mut dyn FnMut(Collected) -> Result<()>) -> Result<()> {
-        for i in 0..SLOTS {
-            self.collect_slot((self.next_slot + i) % SLOTS, collected)?;
+    /// Waits for what is under way, if anything is.
+    pub fn collect(&mut self) -> Result<Option<Collected<'_>>> {
+        match self.pending.take() {
+            Some(last) => self.receive(last).map(Some),
+            None => Ok(None),
         }
-        Ok(())
     }
 
-    fn collect_slot(&mut self, slot: usize, collected: &mut dyn FnMut(Collected) -> Result<()>) -> Result<()> {
-        let Some(pending) = self.slots[slot].pending.take() else { return Ok(()) };
+    fn receive(&mut self, pending: Pending) -> Result<Collected<'_>> {
         self.wait(pending.submission, pending.last_wave)?;
         if self.is_idle() {
             self.idle_since = Some(Instant::now());
         }
-        let size = self.unit_bytes() * pending.units.len() as u64;
-        let staging = &self.slots[slot].staging;
-        {
-            let lost = |e| Error::DevicesLost(format!("{}: {e}", self.gpu.name));
-            let end = size + size_of::<Counters>() as u64;
-            let view = {
-                let _watched = self.gpu.deadline.watch(self.limit());
-                #[cfg(test)]
-                self.gpu.faults.reach(Phase::Mapping, &self.gpu);
-                // A shortage of memory, say, is why there may be nothing to see.
-                self.gpu.check()?;
-                staging.slice(..end).get_mapped_range().map_err(lost)?
-            };
-            let counters: Counters = bytemuck::pod_read_unaligned(&view[size as usize..]);
-            if let Some(what) = counters.missing(&pending.proof) {
-                let what = format!("{}: a unit came back incomplete: {what}", self.gpu.name);
-                return Err(Error::DevicesLost(what));
-            }
-            if counters.records > self.plan.max_records {
-                return Err(Error::Internal(format!(
-                    "a path took {} records where {} were planned for: its unit was not merged",
-                    counters.records, self.plan.max_records
-                )));
-            }
-            collected(Collected {
-                #[cfg(test)]
-                gpu: &self.gpu,
-                units: &pending.units,
-                means: bytemuck::cast_slice(&view[..size as usize]),
-                counters,
-                idle_s: self.idle_s,
-            })?;
+        let (unit_bytes, limit) = (self.unit_bytes(), self.limit());
+        let Slot { staging, units, is_mapped } = &mut self.slots[pending.slot];
+        let end = unit_bytes * units.len() as u64 + size_of::<Counters>() as u64;
+        let lost = |e| Error::DevicesLost(format!("{}: {e}", self.gpu.name));
+        let view = {
+            let _watched = self.gpu.deadline.watch(limit);
+            #[cfg(test)]
+            self.gpu.faults.reach(Phase::Mapping, &self.gpu);
+            // A shortage of memory, say, is why there may be nothing to see.
+            self.gpu.check()?;
+            staging.slice(..end).get_mapped_range().map_err(lost)?
+        };
+        *is_mapped = true;
+        let counters: Counters = bytemuck::pod_read_unaligned(&view[view.len() - size_of::<Counters>()..]);
+        if let Some(what) = counters.missing(&pending.proof) {
+            let what = format!("{}: a unit came back incomplete: {what}", self.gpu.name);
+            return Err(Error::DevicesLost(what));
         }
-        let _watched = self.gpu.deadline.watch(self.limit());
-        staging.unmap();
-        Ok(())
+        if counters.records > self.plan.max_records {
+            return Err(Error::Internal(format!(
+                "a path took {} records where {} were planned for: its unit was not merged",
+                counters.records, self.plan.max_records
+            )));
+        }
+        Ok(Collected {
+            #[cfg(test)]
+            gpu: &self.gpu,
+            units,
+            view,
+            counters,
+            idle_s: self.idle_s,
+        })
     }
 
     /// Whether nothing is under way.
     pub fn is_idle(&self) -> bool {
-        self.slots.iter().all(|slot| slot.pending.is_none())
+        self.pending.is_none()
     }
 
     /// What the counters must show after the last wave of `units`.
@@ -538,14 +528,8 @@ mod tests {
 
     /// The counters of 64 samples of 3 x 2 pixels.
     fn counters(worker: &mut Worker) -> Result<Counters> {
-        let mut found = None;
-        let mut note = |collected: Collected| {
-            found = Some(collected.counters);
-            Ok(())
-        };
-        worker.submit(&[[0, 0, 3, 2]], 0, 64, &mut note)?;
-        worker.collect(&mut note)?;
-        Ok(found.expect("collected"))
+        assert!(worker.submit(&[[0, 0, 3, 2]], 0, 64)?.is_none());
+        Ok(worker.collect()?.expect("just submitted").counters)
     }
 
     /// Without timestamps passes are clocked, and compute the same.

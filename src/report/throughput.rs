@@ -6,8 +6,9 @@ use std::time::Instant;
 use crate::Result;
 use crate::device::prepared::Prepared;
 use crate::gpu::adapter::Gpu;
+use crate::render::interrupt::Interrupt;
 use crate::render::wave::{Budget, WavePlan};
-use crate::render::worker::{Interrupt, UnitRect, Worker};
+use crate::render::worker::{UnitRect, Worker};
 use crate::scene::Scene;
 
 /// Side of the tiles: small, so that a slow device is done with some of them soon.
@@ -64,8 +65,8 @@ impl Trial {
         let mut worker = Worker::new(Arc::clone(gpu), prepared, [TILE, TILE], budget)?;
         worker.watch(interrupt);
         let tiles = spread(scene.film.crop);
-        worker.submit(&tiles[..1], 0, 1, &mut |_| Ok(()))?;
-        worker.collect(&mut |_| Ok(()))?;
+        worker.submit(&tiles[..1], 0, 1)?;
+        worker.collect()?;
         let allocated_bytes = gpu.allocated_bytes().zip(before).map(|(now, before)| now.saturating_sub(before));
         Ok(Trial { worker, tiles, epoch: 0, allocated_bytes })
     }
@@ -90,9 +91,9 @@ impl Trial {
         let began = Instant::now();
         self.epoch += 1;
         for units in tiles.chunks(self.worker.plan.units_at_once(samples)) {
-            self.worker.submit(units, self.epoch, samples, &mut |_| Ok(()))?;
+            self.worker.submit(units, self.epoch, samples)?;
         }
-        self.worker.collect(&mut |_| Ok(()))?;
+        self.worker.collect()?;
         Ok(began.elapsed().as_secs_f64())
     }
 }

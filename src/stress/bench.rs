@@ -7,7 +7,7 @@ use std::time::Duration;
 use super::{Check, Outcome};
 use crate::Result;
 use crate::gpu::adapter::{Gpu, Selection};
-use crate::render::worker::Interrupt;
+use crate::render::interrupt::Interrupt;
 use crate::report::convergence::{Image, Limit, render};
 use crate::scene::{self, Scene};
 

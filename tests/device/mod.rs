@@ -96,8 +96,8 @@ pub fn render(scene: &Scene, epochs: u32, samples: u32, settings: Settings) -> E
                 rays += collected.counters.rays();
                 let unit_size = (tw * th) as usize * channels;
                 // As the renderer does where responses weight.
-                let sums = integration.as_ref().map(|integration| integration.sums(collected.means));
-                let means: &[f32] = sums.as_deref().unwrap_or(collected.means);
+                let sums = integration.as_ref().map(|integration| integration.sums(collected.means()));
+                let means: &[f32] = sums.as_deref().unwrap_or(collected.means());
                 for (unit, means) in collected.units.iter().zip(means.chunks(unit_size)) {
                     for y in unit[1]..unit[3] {
                         for x in unit[0]..unit[2] {
@@ -107,13 +107,12 @@ pub fn render(scene: &Scene, epochs: u32, samples: u32, settings: Settings) -> E
                         }
                     }
                 }
-                Ok(())
             };
             let at_once = worker.plan.units_at_once(samples).min(settings.units);
             for units in tiles.chunks(at_once) {
-                worker.submit(units, epoch, samples, &mut place).expect("a submission");
+                worker.submit(units, epoch, samples).expect("a submission").into_iter().for_each(&mut place);
             }
-            worker.collect(&mut place).expect("results");
+            worker.collect().expect("results").into_iter().for_each(&mut place);
             image
         })
         .collect();
