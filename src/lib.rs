@@ -15,7 +15,6 @@ pub mod preview;
 pub mod reference;
 pub mod render;
 pub mod report;
-pub mod scattering;
 pub mod scene;
 pub mod slurm;
 pub mod spectral;

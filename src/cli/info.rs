@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 
 use super::Output;
-use super::standing::{Standing, list};
+use super::tile_states::{TileStates, list};
 use crate::cube::{Cube, Progress, Verification};
 use crate::spectral::Channels;
 use crate::spectral::colour::ProjectionKind;
@@ -79,7 +79,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         }
         (Err(error), ..) | (_, Err(error), _) => return Err(error),
     };
-    let work = Standing::of(&cube, &samples)?;
+    let work = TileStates::of(&cube, &samples)?;
     let found = Found { progress: Progress::of(&samples), estimate, work, verified, cube };
     output.event("done", found.facts())?;
     output.text(&found.describe())?;
@@ -94,7 +94,7 @@ struct Found {
     cube: Cube,
     progress: Progress,
     estimate: Vec<f64>,
-    work: Standing,
+    work: TileStates,
     verified: Option<Verification>,
 }
 
@@ -108,7 +108,7 @@ fn watch(args: &Args, output: &Output) -> Result<()> {
     loop {
         let began = Instant::now();
         let cube = Cube::open(&args.cube)?;
-        let standing = Standing::of(&cube, &cube.all_samples()?)?;
+        let standing = TileStates::of(&cube, &cube.all_samples()?)?;
         if last.as_ref() != Some(&standing) {
             output.event("progress", standing.facts())?;
             if draws {

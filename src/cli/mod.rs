@@ -17,9 +17,9 @@ mod scene;
 mod sensor;
 mod sinks;
 mod spectrum;
-mod standing;
 mod stress;
 mod submit;
+mod tile_states;
 mod view;
 
 use clap::{Parser, Subcommand};

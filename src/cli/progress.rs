@@ -10,9 +10,10 @@ use super::Output;
 use super::output::say;
 use crate::cube::{Cube, Existing, Progress, reduction};
 use crate::files::format_bytes;
+use crate::preview::Status;
 use crate::render::job::Job;
 use crate::render::plan;
-use crate::render::schedule::{Event, PREVIEW_PIXELS, Status, Summary};
+use crate::render::schedule::{Event, PREVIEW_PIXELS, Summary};
 use crate::{Error, Result};
 
 /// Epochs below which an error estimate is only rough: it is itself one from so few values.

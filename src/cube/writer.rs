@@ -274,8 +274,8 @@ impl Writer {
                 if !state.open.is_empty() && since >= COMMIT_EVERY {
                     break;
                 }
-                let patience = if state.open.is_empty() { COMMIT_EVERY } else { COMMIT_EVERY - since };
-                state = self.changed.wait_timeout(state, patience).unwrap_or_else(PoisonError::into_inner).0;
+                let time_limit = if state.open.is_empty() { COMMIT_EVERY } else { COMMIT_EVERY - since };
+                state = self.changed.wait_timeout(state, time_limit).unwrap_or_else(PoisonError::into_inner).0;
             }
             drop(state);
             self.flush()?;

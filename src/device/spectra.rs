@@ -99,7 +99,7 @@ pub fn spectral_tables<'a>(
     let make = |warp: &Warp| {
         if in_registers && beside <= MAX_REGISTER_SPECTRA && warp.bits() == 0 {
             let curves: Vec<&Curve> = same(&wanted).collect();
-            if let Some(bent) = SpectralTables::bent(&curves, &scene.channels, kinks.min(MOST_KINKS)) {
+            if let Some(bent) = SpectralTables::with_kinks(&curves, &scene.channels, kinks.min(MOST_KINKS)) {
                 return bent;
             }
         }

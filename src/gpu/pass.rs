@@ -1,6 +1,7 @@
 //! A compute pass: a composed shader, its pipeline, and bindings found by the names they have in the WGSL.
 
 use crate::gpu::adapter::Gpu;
+use crate::gpu::buffer;
 use crate::gpu::source::Source;
 use crate::{Error, Result};
 
@@ -102,6 +103,30 @@ impl Pass {
             layout: &self.layouts[group as usize],
             entries: &entries,
         }))
+    }
+
+    /// Runs it once over so many workgroups, each buffer looked up by the name of its variable, and waits for it: for kernels beside
+    /// the render.
+    pub fn run<'a>(
+        &self,
+        gpu: &Gpu,
+        [x, y]: [u32; 2],
+        find: impl Fn(&str) -> Option<wgpu::BufferBinding<'a>>,
+    ) -> Result<()> {
+        let groups =
+            (0..self.layouts.len() as u32).map(|group| self.bind(gpu, group, &find)).collect::<Result<Vec<_>>>()?;
+        let descriptor = wgpu::CommandEncoderDescriptor { label: Some(self.label) };
+        let mut encoder = gpu.device.create_command_encoder(&descriptor);
+        {
+            let mut compute = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+            compute.set_pipeline(&self.pipeline);
+            for (index, group) in groups.iter().enumerate() {
+                let dynamic = self.bindings.iter().filter(|b| b.group == index as u32 && b.name == DYNAMIC).count();
+                compute.set_bind_group(index as u32, group, &vec![0; dynamic]);
+            }
+            compute.dispatch_workgroups(x, y, 1);
+        }
+        buffer::wait(gpu, gpu.queue.submit([encoder.finish()]), buffer::WARM_UP)
     }
 }
 

@@ -9,8 +9,8 @@ use std::time::Duration;
 
 use crossbeam_channel::{Receiver, Sender, unbounded};
 
+use super::status::Status;
 use crate::cube::{Look, Seen};
-use crate::render::schedule::Status;
 
 /// Most points of the error curve. More are thinned out by half, from every second on.
 const MOST_POINTS: usize = 1000;
@@ -242,11 +242,11 @@ impl Feed {
         self.state().snapshot()
     }
 
-    /// Waits until something newer than `revision` is published, but not longer than `patience`.
-    pub fn wait(&self, revision: u64, patience: Duration) -> Snapshot {
+    /// Waits until something newer than `revision` is published, but not longer than `time_limit`.
+    pub fn wait(&self, revision: u64, time_limit: Duration) -> Snapshot {
         let old = |state: &mut State| state.revision <= revision;
         let (state, _) =
-            self.changed.wait_timeout_while(self.state(), patience, old).unwrap_or_else(PoisonError::into_inner);
+            self.changed.wait_timeout_while(self.state(), time_limit, old).unwrap_or_else(PoisonError::into_inner);
         state.snapshot()
     }
 

@@ -4,12 +4,12 @@
 mod fault_tests;
 pub mod interrupt;
 pub mod job;
-pub mod patience;
 pub mod plan;
 pub mod pool;
 pub mod queue;
 pub mod schedule;
 pub mod self_test;
+pub mod time_limit;
 pub mod watch;
 pub mod wave;
 pub mod worker;

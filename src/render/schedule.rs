@@ -11,7 +11,7 @@ use signal_hook::consts::SIGINT;
 use crate::cube::{Run, RunFile, Writer, check_target, epoch_samples, epochs_in, reduction, samples_before};
 use crate::device::prepared::Prepared;
 use crate::gpu::adapter::Gpu;
-use crate::preview::Control;
+use crate::preview::{Control, DeviceStatus, Status};
 use crate::render::interrupt::Interrupt;
 use crate::render::job::{Job, SURE_EPOCHS};
 use crate::render::plan;
@@ -19,44 +19,13 @@ use crate::render::pool::{Merged, Pool, Report, Tally};
 use crate::render::queue::Queue;
 use crate::render::watch::{Heard, Reports, Requests};
 use crate::render::worker::Profile;
-use crate::{Error, Result, files, format};
+use crate::{Error, Result, files, preview};
 
 /// The preview file is rewritten at most this often, and takes at most this share of the time.
 const PREVIEW_INTERVAL: Duration = Duration::from_secs(1);
 const PREVIEW_SHARE: u32 = 20;
 /// Most pixels of the preview file: 4K. Larger pictures are reduced, so that memory does not grow with the cube.
 pub const PREVIEW_PIXELS: u64 = 3840 * 2160;
-
-/// How far a render is.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Status {
-    /// Samples per pixel in the whole image, and when the current epoch will be done.
-    pub samples: u32,
-    pub samples_next: u32,
-    /// Units of the current epoch merged, of all.
-    pub units: (u32, u32),
-    pub paths: u64,
-    pub rays: u64,
-    pub elapsed: Duration,
-    /// Seconds since the first device was ready.
-    pub rendering_s: f64,
-    /// The largest error estimate of a channel, from two full epochs on.
-    pub error_estimate: Option<f64>,
-    pub remaining: Option<Duration>,
-    pub devices: Vec<DeviceStatus>,
-}
-
-/// What one device did.
-#[derive(Debug, Clone, PartialEq)]
-pub struct DeviceStatus {
-    pub name: String,
-    pub paths: u64,
-    /// Units that it has rendered, of all epochs.
-    pub units: u64,
-    /// Seconds in which it had work, and had not.
-    pub busy_s: f64,
-    pub idle_s: f64,
-}
 
 /// What a render tells while it goes on.
 pub enum Event<'a> {
@@ -543,11 +512,11 @@ impl<'a> Render<'a> {
 
     /// Writes the preview, if one is wanted, and says at which exposure.
     fn write_preview(&mut self, cube: &Writer) -> Result<Option<f64>> {
-        let Some(preview) = &self.job.preview else { return Ok(None) };
+        let Some(wanted) = &self.job.preview else { return Ok(None) };
         let began = Instant::now();
         let picture = cube.preview(reduction(cube.cube().header().size, PREVIEW_PIXELS))?;
-        let exposure = preview.exposure.unwrap_or_else(|| picture.auto_exposure());
-        format::png::write(&preview.file, &picture, exposure)?;
+        let exposure = wanted.exposure.unwrap_or_else(|| picture.auto_exposure());
+        preview::write(&wanted.file, &picture, exposure)?;
         self.next_preview = Some(Instant::now() + PREVIEW_INTERVAL.max(began.elapsed() * PREVIEW_SHARE));
         Ok(Some(exposure))
     }

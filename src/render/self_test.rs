@@ -21,22 +21,12 @@ pub fn run(gpu: &Gpu) -> Result<()> {
     let pass = Pass::new(gpu, &source)?;
     let input = buffer::storage(gpu, "self-test input", &[LOOP_LIMIT, SEED as u32, (SEED >> 32) as u32, NAN_BITS])?;
     let size = u64::from(LANES) * WORDS as u64 * 4;
-    let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
-    let results = buffer::empty(gpu, "self-test results", size, usage);
-    let group = pass.bind(gpu, 0, |name| match name {
+    let results = buffer::output(gpu, "self-test results", size);
+    pass.run(gpu, [1, 1], |name| match name {
         "results" => Some(results.as_entire_buffer_binding()),
         "input" => Some(input.as_entire_buffer_binding()),
         _ => None,
     })?;
-    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("self-test") });
-    {
-        let mut compute = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-        compute.set_pipeline(&pass.pipeline);
-        compute.set_bind_group(0, &group, &[]);
-        compute.dispatch_workgroups(1, 1, 1);
-    }
-    let submission = gpu.queue.submit([encoder.finish()]);
-    buffer::wait(gpu, submission, buffer::WARM_UP)?;
     let got: Vec<u32> = buffer::read(gpu, &results, size, buffer::WARM_UP)?;
     for lane in 0..LANES {
         let at = lane as usize * WORDS;

@@ -19,7 +19,7 @@ use crate::gpu::source::Source;
 use crate::gpu::timestamps::Timestamps;
 use crate::gpu::upload::NamedBuffers;
 use crate::render::interrupt::Interrupt;
-use crate::render::patience::Patience;
+use crate::render::time_limit::TimeLimit;
 use crate::render::wave::{Budget, DeviceLimits, WavePlan};
 use crate::{Error, Result};
 
@@ -76,7 +76,7 @@ pub struct Worker {
     waves: VecDeque<InFlight>,
     /// Waves submitted so far.
     submitted: u64,
-    patience: Patience,
+    time_limit: TimeLimit,
     /// Since when the device has been at work on the oldest wave, or will be from its submission.
     at_work_since: Instant,
     interrupt: Arc<Interrupt>,
@@ -194,7 +194,7 @@ impl Worker {
             pending: None,
             waves: VecDeque::new(),
             submitted: 0,
-            patience: Patience::default(),
+            time_limit: TimeLimit::default(),
             at_work_since: Instant::now(),
             interrupt: Arc::default(),
             idle_since: None,
@@ -265,7 +265,7 @@ impl Worker {
 
     /// How long whatever is under way may take.
     fn limit(&self) -> Duration {
-        self.patience.limit(self.waves.iter().map(|wave| u64::from(wave.paths)).sum())
+        self.time_limit.limit(self.waves.iter().map(|wave| u64::from(wave.paths)).sum())
     }
 
     /// Waits for the oldest wave under way.
@@ -283,7 +283,7 @@ impl Worker {
             paths += u64::from(wave.paths);
         }
         if paths > 0 {
-            self.patience.note(paths, self.at_work_since.elapsed());
+            self.time_limit.note(paths, self.at_work_since.elapsed());
             self.at_work_since = Instant::now();
         }
         Ok(())
@@ -383,7 +383,7 @@ impl Worker {
         encoder.clear_buffer(&self.path_buffers.queue_lengths, 0, None);
         let (stride, blocks, bounces) = (self.path_buffers.step_stride, self.shape.blocks, self.bounces());
         let step = |number: u32| [number * stride];
-        let (all, pixels) = (fold(groups), fold(pixel_groups));
+        let (all, pixels) = (grid(groups), grid(pixel_groups));
         let mut pass = self.begin(&mut encoder, "generate", 0);
         self.camera.dispatch(&mut pass, &[], all, 1);
         for bounce in 0..bounces {
@@ -399,7 +399,7 @@ impl Worker {
                 pass = self.begin(&mut encoder, "evaluate", 2 * bounce + 1);
             }
             if let Some(update) = &self.update {
-                update.dispatch(&mut pass, &step(bounce), fold(paths.div_ceil(self.shape.pixels)), blocks);
+                update.dispatch(&mut pass, &step(bounce), grid(paths.div_ceil(self.shape.pixels)), blocks);
             }
         }
         if self.update.is_none() {
@@ -490,7 +490,7 @@ fn sequence(number: u64) -> u32 {
 }
 
 /// Workgroup counts in x and y for at least `groups` groups: a dimension takes at most 65,535.
-fn fold(groups: u32) -> [u32; 2] {
+fn grid(groups: u32) -> [u32; 2] {
     let y = groups.div_ceil(65_535).max(1);
     [groups.div_ceil(y), y]
 }

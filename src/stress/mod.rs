@@ -3,12 +3,12 @@
 //! Cases are scenes as users write them, rendered by the renderer that they use; answers are closed forms, worked out beside each.
 
 mod aiming;
-pub mod asked;
 mod bench;
 mod chi_square;
 mod geometry;
 mod interreflection;
 mod invariance;
+pub mod probe;
 mod range;
 mod sampling;
 mod scattering;

@@ -67,13 +67,13 @@ pub fn wait_for<T>(what: &str, ask: impl FnMut() -> Option<T>) -> T {
     wait_long_for(what, PATIENCE, ask)
 }
 
-fn wait_long_for<T>(what: &str, patience: Duration, mut ask: impl FnMut() -> Option<T>) -> T {
+fn wait_long_for<T>(what: &str, time_limit: Duration, mut ask: impl FnMut() -> Option<T>) -> T {
     let began = Instant::now();
     loop {
         if let Some(answer) = ask() {
             return answer;
         }
-        assert!(began.elapsed() < patience, "waited too long for {what}");
+        assert!(began.elapsed() < time_limit, "waited too long for {what}");
         thread::sleep(Duration::from_millis(50));
     }
 }

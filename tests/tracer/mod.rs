@@ -4,7 +4,7 @@ use spectile::device::prepared::Prepared;
 use spectile::device::text::Module;
 use spectile::device::words::NONE;
 use spectile::gpu::adapter::Gpu;
-use spectile::stress::asked::Kernel;
+use spectile::stress::probe::Kernel;
 
 const TRACE: Module = Module { name: "tests/tracer/trace.wgsl", text: include_str!("trace.wgsl") };
 

@@ -50,7 +50,7 @@ fn cosine_table(first: u32, behind: bool, cosine: f32) -> f32 {
     return tables[at] + (x - f32(i)) * (tables[at + 1u] - tables[at]);
 }
 
-// Where cosine `z` stands among the 128 nodes of a table of albedos, as `scattering::microfacet` has it.
+// Where cosine `z` stands among the 128 nodes of a table of albedos, as `spectral::hemisphere` has it.
 fn albedo_position(z: f32, alpha: f32) -> f32 {
     return 127.0 * sqrt(0.5 * (z + z * (1.0 + alpha) / (z + alpha)));
 }

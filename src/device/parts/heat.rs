@@ -16,10 +16,12 @@ use crate::device::parts::geometry::{FEWER_MATERIALS, MATERIALS};
 use crate::device::parts::textures::{self, Share};
 use crate::device::text::module;
 use crate::device::words::HOT_COSINES;
-use crate::scattering::fresnel::{conductor, dielectric, mean_conductor, mean_dielectric};
-use crate::scattering::{DielectricAlbedo, FACET_COSINES, FacetCosines, ReflectionAlbedo, facet_cosine, index_range};
 use crate::scene::{
     Bsdf, Emission, MaterialId, Reflectance, SMOOTH, Scene, Sides, Spectrum, SpectrumId, Temperature, Weight,
+};
+use crate::spectral::hemisphere::fresnel::{conductor, dielectric, mean_conductor, mean_dielectric};
+use crate::spectral::hemisphere::{
+    DielectricAlbedo, FACET_COSINES, FacetCosines, ReflectionAlbedo, facet_cosine, index_range,
 };
 use crate::spectral::{Channels, Curve, planck};
 

@@ -7,10 +7,10 @@ use crate::device::words::{
     HOT_FACET_COUNT, NONE, RADIATOR_ABSORBS, RADIATOR_COAT, RADIATOR_FACETS, RADIATOR_LAMP, RADIATOR_MIRROR,
     RADIATOR_OPEN, RADIATOR_TWO_SIDED, RADIATOR_VARNISH, Radiator,
 };
-use crate::scattering::fresnel::{mean_conductor, mean_dielectric};
-use crate::scattering::{ReflectionAlbedo, index_range};
 use crate::scene::{Bsdf, Reflectance, SMOOTH, Scene, Temperature};
 use crate::spectral::Curve;
+use crate::spectral::hemisphere::fresnel::{mean_conductor, mean_dielectric};
+use crate::spectral::hemisphere::{ReflectionAlbedo, index_range};
 use crate::{Error, Result};
 
 /// What the surface of a radiator does.

@@ -16,11 +16,11 @@ use crate::device::words::{
     LOBE_ROUGH_BOUNDARY, LOBE_ROUGH_COAT, LOBE_ROUGH_CONDUCTOR, LOBE_TEXTURED, LOBE_TWO_SIDED, Lobe, MATERIAL_DIFFUSE,
     MATERIAL_TRANSMITS, SurfaceMaterial,
 };
-use crate::scattering::fresnel::{self, mean_conductor, mean_dielectric};
-use crate::scattering::{DielectricAlbedo, ReflectionAlbedo, ReflectionProbability, index_range};
 use crate::scene::{
     Attributes, Bsdf, MaterialId, Reflectance, SMOOTH, Scene, SpectrumId, Texture, TextureKind, Weight,
 };
+use crate::spectral::hemisphere::fresnel::{self, mean_conductor, mean_dielectric};
+use crate::spectral::hemisphere::{DielectricAlbedo, ReflectionAlbedo, ReflectionProbability, index_range};
 use crate::spectral::{Curve, Outside};
 
 /// What a lobe does.

@@ -8,8 +8,8 @@ use glam::DVec3;
 use super::ggx::Ggx;
 use super::reflection::{Boundary, Mirror, RoughMirror, reflected};
 use super::{Choice, Lobe, Vertex, cosine_density, cosine_direction, fresnel};
-use crate::scattering::{DielectricAlbedo, ReflectionProbability, index_range};
 use crate::scene::{Scene, SpectrumId};
+use crate::spectral::hemisphere::{DielectricAlbedo, ReflectionProbability, index_range};
 
 /// Indices this near to 1 make no visible boundary. The half vector of refraction is lost there: a rough boundary that
 /// is matched in all channels is smooth, and one that is in some bends there by an index this far from 1.

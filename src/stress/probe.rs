@@ -9,7 +9,7 @@ use crate::device::rng::hash;
 use crate::device::text::{Module, module};
 use crate::device::windows::Windows;
 use crate::gpu::adapter::Gpu;
-use crate::gpu::buffer;
+use crate::gpu::buffer::{self, Buffer};
 use crate::gpu::pass::Pass;
 use crate::gpu::upload::NamedBuffers;
 use crate::render::worker::{device_limits, upload};
@@ -34,7 +34,7 @@ pub struct Kernel<'a> {
     pass: Pass,
     scene: NamedBuffers,
     /// For what the modules declare and the kernel does not use.
-    unused: wgpu::Buffer,
+    unused: Buffer,
 }
 
 impl<'a> Kernel<'a> {
@@ -43,7 +43,7 @@ impl<'a> Kernel<'a> {
         let scene = OnDevice { prepared, windows: Windows::of(&prepared.accel, device_limits(gpu).binding)? };
         let pass = Pass::new(gpu, &scene.around_tracing(module))?;
         let scene = upload(gpu, &scene)?;
-        let unused = buffer::empty(gpu, "unused", 256, wgpu::BufferUsages::STORAGE);
+        let unused = buffer::output(gpu, "unused", 256);
         Ok(Kernel { gpu, pass, scene, unused })
     }
 
@@ -52,26 +52,14 @@ impl<'a> Kernel<'a> {
         let gpu = self.gpu;
         let input = buffer::storage(gpu, "asked", asked)?;
         let size = (size_of::<T>() * answers) as u64;
-        let output = buffer::empty(gpu, "given", size, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC);
-        let bind = |group| {
-            self.pass.bind(gpu, group, |name| match name {
-                "asked" => Some(input.as_entire_buffer_binding()),
-                "given" => Some(output.as_entire_buffer_binding()),
-                _ => self.scene.find(name).or(Some(self.unused.as_entire_buffer_binding())),
-            })
-        };
-        let groups = [bind(0)?, bind(1)?];
-        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("ask") });
-        {
-            let mut compute = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-            compute.set_pipeline(&self.pass.pipeline);
-            compute.set_bind_group(0, &groups[0], &[]);
-            compute.set_bind_group(1, &groups[1], &[]);
-            let workgroups = (answers as u32).div_ceil(64);
-            compute.dispatch_workgroups(workgroups.min(1 << 15), workgroups.div_ceil(1 << 15), 1);
-        }
-        let submission = gpu.queue.submit([encoder.finish()]);
-        buffer::wait(gpu, submission, buffer::WARM_UP)?;
+        let output = buffer::output(gpu, "given", size);
+        let workgroups = (answers as u32).div_ceil(64);
+        let grid = [workgroups.min(1 << 15), workgroups.div_ceil(1 << 15)];
+        self.pass.run(gpu, grid, |name| match name {
+            "asked" => Some(input.as_entire_buffer_binding()),
+            "given" => Some(output.as_entire_buffer_binding()),
+            _ => self.scene.find(name).or(Some(self.unused.as_entire_buffer_binding())),
+        })?;
         buffer::read(gpu, &output, size, buffer::WARM_UP)
     }
 }

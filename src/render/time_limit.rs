@@ -17,11 +17,11 @@ const FORGET: f64 = 1.0 / 16.0;
 
 /// Seconds that a device takes for a path, as far as known.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Patience {
+pub struct TimeLimit {
     seconds_per_path: Option<f64>,
 }
 
-impl Patience {
+impl TimeLimit {
     /// A device took `elapsed` for waves of `paths` paths. What is slower than expected counts at once, what is faster bit by
     /// bit.
     pub fn note(&mut self, paths: u64, elapsed: Duration) {
@@ -44,25 +44,25 @@ mod tests {
 
     #[test]
     fn patience_follows_what_was_measured() {
-        let mut patience = Patience::default();
-        assert_eq!(patience.limit(1), WARM_UP);
-        patience.note(1000, Duration::from_secs(1));
+        let mut time_limit = TimeLimit::default();
+        assert_eq!(time_limit.limit(1), WARM_UP);
+        time_limit.note(1000, Duration::from_secs(1));
         // Ten times the prediction, and never less than a minute.
-        assert_eq!(patience.limit(1000), LEAST);
-        assert_eq!(patience.limit(60_000), Duration::from_secs(600));
+        assert_eq!(time_limit.limit(1000), LEAST);
+        assert_eq!(time_limit.limit(60_000), Duration::from_secs(600));
         // A slow one counts at once, and is forgotten slowly.
-        patience.note(1000, Duration::from_secs(20));
-        assert_eq!(patience.limit(1000), Duration::from_secs(200));
+        time_limit.note(1000, Duration::from_secs(20));
+        assert_eq!(time_limit.limit(1000), Duration::from_secs(200));
         for _ in 0..10 {
-            patience.note(1000, Duration::from_secs(1));
+            time_limit.note(1000, Duration::from_secs(1));
         }
-        let after_ten = patience.limit(1000);
+        let after_ten = time_limit.limit(1000);
         assert!((Duration::from_secs(100)..Duration::from_secs(120)).contains(&after_ten), "{after_ten:?}");
         for _ in 0..200 {
-            patience.note(1000, Duration::from_secs(1));
+            time_limit.note(1000, Duration::from_secs(1));
         }
-        assert_eq!(patience.limit(1000), LEAST);
-        patience.note(0, Duration::MAX);
-        assert_eq!(patience.limit(u64::MAX), Duration::MAX);
+        assert_eq!(time_limit.limit(1000), LEAST);
+        time_limit.note(0, Duration::MAX);
+        assert_eq!(time_limit.limit(u64::MAX), Duration::MAX);
     }
 }

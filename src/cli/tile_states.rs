@@ -15,7 +15,7 @@ const SHOWN: usize = 8;
 
 /// What `info` says of the work on a cube.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Standing {
+pub struct TileStates {
     work: Work,
     /// The array job, if there is one, and what Slurm says of those that are not over.
     job: Option<Job>,
@@ -47,14 +47,14 @@ fn is_waiting(stand: Stand) -> bool {
     stand == Stand::Missing
 }
 
-impl Standing {
-    pub fn of(cube: &Cube, samples: &[u32]) -> Result<Standing> {
+impl TileStates {
+    pub fn of(cube: &Cube, samples: &[u32]) -> Result<TileStates> {
         // What another version has submitted is a cube like any other here.
         let job = Job::find(cube.path()).unwrap_or(None);
         let work = Work::of(cube, samples, job.as_ref().map(|job| job.samples))?;
         let jobs: Vec<u64> = job.iter().flat_map(|job| job.submitted.iter().map(|s| s.array)).collect();
         let queue = if jobs.is_empty() || work.is_done() { None } else { client::states(&jobs) };
-        Ok(Standing { work, job, queue })
+        Ok(TileStates { work, job, queue })
     }
 
     pub fn is_done(&self) -> bool {
