@@ -12,7 +12,12 @@ fn end_path(list: RecordList, rays: u32, overflow: bool) {
         atomicAdd(&counters[COUNTER_RAYS_HIGH], 1u);
     }
     note_records(list);
-    heads[list.path].y = list.used | (wave.sequence << 16u);
+    heads[list.path].y = records_to_read(list) | (wave.sequence << 16u);
+}
+
+// Where more were taken than there is room for, evaluation must not read on into those of other paths.
+fn records_to_read(list: RecordList) -> u32 {
+    return min(list.used, frame.max_records);
 }
 
 // The most records that any path took, which the host compares with what there is room for.
@@ -179,7 +184,7 @@ fn generate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroup
     note_records(list);
     heads[number].y = list.count;
 #else
-    heads[number].y = list.used;
+    heads[number].y = records_to_read(list);
 #endif
     save_path(path, list.count | (list.used << 16u));
     let next = atomicAdd(&queue_lengths[step.bounce], 1u);

@@ -10,12 +10,14 @@ use super::output::say;
 use super::progress::short;
 use super::scene::SceneArgs;
 use crate::cube::Header;
+use crate::device::evaluator::EvaluateShape;
 use crate::device::facts;
 use crate::device::part::OnDevice;
 use crate::device::prepared::Prepared;
 use crate::device::windows::Windows;
 use crate::files::format_bytes;
 use crate::gpu::adapter::{Gpu, Selection};
+use crate::gpu::pass::storage_buffers;
 use crate::render::job::StopRule;
 use crate::render::plan;
 use crate::render::pool::MERGE_THREADS;
@@ -32,6 +34,7 @@ use crate::{Error, Result};
 #[command(after_long_help = "\
 Examples:
   spectile plan scene.toml
+  spectile plan scene.toml --parts
   spectile plan scene.toml --size 4096x4096 --set channels.equal.count=2000 --spp 256
   spectile plan scene.toml --devices 2 --memory 512MiB")]
 pub struct Args {
@@ -51,6 +54,10 @@ pub struct Args {
     /// Samples per pixel to predict the time for, rounded up as by `render`
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
     pub spp: u32,
+
+    /// Print the table of all parts of the renderer too: what each adds to kernels, buffers, records and paths
+    #[arg(long)]
+    pub parts: bool,
 
     /// One JSON object a line on stdout, instead of text
     #[arg(long)]
@@ -204,7 +211,7 @@ impl Plan<'_> {
         });
         let features = facts::parts(&self.on_device());
         let features = features.iter().map(|f| json!({ "name": f.name, "used": f.used, "effect": f.effect }));
-        json!({
+        let mut facts = json!({
             "scene": self.args.scene.scene,
             "size": self.header.size,
             "channels": self.header.channels.len(),
@@ -213,6 +220,7 @@ impl Plan<'_> {
             "evaluator": self.prepared.evaluator.name(),
             "features": features.collect::<Vec<_>>(),
             "spectra": facts::table_bounds(self.prepared),
+            "storage_buffers": self.storage_buffers(),
             "primitives": self.prepared.accel.primitives.len(),
             "bvh_nodes": self.prepared.accel.nodes.len(),
             "emitters": self.prepared.emitters.len(),
@@ -229,7 +237,19 @@ impl Plan<'_> {
             "paths_per_s": self.paths_per_s(),
             "samples": self.samples,
             "predicted_s": self.predicted_s(),
-        })
+        });
+        if self.args.parts {
+            facts["parts"] = facts::table(&self.on_device()).iter().map(facts::PartRow::json).collect();
+        }
+        facts
+    }
+
+    /// Storage buffers that a kernel binds at most.
+    fn storage_buffers(&self) -> u32 {
+        let scene = self.on_device();
+        let kernels = scene.kernels(EvaluateShape::of(self.prepared, true));
+        // Texts that do not parse are refused where they are compiled.
+        kernels.all().filter_map(|source| storage_buffers(source).ok()).max().unwrap_or(0)
     }
 
     fn describe(&self) -> String {
@@ -250,6 +270,7 @@ impl Plan<'_> {
             p.emitters.len()
         );
         text += &format!("evaluator {}\n", p.evaluator.name());
+        text += &format!("kernels   bind {} storage buffers at most\n", self.storage_buffers());
         let lines = facts::parts(&self.on_device());
         for (title, used) in [("used", true), ("left out", false)] {
             for (i, line) in lines.iter().filter(|l| l.used == used).enumerate() {
@@ -305,6 +326,10 @@ impl Plan<'_> {
                 );
             }
             _ => text += "time      unknown without a device\n",
+        }
+        if self.args.parts {
+            text += "parts     used; what each adds to kernels, stages of generate, buffers, records of a path, words of its state\n";
+            facts::table(&self.on_device()).iter().for_each(|row| text += &row.line());
         }
         text
     }

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::device::part::{OnDevice, PARTS, Part};
+use crate::device::part::{OnDevice, PARTS, Part, Records};
 use crate::device::prepared::Prepared;
 use crate::files::format_bytes;
 use crate::{Error, Result};
@@ -29,25 +29,72 @@ fn effect(part: &Part, scene: &OnDevice) -> String {
     }
 }
 
+/// A row of [`PARTS`] as it is for a scene.
+pub struct PartRow {
+    name: &'static str,
+    used: bool,
+    modules: Vec<&'static str>,
+    /// Where it adds to the kernel that generates paths of general scenes.
+    stages: Vec<&'static str>,
+    /// Names and bytes; none where it is not used.
+    buffers: Vec<(String, usize)>,
+    records: Records,
+    state_words: u32,
+}
+
 /// The whole table: what each part adds to kernels, buffers, records and path state, and whether this scene has it.
-pub fn table(scene: &OnDevice) -> Vec<Value> {
+pub fn table(scene: &OnDevice) -> Vec<PartRow> {
     let row = |part: &&Part| {
         let used = (part.used)(scene);
-        let modules: Vec<String> =
-            part.modules.iter().map(|(place, module)| format!("{place:?}: {}", module.name)).collect();
-        let buffers: Vec<Value> = match used {
-            true => (part.buffers)(scene).iter().map(|b| json!({ "name": b.name, "bytes": b.bytes.len() })).collect(),
-            false => Vec::new(),
-        };
-        let records = if used { (part.records)(scene) } else { Default::default() };
-        json!({
-            "name": part.name, "used": used, "modules": modules,
-            "stages": part.lines.iter().map(|(place, _)| *place).collect::<Vec<_>>(), "buffers": buffers,
-            "records": { "path": records.path, "way": records.way, "vertex": records.vertex },
-            "state_words": part.state_words,
-        })
+        let buffers = if used { (part.buffers)(scene) } else { Vec::new() };
+        let (mut modules, mut stages): (Vec<_>, Vec<_>) = (
+            part.modules.iter().map(|(_, module)| module.name).collect(),
+            part.lines.iter().map(|(at, _)| *at).collect(),
+        );
+        modules.dedup();
+        stages.dedup();
+        PartRow {
+            name: part.name,
+            used,
+            modules,
+            stages,
+            buffers: buffers.into_iter().map(|buffer| (buffer.name, buffer.bytes.len())).collect(),
+            records: if used { (part.records)(scene) } else { Records::NONE },
+            state_words: part.state_words,
+        }
     };
     PARTS.iter().map(row).collect()
+}
+
+impl PartRow {
+    pub fn json(&self) -> Value {
+        let buffers = self.buffers.iter().map(|(name, bytes)| json!({ "name": name, "bytes": bytes }));
+        let Records { path, way, vertex } = self.records;
+        json!({
+            "name": self.name, "used": self.used, "modules": self.modules, "stages": self.stages,
+            "buffers": buffers.collect::<Vec<_>>(), "records": { "path": path, "way": way, "vertex": vertex },
+            "state_words": self.state_words,
+        })
+    }
+
+    /// For the terminal.
+    pub fn line(&self) -> String {
+        let buffers = self.buffers.iter().map(|(name, bytes)| format!("{name} {}", format_bytes(*bytes as u64)));
+        let Records { path, way, vertex } = self.records;
+        let all = [
+            self.modules.join(", "),
+            self.stages.join(", "),
+            buffers.collect::<Vec<_>>().join(", "),
+            if self.records == Records::NONE {
+                String::new()
+            } else {
+                format!("{path} + {way} a way + {vertex} a vertex")
+            },
+            if self.state_words == 0 { String::new() } else { format!("{} words", self.state_words) },
+        ];
+        let all: Vec<String> = all.into_iter().filter(|text| !text.is_empty()).collect();
+        format!("{:9} {}: {}\n", if self.used { "      yes" } else { "       no" }, self.name, all.join("; "))
+    }
 }
 
 /// What the scene takes on a device, bytes. `allocated`: what a buffer for so many takes.

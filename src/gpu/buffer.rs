@@ -40,6 +40,13 @@ pub fn empty(gpu: &Gpu, label: &str, size: u64, usage: wgpu::BufferUsages) -> wg
     })
 }
 
+/// A uniform holding `bytes`.
+pub fn uniform(gpu: &Gpu, label: &str, bytes: &[u8]) -> Buffer {
+    let buffer = empty(gpu, label, bytes.len() as u64, wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST);
+    gpu.queue.write_buffer(&buffer, 0, bytes);
+    buffer
+}
+
 /// A storage buffer of `size` bytes that kernels write and [`read`] reads.
 pub fn output(gpu: &Gpu, label: &str, size: u64) -> Buffer {
     empty(gpu, label, size, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC)

@@ -15,11 +15,8 @@ impl NamedBuffers {
         uniform: (&str, &[u8]),
         storage: impl IntoIterator<Item = (String, &'a [u8])>,
     ) -> Result<NamedBuffers> {
-        let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
         let (name, bytes) = uniform;
-        let buffer = buffer::empty(gpu, name, bytes.len() as u64, usage);
-        gpu.queue.write_buffer(&buffer, 0, bytes);
-        let mut named = vec![(name.to_owned(), buffer)];
+        let mut named = vec![(name.to_owned(), buffer::uniform(gpu, name, bytes))];
         for (name, bytes) in storage {
             let buffer = buffer::storage(gpu, &name, bytes)?;
             named.push((name, buffer));

@@ -548,6 +548,30 @@ mod tests {
         }
     }
 
+    /// A path that takes more records than were planned for harms no other, and its unit is not merged.
+    #[test]
+    fn too_many_records_are_a_fault_of_their_own() {
+        let scene = Builder::new()
+            .bounces(3)
+            .plastic(room(DVec3::splat(-2.0), DVec3::splat(2.0)), 0.5, 1.5, 0.2)
+            .lamp(sphere(DVec3::new(0.0, 1.0, 0.0), 0.1), 1.0, Sides::Front)
+            .build();
+        let mut prepared = Prepared::new(&scene, 0).expect("a scene");
+        let planned = prepared.frame.max_records;
+        let mut run = |most: u32| {
+            prepared.frame.max_records = most;
+            let prepared = Arc::new(std::mem::replace(&mut prepared, Prepared::new(&scene, 0).expect("a scene")));
+            let gpu = Gpu::open().expect("a device");
+            counters(&mut Worker::new(gpu, prepared, [4, 4], Budget::default()).expect("a worker"))
+        };
+        let used = run(planned).expect("counters").records;
+        assert!(used > 8 && used <= planned, "{used} of {planned}");
+        assert_eq!(run(used).expect("just enough").records, used);
+        let error = run(used - 1).expect_err("too few");
+        let said = format!("a path took {used} records where {} were planned for", used - 1);
+        assert!(matches!(&error, Error::Internal(what) if what.contains(&said)), "{error}");
+    }
+
     /// The count of rays goes on beyond 32 bits, from wherever it crosses them.
     #[test]
     fn rays_do_not_wrap() {
