@@ -18,7 +18,7 @@ fn a_report_of_two_samplers_and_two_numbers_of_channels() {
     let folder = tempfile::tempdir().expect("a folder");
     let vary = ["--vary", "integrator.sampler=sobol,independent", "--vary", "channels.equal.count=4,8"];
     let output =
-        run(folder.path(), &[&["-o", "report", "--spp", "1024", "--budget", "60s", "--json"], &vary[..]].concat());
+        run(folder.path(), &[&["-o", "report", "--spp", "1024", "--budget", "1h", "--json"], &vary[..]].concat());
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let read = |name: &str| std::fs::read_to_string(folder.path().join("report").join(name)).expect("written");
     let report: Value = serde_json::from_str(&read("converge.json")).expect("JSON");

@@ -12,8 +12,20 @@ use spectile::cube::Cube;
 use spectile::preview::web::{About, Server};
 use spectile::preview::{Feed, follow};
 
-/// Long enough for anything here on a busy machine.
-pub const PATIENCE: Duration = Duration::from_secs(120);
+/// Long enough for anything here on a busy machine; what takes longer hangs.
+pub const PATIENCE: Duration = Duration::from_secs(300);
+
+/// Asks again and again until there is an answer.
+pub fn until<T>(what: &str, mut ask: impl FnMut() -> Option<T>) -> T {
+    let began = Instant::now();
+    loop {
+        if let Some(answer) = ask() {
+            return answer;
+        }
+        assert!(began.elapsed() < PATIENCE, "waited too long for {what}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
 
 /// An answer: status, headers in lower case, body.
 #[derive(Debug)]
@@ -165,15 +177,7 @@ impl Running {
 
     /// Waits until the status is `such`.
     pub fn until(&self, such: impl Fn(&Value) -> bool) -> Value {
-        let began = Instant::now();
-        loop {
-            let status = self.status();
-            if such(&status) {
-                return status;
-            }
-            assert!(began.elapsed() < PATIENCE, "{status}");
-            std::thread::sleep(Duration::from_millis(20));
-        }
+        until("another status", || Some(self.status()).filter(&such))
     }
 
     pub fn control(&self, what: &str) -> u16 {

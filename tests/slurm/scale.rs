@@ -82,7 +82,5 @@ fn scale() {
             measured / predicted,
             1e3 * verify_s / 64.0
         );
-        // Not a benchmark but a sanity check: Slurm itself must not take as long as the work.
-        assert!(measured < 3.0 * predicted, "{measured} s, {predicted} s predicted");
     }
 }
