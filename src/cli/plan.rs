@@ -10,7 +10,7 @@ use super::output::say;
 use super::progress::short;
 use super::scene::SceneArgs;
 use crate::cube::Header;
-use crate::files::format_bytes;
+use crate::files::{format_bytes, shown};
 use crate::gpu::adapter::{Gpu, Selection};
 use crate::render::job::StopRule;
 use crate::render::plan;
@@ -196,7 +196,7 @@ impl Plan<'_> {
         let features = plan::feature_lines(self.prepared, &self.waves);
         let features = features.iter().map(|f| json!({ "name": f.name, "used": f.used, "effect": f.effect }));
         json!({
-            "scene": self.args.scene.scene,
+            "scene": shown(&self.args.scene.scene),
             "size": self.header.size,
             "channels": self.header.channels.len(),
             "tile": self.header.tile,

@@ -17,7 +17,7 @@ use crate::render::prepare::Prepared;
 use crate::render::queue::Queue;
 use crate::render::watch::{Polled, Reports};
 use crate::render::worker::{Interrupt, Profile, check_interrupt};
-use crate::{Error, Result, files, format};
+use crate::{Error, Result, format};
 
 /// The preview file is rewritten at most this often, and takes at most this share of the time.
 const PREVIEW_INTERVAL: Duration = Duration::from_secs(1);
@@ -93,7 +93,7 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
     let tiles = job.tiles(&header)?;
     let there = check_target(&job.output, &header, job.existing, &tiles)?;
     if let Some(preview) = &job.preview {
-        files::check_target(&preview.file)?;
+        format::png::KEPT.check_target(&preview.file)?;
     }
     let gpus = Gpu::open_all(&job.devices)?;
     for gpu in &gpus {
