@@ -10,6 +10,7 @@ use super::Output;
 use super::output::say;
 use super::render::parse_time;
 use crate::device::example::with_everything;
+use crate::files::shown;
 use crate::gpu::adapter::{Gpu, Selection};
 use crate::render::interrupt::Interrupt;
 use crate::report::bench::{Frames, Part, Report, Row};
@@ -100,7 +101,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
             missing.display()
         )));
     }
-    make_folder(&args.output)?;
+    make_folder(&args.output, "bench")?;
     let gpu = Arc::new(Gpu::open_all(&args.devices)?.remove(0));
     let mut report = Report {
         circumstances: Circumstances::now(&gpu),
@@ -109,7 +110,10 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         frames: Vec::new(),
         missing: Vec::new(),
     };
-    output.event("start", json!({ "scenes": files, "device": gpu.name }))?;
+    output.event(
+        "start",
+        json!({ "scenes": files.iter().map(|file| shown(file)).collect::<Vec<_>>(), "device": gpu.name }),
+    )?;
     let began = Instant::now();
     for step in steps(args, &files) {
         let name = name_of(step.file);
@@ -141,7 +145,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         }
         write(&args.output, "bench", &report.csv(), &report.json(), &report.html()?)?;
     }
-    output.event("done", json!({ "report": report.json(), "folder": args.output }))?;
+    output.event("done", json!({ "report": report.json(), "folder": shown(&args.output) }))?;
     output.text(&format!("{}{}\n", report.summary(), args.output.join("bench.html").display()))
 }
 

@@ -15,7 +15,7 @@ use crate::device::facts;
 use crate::device::part::OnDevice;
 use crate::device::prepared::Prepared;
 use crate::device::windows::Windows;
-use crate::files::format_bytes;
+use crate::files::{format_bytes, shown};
 use crate::gpu::adapter::{Gpu, Selection};
 use crate::gpu::pass::storage_buffers;
 use crate::render::job::StopRule;
@@ -212,7 +212,7 @@ impl Plan<'_> {
         let features = facts::parts(&self.on_device());
         let features = features.iter().map(|f| json!({ "name": f.name, "used": f.used, "effect": f.effect }));
         let mut facts = json!({
-            "scene": self.args.scene.scene,
+            "scene": shown(&self.args.scene.scene),
             "size": self.header.size,
             "channels": self.header.channels.len(),
             "tile": self.header.tile,

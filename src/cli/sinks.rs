@@ -42,9 +42,11 @@ impl Sinks {
 
                 use crate::preview::web::{About, Server};
                 let about = About { name: name.clone(), exposure: args.exposure, controls: true };
-                let server = Server::start(address, Arc::clone(&feed), about)?;
+                let server = Server::start_behind(&args.public_host, address, Arc::clone(&feed), about)?;
                 let fields = json!({ "url": server.url(), "token": server.token() });
-                reporter.listening(&format!("watch it at {}", server.url()), fields)?;
+                let through = view::through_proxies(&args.public_host, server.token());
+                let through = through.map_or_else(String::new, |through| format!("; {}", through.trim_end()));
+                reporter.listening(&format!("watch it at {}{through}", server.url()), fields)?;
                 Ok(server)
             })
             .transpose()?;

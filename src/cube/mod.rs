@@ -27,6 +27,7 @@ mod preview;
 #[cfg(all(test, unix))]
 mod protocol_tests;
 mod recover;
+mod restore;
 mod runs;
 mod sensor;
 mod store;
@@ -41,7 +42,7 @@ pub use grid::{Grid, Rect};
 pub use look::{Look, RegionMean, Seen, Window};
 pub use map::Chunk;
 pub use merge::{merge_bytes, merge_means};
-pub use metadata::{FORMAT, Header};
+pub use metadata::{FORMAT, Header, plain_attributes};
 pub use preview::reduction;
 pub use runs::{Run, RunFile, RunState, SlurmTask, Stand, Work, node_name, now_s};
 pub use sensor::{Findings, integrate};

@@ -4,11 +4,11 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use super::checksums;
 use super::journal::{Journal, Record};
 use super::lock::TileLock;
 use super::recover::checksum_of;
-use super::store::{Cube, Part};
+use super::restore;
+use super::store::{Cube, Origin, PRIVATE, Part};
 use crate::{Error, Result};
 
 /// What [`Cube::verify`] found.
@@ -30,12 +30,13 @@ const MAX_THREADS: usize = 8;
 impl Cube {
     /// Compares every file with its checksum. The cube may be being rendered.
     pub fn verify(&self) -> Result<Verification> {
-        let mut found = Verification::default();
-        let wrong = checksums::wrong_files(self.path());
-        let list = self.path().join(checksums::FILE);
-        let (wrong, count) = wrong.map_err(|error| Error::storage(&list, format!("cannot be read: {error}")))?;
-        found.files += count;
-        found.damage.extend(wrong.into_iter().map(|name| format!("{name} is not what was written")));
+        if *self.origin() == Origin::Copy {
+            let what =
+                format!("is a copy without {PRIVATE}, so nothing tells what its files must be; verify the original");
+            return Err(Error::Usage(format!("{} {what}", self.path().display())));
+        }
+        let (files, damage) = restore::verify(self)?;
+        let mut found = Verification { files, damage, tiles: Vec::new() };
         // Reading is what takes the time, and disks of many machines want several readers.
         let (next, count) = (AtomicU32::new(0), self.grid().count());
         let threads = thread::available_parallelism().map_or(1, usize::from).min(MAX_THREADS);

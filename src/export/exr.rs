@@ -18,8 +18,16 @@ use smallvec::SmallVec;
 
 use super::{Progress, check_space};
 use crate::cube::{Quantity, Rect, Strides, View};
-use crate::files::Replacement;
+use crate::files::output::{Product, Replacement, cannot_write};
 use crate::{Error, Result};
+
+/// What [`write`] writes. Where its chunks lie stands at the beginning, and is known at the end: no pipe takes it.
+pub const IMAGE: Product =
+    Product { name: "an OpenEXR image", extensions: &["exr"], is_stream: false, is_folder: false, check: is_exr };
+
+fn is_exr(path: &Path) -> std::result::Result<(), String> {
+    MetaData::read_from_file(path, false).map(drop).map_err(|_| "does not begin like one".into())
+}
 
 /// OpenImageIO, and what is built on it, refuses files with more channels unless told otherwise.
 pub const WIDELY_READ: usize = 1024;
@@ -112,7 +120,7 @@ fn write_file(view: &View, path: &Path, strict_units: bool, progress: &mut Progr
     let sources: Vec<Source> = named.iter().map(|(_, source)| *source).collect();
     let header = header(view, &named, strict_units)?;
 
-    let mut replacement = Replacement::create(path)?;
+    let mut replacement = Replacement::create(path, IMAGE)?;
     let mut ended = None;
     let mut file = BufWriter::with_capacity(1 << 20, replacement.file());
     let result = exr::block::write(&mut file, SmallVec::from_vec(vec![header]), true, |meta, writer| {
@@ -129,8 +137,8 @@ fn write_file(view: &View, path: &Path, strict_units: bool, progress: &mut Progr
     if let Some(error) = ended {
         return Err(error);
     }
-    result.map_err(|error| replacement.failed(error))?;
-    flushed.map_err(|error| replacement.failed(error))?;
+    result.map_err(failed(path))?;
+    flushed.map_err(|error| replacement.failed(&error))?;
     Ok(replacement)
 }
 
@@ -193,6 +201,13 @@ fn header(view: &View, named: &[(String, Source)], strict_units: bool) -> Result
     Ok(header)
 }
 
+fn failed(path: &Path) -> impl Fn(exr::error::Error) -> Error + Copy + use<'_> {
+    move |error| match error {
+        exr::error::Error::Io(error) => cannot_write(path, &error),
+        error => Error::storage(path, format!("cannot be written: {error}")),
+    }
+}
+
 /// One tile after another, several of them compressed at the same time.
 fn write_tiles(
     view: &View,
@@ -208,7 +223,7 @@ fn write_tiles(
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     // Compression holds a tile twice.
     let together = threads.min(TILE_BYTES / tile_bytes).max(1);
-    let failed = |error: exr::error::Error| Error::storage(path, format!("cannot be written: {error}"));
+    let failed = failed(path);
     let indices: Vec<_> = exr::block::enumerate_ordered_header_block_indices(&meta.headers).collect();
     let mut tiles = Tiles { view, reader: view.reader(), sources, bands: Vec::new(), colours: Vec::new() };
     let mut done = 0;

@@ -10,9 +10,50 @@ use zarrs::array::{Array, ArrayBytes, ArrayMetadata};
 use zarrs::filesystem::FilesystemStore;
 
 use super::{PIECE_BYTES, Progress, check_space, long_name, units};
-use crate::cube::{Quantity, Rect, Strides, View};
-use crate::files::NewFolder;
+use crate::cube::{Quantity, Rect, Strides, View, plain_attributes};
+use crate::files::output::{NewFolder, Product, cannot_write, only_holds};
 use crate::{Error, Result};
+
+/// What [`write`] writes.
+pub const STORE: Product = Product {
+    name: "a Zarr store that `export` wrote",
+    extensions: &["zarr"],
+    is_stream: false,
+    is_folder: true,
+    check: is_store,
+};
+
+/// The attribute that tells who wrote a store.
+const SOURCE: &str = "source";
+const SOURCE_BEGINS: &str = "Spectile ";
+/// All arrays that stores may have.
+const ARRAYS: [&str; 10] = [
+    "radiance",
+    "standard_error",
+    "brightness_temperature",
+    "xyz",
+    "wavelength",
+    "wavelength_width",
+    "wavelength_bounds",
+    "response_integral",
+    "x",
+    "y",
+];
+
+/// Whether the group was made by an export, and holds nothing else. A cube is not.
+fn is_store(folder: &Path) -> std::result::Result<(), String> {
+    let text = fs::read(folder.join("zarr.json")).map_err(|_| "holds no zarr.json")?;
+    let group: Value = serde_json::from_slice(&text).map_err(|_| "holds a zarr.json that is not JSON")?;
+    if group["attributes"]["spectile_format"] != Value::Null || folder.join(".spectile").exists() {
+        return Err("is a cube".into());
+    }
+    if !group["attributes"][SOURCE].as_str().is_some_and(|source| source.starts_with(SOURCE_BEGINS)) {
+        return Err("is a store of somebody else".into());
+    }
+    only_holds(folder, |name| name == "zarr.json" || ARRAYS.contains(&name))?;
+    let arrays = ARRAYS.iter().map(|name| folder.join(name)).filter(|array| array.is_dir());
+    arrays.into_iter().try_for_each(|array| only_holds(&array, |name| ["zarr.json", "c"].contains(&name)))
+}
 
 /// About so many bands and pixels a side go into a chunk: 256 KiB.
 const CHUNK_BANDS: usize = 64;
@@ -49,11 +90,11 @@ impl Layout {
     }
 }
 
-/// Writes a store, which must not exist yet.
+/// Writes a store, new or in the place of one.
 pub fn write(view: &View, path: &Path, shards: bool, progress: &mut Progress) -> Result<Vec<PathBuf>> {
     // As if nothing could be compressed.
     check_space(path, view.bytes())?;
-    let folder = NewFolder::create(path)?;
+    let folder = NewFolder::create(path, STORE)?;
     let failed = |what: &dyn std::fmt::Display| Error::storage(path, format!("cannot be written: {what}"));
     let layout = Layout::new(view, shards);
     let arrays = arrays(view, &layout)?;
@@ -63,7 +104,7 @@ pub fn write(view: &View, path: &Path, shards: bool, progress: &mut Progress) ->
         let target = folder.path().join(name);
         fs::create_dir_all(&target)
             .and_then(|()| fs::write(target.join("zarr.json"), format!("{metadata:#}\n")))
-            .map_err(|error| failed(&error))?;
+            .map_err(|error| cannot_write(path, &error))?;
     }
     let open = |name: &str| -> Result<Array<FilesystemStore>> {
         let metadata = arrays.iter().find(|(of, _)| *of == name).map_or(Value::Null, |(_, metadata)| metadata.clone());
@@ -92,7 +133,7 @@ pub fn write(view: &View, path: &Path, shards: bool, progress: &mut Progress) ->
         write_values(of, &layout, &open(variable(of))?, &failed, &mut tell)?;
     }
     let group = group(view, &arrays);
-    fs::write(folder.path().join("zarr.json"), format!("{group:#}\n")).map_err(|error| failed(&error))?;
+    fs::write(folder.path().join("zarr.json"), format!("{group:#}\n")).map_err(|error| cannot_write(path, &error))?;
     folder.finish()?;
     Ok(vec![path.to_owned()])
 }
@@ -150,10 +191,12 @@ fn variable(view: &View) -> &'static str {
 fn group(view: &View, arrays: &[(&str, Value)]) -> Value {
     let header = view.cube().header();
     let mut attributes = header.attributes.clone();
+    // Of the cube, which this is no longer.
+    attributes.remove("uncertainty");
     attributes.extend([
         ("Conventions".into(), json!("CF-1.11")),
         ("title".into(), json!("Spectral image")),
-        ("source".into(), json!(format!("Spectile {}", env!("CARGO_PKG_VERSION")))),
+        (SOURCE.into(), json!(format!("{SOURCE_BEGINS}{}", env!("CARGO_PKG_VERSION")))),
         ("channel_names".into(), json!(view.channels().names)),
     ]);
     if !view.channels().responses.is_empty() {
@@ -163,7 +206,7 @@ fn group(view: &View, arrays: &[(&str, Value)]) -> Value {
     json!({
         "zarr_format": 3,
         "node_type": "group",
-        "attributes": attributes,
+        "attributes": plain_attributes(attributes),
         "consolidated_metadata": { "kind": "inline", "must_understand": false, "metadata": metadata },
     })
 }

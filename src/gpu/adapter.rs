@@ -130,6 +130,8 @@ pub enum Selection {
     Count(usize),
     /// Positions in [`list`].
     List(Vec<usize>),
+    /// Every software device, whatever else there is.
+    Software,
 }
 
 impl std::str::FromStr for Selection {
@@ -162,7 +164,10 @@ impl Selection {
             (Selection::List(_), Given::Count(_)) => &Given::Everything,
             (_, given) => given,
         };
-        let all = usable_once(listed, given)?;
+        let all = match self {
+            Selection::Software => software_among(listed),
+            _ => usable_once(listed, given)?,
+        };
         match self {
             Selection::List(positions) => {
                 for &position in positions {
@@ -193,7 +198,7 @@ impl Selection {
                      (Debian/Ubuntu: apt-get install mesa-vulkan-drivers libvulkan1)"
                 )))
             }
-            Selection::All => Ok(all),
+            Selection::All | Selection::Software => Ok(all),
             Selection::Count(count) => Ok((0..*count).map(|i| all[i % all.len()]).collect()),
         }
     }
@@ -202,15 +207,40 @@ impl Selection {
 /// Usable adapters: every GPU that was given, through the first backend that lists it; if there is none, every software
 /// adapter.
 fn usable_once(listed: &[AdapterFacts], given: &Given) -> Result<Vec<usize>> {
-    let of = |software: bool| -> Vec<usize> {
-        let usable = |facts: &AdapterFacts| facts.unusable.is_none() && facts.is_software == software;
-        let backend_of = |name: &str| listed.iter().find(|f| usable(f) && f.name == name).map(|f| &f.backend);
-        (0..listed.len())
-            .filter(|&i| usable(&listed[i]) && backend_of(&listed[i].name) == Some(&listed[i].backend))
-            .collect()
-    };
-    let gpus = given.among(listed, &of(false))?;
-    Ok(if gpus.is_empty() { of(true) } else { gpus })
+    let gpus = given.among(listed, &usable(listed, false))?;
+    Ok(if gpus.is_empty() { software_among(listed) } else { gpus })
+}
+
+fn software_among(listed: &[AdapterFacts]) -> Vec<usize> {
+    usable(listed, true)
+}
+
+/// Usable adapters that are software or are not, each through the first backend that lists it.
+fn usable(listed: &[AdapterFacts], software: bool) -> Vec<usize> {
+    let is_usable = |facts: &AdapterFacts| facts.unusable.is_none() && facts.is_software == software;
+    let backend_of = |name: &str| listed.iter().find(|f| is_usable(f) && f.name == name).map(|f| &f.backend);
+    (0..listed.len())
+        .filter(|&i| is_usable(&listed[i]) && backend_of(&listed[i].name) == Some(&listed[i].backend))
+        .collect()
+}
+
+/// The devices of a task whose job asked for GPUs. Software devices stand in only where they are allowed to: they render the
+/// same at a hundredth of the speed, which nobody wants unasked on a whole cluster.
+pub fn of_task(allow_software: bool) -> Result<Selection> {
+    let listed = list();
+    let chosen = Selection::All.choose(&listed, &allocation::given()?);
+    match chosen {
+        Ok(chosen) => match chosen.first().map(|&first| &listed[first]) {
+            Some(first) if first.is_software && !allow_software => Err(Error::NoDevice(format!(
+                "no GPU is found, only {}, which renders on the CPUs: --allow-software would use it, and --gpus-per-task 0 \
+                 asks for nothing else",
+                first.name
+            ))),
+            _ => Ok(Selection::All),
+        },
+        Err(Error::NoDevice(_)) if allow_software && !software_among(&listed).is_empty() => Ok(Selection::Software),
+        Err(error) => Err(error),
+    }
 }
 
 /// Where `now`, what another Instance lists, has the adapter `listed[index]`: by name, backend, and position among

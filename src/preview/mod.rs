@@ -15,5 +15,5 @@ pub use feed::{Control, ErrorPoint, Feed, Progress, Snapshot, Source, Stage, Wor
 pub use status::{DeviceStatus, Status};
 pub use tev::Tev;
 
-/// Writes the picture of a render at an exposure of `ev`, 8-bit sRGB, replacing the last one in one step.
-pub use crate::format::png::write;
+/// The picture of a render as a file, replaced in one step again and again.
+pub use crate::format::png::{KEPT as PICTURE, write};

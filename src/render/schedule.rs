@@ -19,7 +19,7 @@ use crate::render::pool::{Merged, Pool, Report, Tally};
 use crate::render::queue::Queue;
 use crate::render::watch::{Heard, Reports, Requests};
 use crate::render::worker::Profile;
-use crate::{Error, Result, files, preview};
+use crate::{Error, Result, preview};
 
 /// The preview file is rewritten at most this often, and takes at most this share of the time.
 const PREVIEW_INTERVAL: Duration = Duration::from_secs(1);
@@ -64,7 +64,7 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
     let tiles = job.tiles(&header)?;
     let there = check_target(&job.output, &header, job.existing, &tiles)?;
     if let Some(preview) = &job.preview {
-        files::check_target(&preview.file)?;
+        preview::PICTURE.check_target(&preview.file)?;
     }
     let gpus = Gpu::open_all(&job.devices)?;
     for gpu in &gpus {

@@ -92,12 +92,13 @@ impl Row {
     }
 }
 
+/// The first line of its table.
+pub const CSV_HEADER: &str = "part,scene,evaluator,kernels,channels,pool,paths_per_s,slowest,fastest,frames_per_s_512,generate_us,evaluate_us,\
+     path_bytes,planned_bytes,allocated_bytes";
+
 impl Report {
     pub fn csv(&self) -> String {
-        let mut text = String::from(
-            "part,scene,evaluator,kernels,channels,pool,paths_per_s,slowest,fastest,frames_per_s_512,generate_us,evaluate_us,\
-             path_bytes,planned_bytes,allocated_bytes\n",
-        );
+        let mut text = format!("{CSV_HEADER}\n");
         for row in &self.rows {
             let [slowest, fastest] = row.rates.range();
             let micro = |s: f64| format!("{:.5}", 1e6 * s);

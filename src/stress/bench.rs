@@ -131,7 +131,7 @@ impl Machine {
     pub fn several(&self, count: usize) -> Selection {
         match &self.devices {
             Selection::List(positions) => Selection::List(vec![positions[0]; count]),
-            Selection::All | Selection::Count(_) => Selection::Count(count),
+            Selection::All | Selection::Software | Selection::Count(_) => Selection::Count(count),
         }
     }
 }

@@ -58,7 +58,7 @@ fn machinery(bench: &mut Bench) -> Result<()> {
     let job = |name: &str| Job {
         scene: scene.clone(),
         output: folder.path().join(name),
-        existing: Existing::Join,
+        existing: Existing::Resume,
         tiles: None,
         seed: 7,
         tile: Some(8),

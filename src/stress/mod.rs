@@ -20,8 +20,8 @@ use serde_json::{Value, json};
 pub use bench::{Bench, Machine};
 
 use crate::Result;
-use crate::report::Circumstances;
 use crate::report::page::Page;
+use crate::report::{Circumstances, STRESS_CSV_HEADER};
 
 /// One row of the suite.
 #[derive(Clone, Copy)]
@@ -137,7 +137,7 @@ pub fn facts(case: &Case, outcome: &Outcome) -> Value {
 
 /// The report as CSV: one row a check.
 pub fn csv(outcomes: &[(Case, Outcome)]) -> String {
-    let mut text = String::from("group,case,check,expected,got,error,bound,standard_error,verdict\n");
+    let mut text = format!("{STRESS_CSV_HEADER}\n");
     for (case, outcome) in outcomes {
         for c in &outcome.checks {
             text += &format!(
