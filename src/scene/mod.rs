@@ -10,6 +10,7 @@ mod decode;
 mod digest;
 mod environment;
 mod file;
+pub mod keys;
 mod light;
 mod material;
 mod medium;
@@ -20,6 +21,7 @@ mod spectrum;
 mod texture;
 mod transform;
 mod tree;
+mod words;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -28,6 +30,7 @@ use glam::{DAffine3, DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 pub use file::{load, parse};
+pub use spectrum::Quantity;
 
 use crate::spectral::{Channels, Curve};
 
