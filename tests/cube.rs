@@ -32,8 +32,9 @@ fn first_units_come_back_bit_for_bit_with_edge_tiles() {
             let chunk = cube.chunk(tile).expect("chunk").expect("rendered");
             let (rect, grid) = (cube.grid().rect(tile), cube.grid());
             assert_eq!(chunk.values().len(), grid.tile_pixels() * channels);
+            // Column by column.
             for (pixel, values) in chunk.values().chunks_exact(channels).enumerate() {
-                let (x, y) = (rect.x0 + pixel as u32 % grid.tile[0], rect.y0 + pixel as u32 / grid.tile[0]);
+                let (x, y) = (rect.x0 + pixel as u32 / grid.tile[1], rect.y0 + pixel as u32 % grid.tile[1]);
                 if x >= rect.x1 || y >= rect.y1 {
                     assert!(values.iter().all(|v| v.is_nan()), "padding of {tile}");
                     continue;
@@ -222,7 +223,7 @@ fn derived_arrays_follow_the_radiance() {
             }
         }
     }
-    // Overview: [K][1][2] in a file of the tile, means over the pixels of the picture only.
+    // Overview: [2][1][K] in a file of the tile, means over the pixels of the picture only.
     for tile in [0, 1, 3] {
         let [column, row] = cube.grid().position(tile);
         let bytes = fs::read(cube.path().join(format!("overview/c/0/{row}/{column}"))).expect("overview");
@@ -238,7 +239,7 @@ fn derived_arrays_follow_the_radiance() {
                         pixels.push(f64::from(cube.spectrum(x, y).expect("read").expect("rendered")[k]));
                     }
                 }
-                let got = values[k * 2 + block as usize];
+                let got = values[block as usize * 5 + k];
                 if pixels.is_empty() {
                     assert!(got.is_nan());
                 } else {
@@ -283,11 +284,13 @@ fn what_is_no_cube_is_refused_in_words() {
     assert!(refusal("empty").contains("not JSON"));
     fs::write(folder.path().join("empty/zarr.json"), r#"{"zarr_format": 3, "attributes": {}}"#).expect("written");
     assert!(refusal("empty").contains("not a Spectile cube"));
-    fs::write(folder.path().join("empty/zarr.json"), r#"{"attributes": {"spectile_format": 2}}"#).expect("written");
-    assert!(refusal("empty").contains("format 2"));
+    fs::write(folder.path().join("empty/zarr.json"), r#"{"attributes": {"spectile_format": 3}}"#).expect("written");
+    assert!(refusal("empty").contains("format 3; this version reads the formats 1 and 2"));
 
     let cube = patterned(folder.path(), "good.zarr", header([8, 8], [8, 8], 2));
     let metadata = fs::read_to_string(cube.path().join("zarr.json")).expect("read");
+    // A copy without what Spectile keeps for itself is known by its metadata alone.
+    fs::rename(cube.path().join(".spectile"), folder.path().join("kept")).expect("moved");
     for (from, to) in [
         ("\"order\"", "\"odrer\""),
         ("\"epoch\": 64", "\"epoch\": 63"),
@@ -300,12 +303,16 @@ fn what_is_no_cube_is_refused_in_words() {
         assert!(refusal("good.zarr").contains("damaged"), "{from}");
     }
     fs::write(cube.path().join("zarr.json"), metadata).expect("written");
+    let bounds = cube.path().join("wavelength_bounds/c/0/0");
+    let whole = fs::read(&bounds).expect("read");
+    fs::write(&bounds, [0; 31]).expect("written");
+    assert!(refusal("good.zarr").contains("31 bytes long, not 32"));
+    fs::write(&bounds, whole).expect("written");
+    fs::rename(folder.path().join("kept"), cube.path().join(".spectile")).expect("moved");
     fs::write(cube.path().join("radiance/c/0/0/0"), [0; 100]).expect("written");
     let opened = Cube::open(cube.path()).expect("opens");
     assert!(opened.chunk(0).err().expect("refused").to_string().contains("is damaged: 100 bytes long, not 512"));
     assert!(opened.spectrum(7, 7).unwrap_err().to_string().contains("is damaged"));
-    fs::write(cube.path().join("wavelength_bounds/c/0/0"), [0; 31]).expect("written");
-    assert!(refusal("good.zarr").contains("31 bytes long, not 32"));
 }
 
 #[test]
@@ -359,10 +366,16 @@ fn overwrite_replaces_cubes_and_nothing_else() {
     fs::remove_file(&path).expect("removed");
     #[cfg(unix)]
     {
-        std::os::unix::fs::symlink("nowhere", &path).expect("linked");
+        // Through a link the cube behind it is meant, also one that is new.
+        std::os::unix::fs::symlink("elsewhere", &path).expect("linked");
+        let behind = folder.path().join("elsewhere");
+        drop(Written::open(&path, header([8, 8], [8, 8], 2), Existing::Refuse).expect("made behind the link"));
+        assert!(path.is_symlink() && behind.join("zarr.json").is_file());
         assert!(refusal(false).contains("exists already"));
-        assert!(refusal(true).contains("a link to nothing"));
+        drop(Written::open(&path, header([16, 8], [8, 8], 2), Existing::Replace).expect("replaced behind the link"));
+        assert!(path.is_symlink() && Cube::open(&behind).expect("opens").header().size == [16, 8]);
         fs::remove_file(&path).expect("removed");
+        fs::remove_dir_all(&behind).expect("removed");
     }
 
     // A cube, alone and with somebody's notes in it.

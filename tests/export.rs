@@ -137,7 +137,15 @@ fn envi_in_every_order_is_read_by_spectral_and_rasterio() {
         // The extension says the order too.
         let (done, _) = export(
             folder.path(),
-            &["-o", &format!("part.{interleave}"), "--crop", "5,7,66,30", "--bands", "20,3..9", "--integrated"],
+            &[
+                "-o",
+                &format!("part-{interleave}.{interleave}"),
+                "--crop",
+                "5,7,66,30",
+                "--bands",
+                "20,3..9",
+                "--integrated",
+            ],
         );
         let bands = [20].into_iter().chain(3..9).collect();
         let part = Part { cube: &cube, bands, crop: [5, 7, 66, 30], integrated: true };
@@ -205,7 +213,13 @@ fn compressed_zarr_is_read_by_xarray() {
         export(folder.path(), &["-o", "part.zarr", "--bands", "7..9,1", "--crop", "9,0,70,37", "--integrated"]);
     let part = Part { cube: &cube, bands: vec![7, 8, 1], crop: [9, 0, 70, 37], integrated: true };
     part.check(folder.path(), "zarr", &done["files"], more(true, "W m-2 sr-1"));
-    refused(folder.path(), &["-o", "part.zarr"], "exists already");
+    // One's own export is replaced, unless somebody has put something into it; a cube never is.
+    let (done, _) = export(folder.path(), &["-o", "part.zarr", "--bands", "3"]);
+    let part = Part { bands: vec![3], ..whole(&cube) };
+    part.check(folder.path(), "zarr", &done["files"], more(true, "W m-2 sr-1 nm-1"));
+    fs::write(folder.path().join("part.zarr/radiance/notes.txt"), "x").expect("written");
+    refused(folder.path(), &["-o", "part.zarr"], "also holds `notes.txt`");
+    refused(folder.path(), &["-o", "cube.zarr"], "it is a cube");
 }
 
 #[test]
@@ -299,7 +313,12 @@ fn damaged_cubes_are_not_exported() {
     let spoilt = [spoil("radiance/c/0/4/4", 100), spoil("preview/c/4/4/0", 100)];
     refused("is damaged");
     spoilt.iter().for_each(|(path, whole)| fs::write(path, whole).expect("written"));
+    // The group's metadata matter only where Spectile's own record is missing.
     let (path, whole) = spoil("zarr.json", 50);
+    export(folder.path(), &["-o", "a.csv"]);
+    fs::remove_file(folder.path().join("a.csv")).expect("removed");
+    let kept = tempdir().expect("folder");
+    fs::rename(cube.path().join(".spectile"), kept.path().join("kept")).expect("moved");
     refused("zarr.json is not JSON");
     fs::remove_file(&path).expect("removed");
     refused("holds no zarr.json");
@@ -355,34 +374,35 @@ fn what_is_interrupted_leaves_nothing() {
         let response = spectile::spectral::Response::new(vec![450.0, 600.0, 750.0], vec![0.0, 1.0, 0.0]);
         vec![("band".to_owned(), response.expect("a response"))]
     };
-    let exports: [(&str, &[&str], Write); 10] = [
-        ("a.img", &["a.img", "a.hdr"], &to(Format::Envi { interleave: Interleave::Bil })),
-        ("b.img", &["b.img"], &to(Format::Envi { interleave: Interleave::Bsq })),
-        ("c.img", &[], &to(Format::Envi { interleave: Interleave::Bip })),
-        ("a.exr", &["a.exr"], &to(Format::Exr { strict_units: false, split: None })),
-        ("b.exr", &["b.410.000-550.000nm.exr"], &to(Format::Exr { strict_units: false, split: Some(8) })),
-        ("a.zarr", &[], &to(Format::Zarr { shards: true })),
-        ("a.csv", &["a.csv"], &to(Format::Csv)),
-        ("blocks", &[], &|path, progress| export::write_blocks(&view, path, Format::Csv, 16, progress).map(drop)),
-        ("a.png", &["a.png"], &|path, progress| export::write_png(&view, path, &colours, None, progress).map(drop)),
-        ("sensor.zarr", &[], &|path, progress| {
+    let exports: [(&str, Write); 10] = [
+        ("a.img", &to(Format::Envi { interleave: Interleave::Bil })),
+        ("b.img", &to(Format::Envi { interleave: Interleave::Bsq })),
+        ("c.img", &to(Format::Envi { interleave: Interleave::Bip })),
+        ("a.exr", &to(Format::Exr { strict_units: false, split: None })),
+        ("b.exr", &to(Format::Exr { strict_units: false, split: Some(8) })),
+        ("a.zarr", &to(Format::Zarr { shards: true })),
+        ("a.csv", &to(Format::Csv)),
+        ("blocks", &|path, progress| export::write_blocks(&view, path, Format::Csv, 16, progress).map(drop)),
+        ("a.png", &|path, progress| export::write_png(&view, path, &colours, None, progress).map(drop)),
+        ("sensor.zarr", &|path, progress| {
             integrate(&cube, &responses, "s.csv", path, Existing::Replace, progress).map(drop)
         }),
     ];
-    for (name, there, write) in exports {
-        for when in ["at once", "at the end"] {
-            for file in there {
-                fs::write(out.join(file), b"old").expect("written");
+    for (name, write) in exports {
+        // First nothing is there, then what was written before.
+        for (when, is_old) in [("at once", false), ("at the end", false), ("at once", true), ("at the end", true)] {
+            if is_old {
+                write(&out.join(name), &mut |_, _| Ok(())).expect("written");
             }
+            let before = files(&out, |_| true);
+            assert_eq!(before.is_empty(), !is_old, "{name}");
             let stop = &mut |done: u64, all: u64| match when {
                 "at the end" if done < all => Ok(()),
                 _ => Err(spectile::Error::Interrupted { signal: 15 }),
             };
             let result = write(&out.join(name), stop);
             assert!(matches!(result, Err(spectile::Error::Interrupted { signal: 15 })), "{name} {when}: {result:?}");
-            let left = files(&out, |_| true);
-            assert!(left.len() == there.len() && left.values().all(|bytes| bytes == b"old"), "{name} {when}: {left:?}");
-            there.iter().for_each(|file| fs::remove_file(out.join(file)).expect("removed"));
+            assert!(files(&out, |_| true) == before, "{name} {when}");
         }
         // And what is not interrupted is there, and nothing beside it.
         write(&out.join(name), &mut |_, _| Ok(())).expect("written");
@@ -391,17 +411,6 @@ fn what_is_interrupted_leaves_nothing() {
                 .expect("list")
                 .all(|entry| { !entry.expect("an entry").file_name().to_str().expect("UTF-8").starts_with('.') })
         );
-        if name == "sensor.zarr" {
-            // A cube that is to be replaced stays, too.
-            let before = files(&out.join(name), |_| true);
-            let stop = &mut |done: u64, all: u64| match done < all {
-                true => Ok(()),
-                false => Err(spectile::Error::Interrupted { signal: 15 }),
-            };
-            assert!(write(&out.join(name), stop).is_err());
-            assert!(files(&out.join(name), |_| true) == before && before.len() > 20);
-            write(&out.join(name), &mut |_, _| Ok(())).expect("replaced");
-        }
         fs::remove_dir_all(&out).expect("removed");
         fs::create_dir(&out).expect("made");
     }

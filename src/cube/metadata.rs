@@ -1,6 +1,7 @@
 //! What a cube says about itself: the header, its form as Zarr v3 metadata with CF attributes, and the record under
 //! `.spectile/` by which Spectile knows it whatever others make of the attributes.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde_json::{Map, Value, json};
@@ -394,8 +395,19 @@ pub(super) enum Recorded {
     Damaged,
 }
 
+/// Whatever the order of keys and the spaces between them.
 fn record_checksum(content: &Value) -> String {
-    format!("{:032x}", super::checksums::of(content.to_string().as_bytes()))
+    fn sorted(value: &Value) -> Value {
+        match value {
+            Value::Object(fields) => {
+                let in_order: BTreeMap<&String, Value> = fields.iter().map(|(k, v)| (k, sorted(v))).collect();
+                Value::Object(in_order.into_iter().map(|(k, v)| (k.clone(), v)).collect())
+            }
+            Value::Array(items) => Value::Array(items.iter().map(sorted).collect()),
+            other => other.clone(),
+        }
+    }
+    format!("{:032x}", super::checksums::of(sorted(content).to_string().as_bytes()))
 }
 
 fn unknown_format(path: &Path, format: u64) -> Error {

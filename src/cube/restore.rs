@@ -163,7 +163,9 @@ pub(super) fn restore(cube: &Cube) -> Result<()> {
         // Others' arrays must be seen by who reads consolidated metadata.
         Found::Broken => {
             let mut group = own_group.clone();
-            group["consolidated_metadata"]["metadata"] = Value::Object(all_nodes(path));
+            if let Some(consolidated) = group["consolidated_metadata"]["metadata"].as_object_mut() {
+                consolidated.extend(all_nodes(path));
+            }
             (Value::Null, group)
         }
     };

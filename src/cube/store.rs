@@ -213,19 +213,19 @@ impl Cube {
         if let Some(file) = open(&path)? {
             return Ok(Some(file));
         }
-        let record = Journal::of(self, tile).last()?;
+        let journal = Journal::of(self, tile);
+        let is_orphan = || self.origin == Origin::Copy && self.part_path(Part::Radiance, tile).exists();
         let witness = match part {
-            Part::Samples if record.is_some() => "its journal",
-            Part::Samples if self.origin == Origin::Copy && self.part_path(Part::Radiance, tile).exists() => {
-                "`radiance`"
-            }
+            Part::Samples if journal.last()?.is_some() => "its journal",
+            Part::Samples if is_orphan() => "`radiance`",
             Part::Samples => return Ok(None),
             _ if self.open_part(Part::Samples, tile)?.is_none() => return Ok(None),
             _ => "`samples`",
         };
         // The files of a commit take their places one after the other, and whoever did that may have been killed: the rest
-        // still lies aside. Or it has come to its place by now, which no file in place ever leaves.
-        if let Some(record) = record
+        // still lies aside. Or it has come to its place by now, which no file in place ever leaves. So the journal is read
+        // after what says that there is something, and the place after that.
+        if let Some(record) = journal.last()?
             && let Some(file) = open(&self.aside_path(part, tile, record.suffix))?
         {
             return Ok(Some(file));

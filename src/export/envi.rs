@@ -62,6 +62,9 @@ fn data_of(path: &Path) -> PathBuf {
 pub fn check_target(path: &Path) -> Result<()> {
     let data = data_of(path);
     let header = header_of(&data);
+    if data.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("zarr")) {
+        return Err(Error::Usage(format!("{}: GDAL opens no ENVI file of this name; use .img", data.display())));
+    }
     DATA.check_target(&data)?;
     HEADER.check_target(&header)?;
     if header.exists() && !data.exists() {
@@ -78,9 +81,6 @@ const MISSING: f32 = -9999.0;
 pub fn write(view: &View, path: &Path, interleave: Interleave, progress: &mut Progress) -> Result<Vec<PathBuf>> {
     let data = data_of(path);
     let header = header_of(&data);
-    if data.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("zarr")) {
-        return Err(Error::Usage(format!("{}: GDAL opens no ENVI file of this name; use .img", data.display())));
-    }
     check_target(path)?;
     check_space(&data, view.bytes())?;
     let mut file = Replacement::create(&data, DATA)?;

@@ -7,12 +7,13 @@ use std::sync::Arc;
 
 use serde_json::{Map, Value, json};
 use zarrs::array::{Array, ArrayBytes, ArrayMetadata};
-use zarrs::filesystem::FilesystemStore;
+use zarrs::storage::store::MemoryStore;
+use zarrs::storage::{ReadableStorageTraits, WritableStorageTraits};
 
 use super::{PIECE_BYTES, Progress, check_space, long_name, units};
 use crate::cube::{Quantity, Rect, Strides, View, plain_attributes};
 use crate::files::output::{NewFolder, Product, cannot_write, only_holds};
-use crate::{Error, Result};
+use crate::{Error, Result, files};
 
 /// What [`write`] writes.
 pub const STORE: Product = Product {
@@ -98,18 +99,18 @@ pub fn write(view: &View, path: &Path, shards: bool, progress: &mut Progress) ->
     let failed = |what: &dyn std::fmt::Display| Error::storage(path, format!("cannot be written: {what}"));
     let layout = Layout::new(view, shards);
     let arrays = arrays(view, &layout)?;
-    let store = FilesystemStore::new(folder.path()).map_err(|error| failed(&error))?;
-    let store = Arc::new(store);
     for (name, metadata) in &arrays {
         let target = folder.path().join(name);
         fs::create_dir_all(&target)
             .and_then(|()| fs::write(target.join("zarr.json"), format!("{metadata:#}\n")))
             .map_err(|error| cannot_write(path, &error))?;
     }
-    let open = |name: &str| -> Result<Array<FilesystemStore>> {
+    let open = |name: &str| -> Result<Chunks> {
         let metadata = arrays.iter().find(|(of, _)| *of == name).map_or(Value::Null, |(_, metadata)| metadata.clone());
         let metadata: ArrayMetadata = serde_json::from_value(metadata).map_err(|error| failed(&error))?;
-        Array::new_with_metadata(Arc::clone(&store), &format!("/{name}"), metadata).map_err(|error| failed(&error))
+        let memory = Arc::new(MemoryStore::new());
+        let array = Array::new_with_metadata(Arc::clone(&memory), &format!("/{name}"), metadata);
+        Ok(Chunks { array: array.map_err(|error| failed(&error))?, memory, folder: folder.path(), target: path })
     };
     let channels = view.channels();
     let each = |value: &dyn Fn(usize) -> f64| (0..channels.len()).map(value).collect::<Vec<f64>>();
@@ -124,13 +125,13 @@ pub fn write(view: &View, path: &Path, shards: bool, progress: &mut Progress) ->
         ("y", vec![0], centres(top, height)),
     ] {
         let bytes: Vec<u8> = bytemuck::cast_slice(&values).to_vec();
-        open(name)?.store_chunk(&indices, ArrayBytes::new_flen(bytes)).map_err(|error| failed(&error))?;
+        open(name)?.put(&indices, bytes)?;
     }
     let views = views(view)?;
     let (count, pixels) = (views.len() as u64, view.rect().pixels());
     for (i, of) in (0..).zip(&views) {
         let mut tell = |done: u64, _: u64| progress(i * pixels + done, count * pixels);
-        write_values(of, &layout, &open(variable(of))?, &failed, &mut tell)?;
+        write_values(of, &layout, &open(variable(of))?, &mut tell)?;
     }
     let group = group(view, &arrays);
     fs::write(folder.path().join("zarr.json"), format!("{group:#}\n")).map_err(|error| cannot_write(path, &error))?;
@@ -138,13 +139,30 @@ pub fn write(view: &View, path: &Path, shards: bool, progress: &mut Progress) ->
     Ok(vec![path.to_owned()])
 }
 
-fn write_values(
-    view: &View,
-    layout: &Layout,
-    array: &Array<FilesystemStore>,
-    failed: &dyn Fn(&dyn std::fmt::Display) -> Error,
-    progress: &mut Progress,
-) -> Result<()> {
+/// The chunks of an array, encoded in memory one at a time: a store of zarrs's on disk takes no path that is not UTF-8.
+struct Chunks<'a> {
+    array: Array<MemoryStore>,
+    memory: Arc<MemoryStore>,
+    folder: &'a Path,
+    /// What errors name.
+    target: &'a Path,
+}
+
+impl Chunks<'_> {
+    /// Writes the chunk (or shard) of these little-endian values; one that holds nothing but the fill value has no file.
+    fn put(&self, indices: &[u64], values: Vec<u8>) -> Result<()> {
+        let failed = |error: &dyn std::fmt::Display| Error::storage(self.target, format!("cannot be written: {error}"));
+        self.array.store_chunk(indices, ArrayBytes::new_flen(values)).map_err(|error| failed(&error))?;
+        let key = self.array.chunk_key(indices);
+        let Some(encoded) = self.memory.get(&key).map_err(|error| failed(&error))? else { return Ok(()) };
+        self.memory.erase(&key).map_err(|error| failed(&error))?;
+        let file = self.folder.join(key.as_str());
+        let written = fs::create_dir_all(files::parent(&file)).and_then(|()| fs::write(&file, encoded));
+        written.map_err(|error| cannot_write(self.target, &error))
+    }
+}
+
+fn write_values(view: &View, layout: &Layout, chunks: &Chunks, progress: &mut Progress) -> Result<()> {
     let (mut reader, rect, bands) = (view.reader(), view.rect(), view.channels().len());
     let [deep, side, _] = layout.file.map(|n| n as usize);
     let strides = Strides { row: side, pixel: 1, band: side * side };
@@ -158,9 +176,7 @@ fn write_values(
                 values.fill(f32::NAN);
                 let part = first..(first + deep).min(bands);
                 reader.read(Rect { x0, y0, x1, y1 }, part, strides, &mut values)?;
-                array
-                    .store_chunk(&[group, row, column], ArrayBytes::new_flen(bytemuck::cast_slice::<f32, u8>(&values)))
-                    .map_err(|error| failed(&error))?;
+                chunks.put(&[group, row, column], bytemuck::cast_slice(&values).to_vec())?;
             }
         }
         progress(u64::from(y1 - rect.y0) * u64::from(rect.width()), rect.pixels())?;
