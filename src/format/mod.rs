@@ -10,5 +10,6 @@ pub mod plot;
 pub mod png;
 pub mod refractive;
 pub mod response;
+pub mod table;
 pub mod text;
 pub mod volume;

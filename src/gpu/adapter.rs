@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use crate::gpu::allocation::{self, Given};
 use crate::gpu::deadline::Deadline;
+use crate::gpu::instance::instance;
 use crate::{Error, Result};
 
 /// What `spectile devices` says of one adapter.
@@ -59,12 +60,6 @@ pub(crate) enum Trouble {
 /// Storage buffers that the largest pass may bind at once, generate_vertex: what every scene has (3 of the scene, 4 windows
 /// each of nodes and primitives, 8 of the wave), and what materials, lights and media of general scenes add.
 pub const STORAGE_BUFFERS: u32 = 30;
-
-fn instance() -> wgpu::Instance {
-    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
-    descriptor.backends = wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12;
-    wgpu::Instance::new(descriptor)
-}
 
 fn adapters(instance: &wgpu::Instance) -> Vec<wgpu::Adapter> {
     pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()))

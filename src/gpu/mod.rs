@@ -6,6 +6,7 @@ pub mod buffer;
 pub mod deadline;
 #[cfg(test)]
 pub mod fault;
+mod instance;
 pub mod layout;
 pub mod pass;
 pub mod self_test;

@@ -20,6 +20,7 @@ use serde_json::{Value, json};
 pub use bench::{Bench, Machine};
 
 use crate::Result;
+use crate::format::table::Table;
 use crate::report::Circumstances;
 use crate::report::page::Page;
 
@@ -137,24 +138,18 @@ pub fn facts(case: &Case, outcome: &Outcome) -> Value {
 
 /// The report as CSV: one row a check.
 pub fn csv(outcomes: &[(Case, Outcome)]) -> String {
-    let mut text = String::from("group,case,check,expected,got,error,bound,standard_error,verdict\n");
+    let head = ["group", "case", "check", "expected", "got", "error", "bound", "standard_error", "verdict"];
+    let mut table = Table::new(&head);
     for (case, outcome) in outcomes {
         for c in &outcome.checks {
-            text += &format!(
-                "{},{},\"{}\",{:e},{:e},{:e},{:e},{:e},{}\n",
-                case.group,
-                case.name,
-                c.what.replace('"', "\"\""),
-                c.expected,
-                c.got,
-                c.got - c.expected,
-                c.bound,
-                c.standard_error,
-                c.verdict()
-            );
+            let numbers = [c.expected, c.got, c.got - c.expected, c.bound, c.standard_error];
+            let [expected, got, error, bound, standard_error] = numbers.map(|number| format!("{number:e}"));
+            let (group, name) = (case.group.to_owned(), case.name.to_owned());
+            let verdict = c.verdict().to_owned();
+            table.row([group, name, c.what.clone(), expected, got, error, bound, standard_error, verdict]);
         }
     }
-    text
+    table.finish()
 }
 
 /// The report as a page.
