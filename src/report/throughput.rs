@@ -16,8 +16,9 @@ const TILE: u32 = 8;
 /// A full epoch of each tile.
 const SAMPLES: u32 = 64;
 const TILE_PATHS: f64 = (TILE * TILE * SAMPLES) as f64;
-/// How long a turn should take, seconds; it takes longer where a single tile does.
+/// How long a turn should take, seconds; it takes longer where so few tiles do.
 const TURN_S: f64 = 0.5;
+const LEAST_TILES: usize = 4;
 
 /// A device ready to render a scene.
 pub struct Trial {
@@ -143,12 +144,12 @@ pub fn measure(trials: &mut [Trial], rounds: u32) -> Result<Vec<Rates>> {
     Ok(rates)
 }
 
-/// How many tiles a turn has, of those that are `there`, the same for all trials, and how often each trial renders them in one: tiles differ in
-/// what they cost, and evaluators hundredfold in what they can do. `paces` are tiles a second, `full` the tiles that fill a
-/// trial's waves.
+/// How many tiles a turn has, of those that are `there`, the same for all trials, and how often each trial renders them in
+/// one: tiles differ in what they cost, and evaluators hundredfold in what they can do. `paces` are tiles a second, `full` the
+/// tiles that fill a trial's waves.
 fn turns(paces: &[f64], full: &[usize], there: usize) -> (usize, Vec<usize>) {
     let slowest = paces.iter().copied().fold(f64::INFINITY, f64::min);
-    let tiles = ((TURN_S * slowest) as usize).clamp(1, there);
+    let tiles = ((TURN_S * slowest) as usize).clamp(LEAST_TILES.min(there), there);
     let enough = |(&pace, &full): (&f64, &usize)| ((TURN_S * pace).round() as usize).max(full).div_ceil(tiles);
     (tiles, paces.iter().zip(full).map(enough).collect())
 }
@@ -174,8 +175,8 @@ mod tests {
     #[test]
     fn turns_are_alike_and_long_enough() {
         assert_eq!(turns(&[20.0, 2000.0, 37.0], &[1, 4, 8], 4096), (10, vec![1, 100, 2]));
-        // A single tile takes the slowest long; waves that hold many tiles are filled.
-        assert_eq!(turns(&[0.1, 4.0], &[1, 64], 4096), (1, vec![1, 64]));
+        // A few tiles take the slowest long; waves that hold many tiles are filled.
+        assert_eq!(turns(&[0.1, 4.0], &[1, 64], 4096), (4, vec![1, 16]));
         // A small picture is rendered again and again.
         assert_eq!(turns(&[500.0, 1000.0], &[1, 1], 4), (4, vec![63, 125]));
     }
