@@ -14,6 +14,7 @@ use exr::meta::attribute::{
 use exr::meta::header::Header;
 use exr::meta::{BlockDescription, MetaData};
 use exr::prelude::Compression;
+use rayon::prelude::*;
 use smallvec::SmallVec;
 
 use super::{Progress, check_space};
@@ -220,25 +221,18 @@ fn write_tiles(
     let header = &meta.headers[0];
     let side = header.max_block_pixel_size().x() as u32;
     let tile_bytes = (side * side) as usize * sources.len() * 4;
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
     // Compression holds a tile twice.
-    let together = threads.min(TILE_BYTES / tile_bytes).max(1);
+    let together = rayon::current_num_threads().min(TILE_BYTES / tile_bytes).max(1);
     let failed = failed(path);
     let indices: Vec<_> = exr::block::enumerate_ordered_header_block_indices(&meta.headers).collect();
     let mut tiles = Tiles { view, reader: view.reader(), sources, bands: Vec::new(), colours: Vec::new() };
     let mut done = 0;
     for group in indices.chunks(together) {
         let blocks = group.iter().map(|(at, index)| Ok((*at, tiles.block(*index)?))).collect::<Result<Vec<_>>>()?;
-        let compressed: Vec<_> = std::thread::scope(|scope| {
-            let compress = |(at, block): (usize, UncompressedBlock)| {
-                scope.spawn(move || block.compress_to_chunk(&meta.headers).map(|chunk| (at, chunk)))
-            };
-            let running: Vec<_> = blocks.into_iter().map(compress).collect();
-            running.into_iter().map(|thread| thread.join()).collect()
-        });
-        for chunk in compressed {
-            let chunk = chunk.map_err(|_| Error::Internal("a thread that compresses panicked".into()))?;
-            let (at, chunk) = chunk.map_err(failed)?;
+        let compress = |(at, block): (usize, UncompressedBlock)| Ok((at, block.compress_to_chunk(&meta.headers)?));
+        let compressed: Vec<_> =
+            blocks.into_par_iter().with_max_len(1).map(compress).collect::<exr::error::Result<_>>().map_err(failed)?;
+        for (at, chunk) in compressed {
             writer.write_chunk(at, chunk).map_err(failed)?;
         }
         done += group.iter().map(|(_, index)| index.pixel_size.area() as u64).sum::<u64>();

@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use crate::gpu::allocation::{self, Given};
 use crate::gpu::deadline::Deadline;
+use crate::gpu::instance::instance;
 use crate::{Error, Result};
 
 /// What `spectile devices` says of one adapter.
@@ -56,12 +57,6 @@ pub(crate) enum Trouble {
     Hung(Duration),
     Lost(String),
     Other(String),
-}
-
-fn instance() -> wgpu::Instance {
-    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
-    descriptor.backends = wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12;
-    wgpu::Instance::new(descriptor)
 }
 
 fn adapters(instance: &wgpu::Instance) -> Vec<wgpu::Adapter> {

@@ -6,6 +6,7 @@ pub mod buffer;
 pub mod deadline;
 #[cfg(test)]
 pub mod fault;
+mod instance;
 pub mod pass;
 pub mod source;
 pub mod timestamps;

@@ -56,8 +56,6 @@ pub fn text(job: &Job, cube: &Path, tasks: &str) -> Result<String> {
         "\n\
          # Software devices get as many threads as the task has CPUs; GPUs are those that Slurm gives the task.\n\
          export LP_NUM_THREADS=\"${{SLURM_CPUS_ON_NODE:-1}}\"\n\
-         # Vulkan loaders want a folder for it.\n\
-         [ -d \"${{XDG_RUNTIME_DIR:-}}\" ] || export XDG_RUNTIME_DIR=\"${{TMPDIR:-/tmp}}\"\n\
          # On SIGTERM, before the time limit or at preemption, it commits what is merged and requeues its task.\n\
          exec {} array-task {}\n",
         quote(&job.program.display().to_string()),

@@ -70,8 +70,10 @@ impl Response {
         Ok(Response { curve, support: [from, to], integral, centroid })
     }
 
+    /// What decides it; all else that it holds follows from that.
     pub fn curve(&self) -> &Curve {
-        &self.curve
+        let Response { curve, support: _, integral: _, centroid: _ } = self;
+        curve
     }
 
     /// Between these, nm, lies all of it.

@@ -5,11 +5,10 @@
 //! The paper tabulates the coefficients; here they are solved for, one by one or a picture at a time.
 
 use std::collections::HashMap;
-use std::num::NonZeroUsize;
 use std::sync::LazyLock;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::{DMat3, DVec3};
+use rayon::prelude::*;
 
 use super::curve::{Curve, Outside};
 use super::data::{CIE1931, D65, columns};
@@ -97,28 +96,16 @@ pub fn smooth_of(colours: &[[f32; 3]]) -> Vec<Smooth> {
     distinct.dedup_by_key(|rgb| rgb.map(f32::to_bits));
 
     const BLOCK: usize = 256;
-    let blocks: Vec<&[[f32; 3]]> = distinct.chunks(BLOCK).collect();
-    let next = AtomicUsize::new(0);
-    let work = || {
-        let mut done = Vec::new();
-        while let Some(block) = blocks.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let mut before = None;
-            for rgb in *block {
-                let smooth = near(rgb.map(f64::from), before);
-                before = Some(smooth).filter(|_| grey(rgb.map(f64::from)).is_none());
-                done.push((rgb.map(f32::to_bits), smooth));
-            }
-        }
-        done
+    let solve = |block: &[[f32; 3]]| {
+        let mut before = None;
+        let solved = block.iter().map(|rgb| {
+            let smooth = near(rgb.map(f64::from), before);
+            before = Some(smooth).filter(|_| grey(rgb.map(f64::from)).is_none());
+            (rgb.map(f32::to_bits), smooth)
+        });
+        solved.collect::<Vec<_>>()
     };
-    let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get).min(blocks.len());
-    let solved: HashMap<[u32; 3], Smooth> = std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..cores).map(|_| scope.spawn(work)).collect();
-        let join = |worker: std::thread::ScopedJoinHandle<_>| {
-            worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-        };
-        workers.into_iter().flat_map(join).collect()
-    });
+    let solved: HashMap<[u32; 3], Smooth> = distinct.par_chunks(BLOCK).with_max_len(1).flat_map_iter(solve).collect();
     colours.iter().map(|rgb| solved[&rgb.map(f32::to_bits)]).collect()
 }
 

@@ -103,8 +103,8 @@ impl Place {
 
     fn command(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_spectile"));
-        // The Vulkan loader wants one, and would say so on stderr.
-        command.env("XDG_RUNTIME_DIR", self.path());
+        // As under cron: nothing on stderr may be for want of it.
+        command.env_remove("XDG_RUNTIME_DIR");
         command.current_dir(self.path()).args(arguments);
         command
     }

@@ -2,8 +2,9 @@
 //! surface reflects or absorbs, for every Fresnel reflectance at once.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
-use super::microfacet::{LATTICE, Lattice, azimuth_at, cosine_at, in_parallel, lambda, smith_ratio, turn};
+use super::microfacet::{LATTICE, Lattice, azimuth_at, cosine_at, lambda, smith_ratio, turn};
 
 /// Cosines between direction and facet for which there is a weight, spread as cubes: metals change fastest near grazing.
 pub const FACET_COSINES: usize = 256;
@@ -40,14 +41,15 @@ impl FacetCosines {
         cosines.sort_by(f64::total_cmp);
         cosines.dedup();
         let lattice = Lattice::new(LATTICE);
-        let weights = in_parallel(rows * cosines.len(), |node| {
+        let of_node = |node: usize| {
             let (sin, cos) =
                 if rows == 1 { (0.0, 1.0) } else { azimuth_at(node / cosines.len(), alpha, AZIMUTHS).sin_cos() };
             let z = cosines[node % cosines.len()];
             let r = ((1.0 - z) * (1.0 + z)).max(0.0).sqrt();
             weights(alpha, DVec3::new(r * cos, r * sin, z), &lattice)
-        });
-        FacetCosines { alpha, cosines, weights: weights.concat() }
+        };
+        let weights = (0..rows * cosines.len()).into_par_iter().flat_map_iter(of_node).collect();
+        FacetCosines { alpha, cosines, weights }
     }
 
     /// The weights w_j of a direction with z in [0, 1].

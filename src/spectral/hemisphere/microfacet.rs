@@ -7,9 +7,9 @@
 //! Benyoub 2023): E = ∫∫ F G2/G1 du dv, whose integrand is bounded by 1 at every roughness.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
-use std::num::NonZeroUsize;
 
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 
 use super::fresnel;
 
@@ -41,14 +41,15 @@ impl ReflectionAlbedo {
         let rows = if alpha[0] == alpha[1] { 1 } else { AZIMUTHS };
         let mut albedo = ReflectionAlbedo { alpha, loss: Vec::new(), mean_loss: 0.0 };
         let lattice = Lattice::new(LATTICE);
-        albedo.loss = in_parallel(rows, |row| {
+        let of_row = |row: usize| {
             let (sin, cos) = azimuth_at(row, alpha, AZIMUTHS).sin_cos();
             let (towards, effective) = (DVec3::new(cos, sin, 0.0), (alpha[0] * cos).hypot(alpha[1] * sin));
             std::array::from_fn(|i| {
                 let z = cosine_at(i, effective);
                 1.0 - reflection(alpha, (1.0 - z * z).max(0.0).sqrt() * towards + z * DVec3::Z, &lattice)
             })
-        });
+        };
+        albedo.loss = (0..rows).into_par_iter().map(of_row).collect();
         // (1/π) ∫ loss cosθ dω, by the midpoints of z² and azimuth.
         const STEPS: usize = 512;
         let midpoint = |i: usize, n: usize| (i as f64 + 0.5) / n as f64;
@@ -121,11 +122,11 @@ impl DielectricAlbedo {
         let steps = ((last - first) / INDEX_STEP).ceil().max(0.0) as usize;
         let step = (last - first) / steps.max(1) as f64;
         let lattice = Lattice::new(LATTICE);
-        let sides = in_parallel(2 * (steps + 1), |i| {
-            let eta = (first + (i / 2) as f64 * step).exp();
-            SideAlbedo::new(alpha, if i % 2 == 0 { eta } else { eta.recip() }, &lattice)
+        let sides = (0..=steps).into_par_iter().map(|i| {
+            let eta = (first + i as f64 * step).exp();
+            [eta, eta.recip()].map(|eta| SideAlbedo::new(alpha, eta, &lattice))
         });
-        let sides = sides.chunks(2).map(|pair| [pair[0].clone(), pair[1].clone()]).collect();
+        let sides = sides.collect();
         DielectricAlbedo { alpha, first, step, sides }
     }
 
@@ -312,20 +313,6 @@ impl Lattice {
             f(point.weight, h.normalize());
         }
     }
-}
-
-/// `make(0..count)` in order, on every core.
-pub(super) fn in_parallel<T: Send>(count: usize, make: impl Fn(usize) -> T + Sync) -> Vec<T> {
-    let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get).min(count.max(1));
-    let make = &make;
-    let mut parts: Vec<Vec<T>> = std::thread::scope(|scope| {
-        let part = |core: usize| scope.spawn(move || (core..count).step_by(cores).map(make).collect::<Vec<T>>());
-        let workers: Vec<_> = (0..cores).map(part).collect();
-        let join = |w: std::thread::ScopedJoinHandle<_>| w.join().unwrap_or_else(|e| std::panic::resume_unwind(e));
-        workers.into_iter().map(join).collect()
-    });
-    parts.iter_mut().for_each(|part| part.reverse());
-    (0..count).map(|i| parts[i % cores].pop().expect("every index has one core")).collect()
 }
 
 #[cfg(test)]
