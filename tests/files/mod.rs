@@ -1,0 +1,7 @@
+//! Cubes, and files of other programs: read, written and read back.
+
+mod cube;
+mod export;
+mod imports;
+mod python;
+mod sensor;

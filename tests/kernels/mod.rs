@@ -1,0 +1,4 @@
+//! The texts of the kernels, without a device.
+
+mod cornell_kernels;
+mod shaders;
