@@ -22,12 +22,14 @@ pub mod stress;
 
 // The unit tests that need a scene build it as the integration tests do, and compare cubes as they do.
 #[cfg(test)]
-#[path = "../tests/cube_files/mod.rs"]
+#[allow(dead_code, reason = "unit tests use a part of it")]
+#[path = "../tests/support/cube_files.rs"]
 mod cube_files;
 #[cfg(test)]
 extern crate self as spectile;
 #[cfg(test)]
-#[path = "../tests/scene_builder/mod.rs"]
+#[allow(dead_code, reason = "unit tests use a part of it")]
+#[path = "../tests/support/scene_builder/mod.rs"]
 mod scene_builder;
 
 pub use error::{Error, Result};

@@ -5,8 +5,8 @@ use spectile::device::prepared::Prepared;
 use spectile::device::words::Primitive;
 use spectile::scene::Mesh;
 
+use super::{Random, black_mesh, f32s};
 use crate::tracer::{Ray, trace};
-use crate::{Random, black_mesh, f32s};
 
 /// Distance along the ray to a triangle in f64, with barycentric weights allowed to miss by `slack`.
 fn distance_f64(p: &Primitive, ray: &Ray, slack: impl Fn(f64, f64) -> f64) -> Option<f64> {

@@ -6,8 +6,8 @@ use spectile::device::words::{Emitter, Material};
 use spectile::scene::{Attributes, Filter, Projection, Scene, Sides, Temperature};
 use spectile::spectral::{Channels, Curve, Outside, planck as law};
 
+use super::reference::BOUNCES;
 use crate::device::{Settings, assert_as_reference, measure, render};
-use crate::reference::BOUNCES;
 use crate::scene_builder::closed_forms::{self, Case};
 use crate::scene_builder::heat::*;
 use crate::scene_builder::*;

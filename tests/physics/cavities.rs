@@ -4,11 +4,11 @@ use glam::{DVec2, DVec3};
 use spectile::scene::{Filter, Projection, Shape, Sides};
 use spectile::spectral::Channels;
 
+use super::{assert_exact, measure, table};
 use crate::device::{Settings, render};
 use crate::scene_builder::closed_forms::{self, Case};
 use crate::scene_builder::*;
 use crate::statistics::*;
-use crate::{assert_exact, measure, table};
 
 /// Radiance after `vertices` surface vertices in a closed cavity.
 fn cavity(emission: f64, reflectance: f64, vertices: i32) -> f64 {

@@ -5,8 +5,8 @@ use std::f64::consts::PI;
 use glam::DVec3;
 use spectile::scene::{Film, Filter, Scene, Sides};
 
+use super::measure;
 use crate::device::{Settings, render};
-use crate::measure;
 use crate::scene_builder::closed_forms::{self, Case, form_factors, patch, patch_under_squares};
 use crate::scene_builder::*;
 use crate::statistics::*;

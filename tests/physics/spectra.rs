@@ -4,9 +4,9 @@ use glam::DVec3;
 use spectile::scene::{Sampler, Sides};
 use spectile::spectral::{Channels, Curve};
 
+use super::{measure, table};
 use crate::scene_builder::*;
 use crate::statistics::*;
-use crate::{measure, table};
 
 /// Mean radiance of a black body over overlapping bands, width x mean = the published band radiances.
 #[test]

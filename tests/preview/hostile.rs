@@ -7,9 +7,10 @@ use std::path::Path;
 
 use tempfile::tempdir;
 
-use crate::client::{Answer, PATIENCE, Running, ask, cornell, get, raw, serve, until};
-use crate::common::{header, patterned};
+use super::client::{Answer, Running, ask, get, raw, serve};
+use crate::binary::{PATIENCE, cornell, wait_for};
 use crate::cube_files::arrays;
+use crate::cubes::{header, patterned};
 
 /// Answers must not speak of this machine's files, and must carry what keeps browsers strict.
 #[track_caller]
@@ -201,7 +202,7 @@ fn slow_and_greedy_clients_hold_up_nobody() {
     assert!(answered.is_ok() && first == *b"HTTP/1.1 503", "the hundredth connection was served: {answered:?}");
     drop(many);
     let status = format!("GET /api/status HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\n\r\n");
-    until("room", || raw(address, status.as_bytes()).filter(|answer| answer.status == 200));
+    wait_for("room", || raw(address, status.as_bytes()).filter(|answer| answer.status == 200));
 
     // One connection that asks and asks, and then is closed.
     let mut stream = TcpStream::connect(address).expect("connects");
@@ -278,7 +279,7 @@ fn a_render_is_not_disturbed() {
     let (code, events) = running.ends();
     assert_eq!(code, Some(0), "{events:?}");
     assert!(!events.iter().any(|event| event["event"] == "paused"));
-    let alone = crate::client::command(folder.path(), &arguments("alone.zarr")).output().expect("runs");
+    let alone = crate::binary::command(folder.path(), &arguments("alone.zarr")).output().expect("runs");
     assert!(alone.status.success());
     assert!(arrays(&folder.path().join("watched.zarr")) == arrays(&folder.path().join("alone.zarr")));
 }

@@ -8,8 +8,9 @@ use std::process::Stdio;
 use spectile::cube::{Cube, Existing, Writer};
 use tempfile::tempdir;
 
-use crate::client::{Running, command, get};
-use crate::common::{create, header};
+use super::client::{Running, get};
+use crate::binary::command;
+use crate::cubes::{create, header};
 
 const CHANNELS: usize = 2000;
 const TILE: u64 = 64;
@@ -101,7 +102,7 @@ fn a_hundred_gibibytes_open_and_a_spectrum_is_one_read() {
     assert_eq!(answer.floats().len(), 100 * 50 * 3);
     assert!(read <= 3 * 2 * pixels * 12 + slack && mapped <= pages, "{read} {mapped}");
     // More radiance than a look may take is refused with a way out, not begun.
-    let all = crate::client::ask(running.address, "GET", "/api/image?show=channel&k=0&scale=4&x1=2048&y1=2048", &[]);
+    let all = super::client::ask(running.address, "GET", "/api/image?show=channel&k=0&scale=4&x1=2048&y1=2048", &[]);
     assert!(all.status == 400 && all.text().contains("scale"), "{all:?}");
 }
 
@@ -122,7 +123,7 @@ fn what_cannot_be_viewed_is_refused() {
     let taken = std::net::TcpListener::bind("127.0.0.1:0").expect("binds");
     let address = taken.local_addr().expect("an address").to_string();
     refused(&["view", "cube.zarr", "--listen", &address], 2, "another process listens there already");
-    let scene = crate::client::cornell();
+    let scene = crate::binary::cornell();
     let render = |more: &[&str], words: &str| {
         let scene = scene.to_str().expect("UTF-8");
         refused(&[&["render", scene, "-o", "new.zarr"], more].concat(), 2, words);

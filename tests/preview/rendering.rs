@@ -4,11 +4,11 @@ use std::fs;
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
-
 use spectile::cube::Cube;
 use tempfile::tempdir;
 
-use crate::client::{Events, PATIENCE, Running, command, cornell, get, until};
+use super::client::{Events, Running, get};
+use crate::binary::{PATIENCE, command, cornell, wait_for};
 
 fn render<'a>(scene: &'a str, more: &[&'a str]) -> Vec<&'a str> {
     let small = ["render", scene, "-o", "cube.zarr", "--json", "--listen", "127.0.0.1:0", "--tile", "16"];
@@ -19,7 +19,7 @@ fn render<'a>(scene: &'a str, more: &[&'a str]) -> Vec<&'a str> {
 fn at_rest(running: &Running) -> Value {
     running.until(|status| status["stage"] == "paused");
     let mut last = running.status();
-    until("the last units", || {
+    wait_for("the last units", || {
         std::thread::sleep(Duration::from_secs(1));
         let now = running.status();
         let rests = now["paths"] == last["paths"];
@@ -53,7 +53,7 @@ fn the_first_picture_comes_with_the_first_paths_and_controls_are_obeyed() {
         let of_tile = |tile| cube.grid().rect(tile).pixels() * u64::from(cube.samples(tile).expect("samples"));
         (0..cube.grid().count()).map(of_tile).sum()
     };
-    until("all that is merged", || (Some(paths()) == rests["paths"].as_u64()).then_some(()));
+    wait_for("all that is merged", || (Some(paths()) == rests["paths"].as_u64()).then_some(()));
     // A spectrum is the one on disk.
     let csv = get(running.address, "/api/spectrum?x=20&y=30&format=csv").body;
     assert_eq!(csv, command(folder.path(), &["spectrum", "cube.zarr", "20", "30"]).output().expect("runs").stdout);

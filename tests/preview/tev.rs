@@ -10,8 +10,9 @@ use spectile::cube::Cube;
 use spectile::preview::{Feed, Tev, follow};
 use tempfile::tempdir;
 
-use crate::client::{PATIENCE, Running, cornell};
-use crate::common::{Written, create, header, pattern, patterned, unit};
+use super::client::Running;
+use crate::binary::{PATIENCE, cornell};
+use crate::cubes::{Written, create, header, pattern, patterned, unit};
 
 /// A body: little-endian numbers, strings that end with a zero.
 struct Body<'a>(&'a [u8]);

@@ -3,6 +3,7 @@
 use std::io::{BufRead, BufReader};
 
 use super::{Place, Running, arrays, events, png, samples, wait_for};
+use crate::report::excuse;
 
 /// Until every tile of `cube.zarr` has `least` samples; returns them.
 fn until_samples(place: &Place, least: u32) -> u32 {
@@ -88,7 +89,7 @@ fn on_a_terminal_there_is_a_bar() {
     let mut script = std::process::Command::new("script");
     script.current_dir(place.path()).env("XDG_RUNTIME_DIR", place.path()).args(["-qec", &line, "/dev/null"]);
     let Ok(output) = script.output() else {
-        println!("skipped: there is no `script` (util-linux), which makes a terminal");
+        excuse("there is no `script` (util-linux), which makes a terminal");
         return;
     };
     let said = String::from_utf8_lossy(&output.stdout);

@@ -1,6 +1,6 @@
 //! The model of docs/SCALE.md against runs on 1, 2 and 4 nodes of this machine. Prints the table that stands there:
 //!
-//!     cargo test --release --test slurm scale -- --ignored --nocapture
+//!     cargo test --release --test all slurm::scale -- --ignored --nocapture
 
 use std::process::Command;
 use std::time::Instant;
