@@ -62,7 +62,6 @@ nk = "gold.csv"
 roughness = [0.1, 0.3]
 energy_compensation = true
 two_sided = true
-temperature = 350.0
 "#;
 const A_DIELECTRIC: &str = r#"
 [materials.paint.dielectric]
@@ -75,8 +74,6 @@ const A_PLASTIC: &str = r#"
 reflectance = { rgb = [0.1, 0.2, 0.6] }
 eta = 1.5
 roughness = 0.05
-two_sided = true
-temperature = 295.0
 "#;
 const A_BLEND: &str = r#"
 [materials.paint.blend]
@@ -153,6 +150,7 @@ pub static CONDUCTOR: Section = Section {
 [materials.paint.conductor]
 eta = 0.2
 k = { samples = [[380, 1.9], [780, 4.7]] }
+temperature = 350.0
 "#,
     ],
     notes: "",
@@ -203,7 +201,16 @@ pub static PLASTIC: Section = Section {
     ],
     later: &[],
     at: "materials.paint.plastic",
-    examples: &[A_PLASTIC],
+    examples: &[
+        A_PLASTIC,
+        r#"
+[materials.paint.plastic]              # a warm varnish, its back black
+reflectance = 0.3
+eta = { file = "n-bk7.yml", column = "n" }
+two_sided = false
+temperature = 310.0
+"#,
+    ],
     notes: "",
 };
 

@@ -297,6 +297,13 @@ pub fn find(path: &str) -> Result<Found, String> {
     if let Some(section) = SECTIONS.iter().find(|section| section.path == path) {
         return Ok(Found::Section(section));
     }
+    let of_section = |section: &&'static Section| {
+        let key = section.key(path.strip_prefix(section.path)?.strip_prefix('.')?)?;
+        Some(Found::Key(section, key))
+    };
+    if let Some(found) = SECTIONS.iter().filter(|section| section.path != SCENE.path).find_map(of_section) {
+        return Ok(found);
+    }
     let words: Vec<&str> = path.split('.').collect();
     walk(&SCENE, &words).ok_or_else(|| unknown(path))
 }
@@ -409,7 +416,6 @@ mod tests {
             ("materials.plastik", "materials.NAME.plastic"),
             ("temperature", "media.NAME.temperature"),
             ("film.widht", "film.width"),
-            ("", "film"),
         ] {
             let message = find(path).expect_err(path);
             assert!(message.contains(nearest) && !message.contains('\n'), "{message}");
