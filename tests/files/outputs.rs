@@ -2,7 +2,6 @@
 //! standard output; and nothing of anybody else's is ever touched. Through the real binary.
 #![cfg(unix)]
 
-#[path = "cube_files/mod.rs"]
 use std::fs;
 use std::os::unix::fs::{FileTypeExt, PermissionsExt, symlink};
 use std::path::{Path, PathBuf};

@@ -1,7 +1,6 @@
 //! Cubes in other people's hands: notes among the attributes, arrays and metadata that others write, files that get lost,
 //! copies, and cubes of version 1 of the layout.
 
-#[path = "cube_files/mod.rs"]
 use std::fs;
 use std::path::{Path, PathBuf};
 

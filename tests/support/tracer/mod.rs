@@ -3,7 +3,6 @@
 use spectile::device::prepared::Prepared;
 use spectile::device::text::Module;
 use spectile::device::words::NONE;
-use spectile::gpu::adapter::Gpu;
 use spectile::stress::probe::Kernel;
 
 const TRACE: Module = Module { name: "tests/support/tracer/trace.wgsl", text: include_str!("trace.wgsl") };
