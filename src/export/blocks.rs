@@ -50,7 +50,7 @@ pub fn write(view: &View, path: &Path, format: Format, side: u32, progress: &mut
             let (x, y) = (left + x0, top + y0);
             let name = format!("x{x:06}_y{y:06}.{}", format.extension());
             let mut tell = |of_block: u64, _: u64| progress(done + of_block, rect.pixels());
-            let files = write_file(&block, &folder.path().join(name), format, &mut tell)?;
+            let files = write_file(&block, &folder.aside().join(name), format, &mut tell)?;
             done += block.rect().pixels();
             let names: Vec<_> =
                 files.iter().map(|file| file.file_name().unwrap_or_default().to_string_lossy()).collect();
@@ -74,7 +74,7 @@ pub fn write(view: &View, path: &Path, format: Format, side: u32, progress: &mut
         "bands": bands.collect::<Vec<_>>(),
         "blocks": blocks,
     });
-    write_atomically(&folder.path().join(INDEX), format!("{index:#}\n").as_bytes())?;
+    write_atomically(&folder.aside().join(INDEX), format!("{index:#}\n").as_bytes())?;
     folder.finish()?;
     Ok(vec![path.to_owned()])
 }

@@ -100,7 +100,7 @@ pub fn write(view: &View, path: &Path, shards: bool, progress: &mut Progress) ->
     let layout = Layout::new(view, shards);
     let arrays = arrays(view, &layout)?;
     for (name, metadata) in &arrays {
-        let target = folder.path().join(name);
+        let target = folder.aside().join(name);
         fs::create_dir_all(&target)
             .and_then(|()| fs::write(target.join("zarr.json"), format!("{metadata:#}\n")))
             .map_err(|error| cannot_write(path, &error))?;
@@ -110,7 +110,7 @@ pub fn write(view: &View, path: &Path, shards: bool, progress: &mut Progress) ->
         let metadata: ArrayMetadata = serde_json::from_value(metadata).map_err(|error| failed(&error))?;
         let memory = Arc::new(MemoryStore::new());
         let array = Array::new_with_metadata(Arc::clone(&memory), &format!("/{name}"), metadata);
-        Ok(Chunks { array: array.map_err(|error| failed(&error))?, memory, folder: folder.path(), target: path })
+        Ok(Chunks { array: array.map_err(|error| failed(&error))?, memory, folder: folder.aside(), target: path })
     };
     let channels = view.channels();
     let each = |value: &dyn Fn(usize) -> f64| (0..channels.len()).map(value).collect::<Vec<f64>>();
@@ -134,7 +134,7 @@ pub fn write(view: &View, path: &Path, shards: bool, progress: &mut Progress) ->
         write_values(of, &layout, &open(variable(of))?, &mut tell)?;
     }
     let group = group(view, &arrays);
-    fs::write(folder.path().join("zarr.json"), format!("{group:#}\n")).map_err(|error| cannot_write(path, &error))?;
+    fs::write(folder.aside().join("zarr.json"), format!("{group:#}\n")).map_err(|error| cannot_write(path, &error))?;
     folder.finish()?;
     Ok(vec![path.to_owned()])
 }

@@ -355,7 +355,7 @@ impl NewFolder {
     }
 
     /// Where it is filled.
-    pub fn path(&self) -> &Path {
+    pub fn aside(&self) -> &Path {
         &self.aside
     }
 

@@ -270,7 +270,7 @@ fn files_that_are_gone_are_not_passed_over() {
                 fs::read_dir(to.path()).expect("list").flat_map(|e| e.expect("an entry").file_name().into_string());
             assert!(left.into_iter().all(|name| !name.starts_with('.')), "nothing half-made stays");
             let cube = Cube::open(&path).expect("opens");
-            assert_eq!(cube.lost(&cube.all_samples().expect("samples")), [0..1]);
+            assert_eq!(cube.lost(&cube.all_samples().expect("samples")), std::slice::from_ref(&(0..1)));
             assert!(cube.spectrum(17, 9).expect("another tile").is_some());
         });
         without("preview/c/0/0/0", &|| {

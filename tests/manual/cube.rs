@@ -261,7 +261,8 @@ fn matches(pattern: &str, name: &str, arrays: &BTreeSet<String>) -> bool {
     let digits = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
     let random = |text: &str| text.bytes().all(|byte| byte.is_ascii_alphanumeric());
     let is_array = |text: &str| arrays.contains(text);
-    let words: [(&str, &dyn Fn(&str) -> bool); 5] =
+    type Known<'a> = (&'a str, &'a dyn Fn(&str) -> bool);
+    let words: [Known; 5] =
         [("ROW", &digits), ("COLUMN", &digits), ("TILE", &digits), ("SUFFIX", &random), ("ARRAY", &is_array)];
     for (word, is_one) in words {
         if let Some(rest) = pattern.strip_prefix(word) {
@@ -351,7 +352,7 @@ fn journals_are_laid_out_as_the_page_says(cubes: &Cubes) {
         let (mut variance, mut square) = ([0.0; K], [0.0; K]);
         for tile in 0..4u32 {
             let bytes = std::fs::read(path.join(".spectile/journal").join(tile.to_string())).expect("a journal");
-            assert!(bytes.len() % record_bytes == 0 && bytes.len() <= 16 * record_bytes, "{}", bytes.len());
+            assert!(bytes.len().is_multiple_of(record_bytes) && bytes.len() <= 16 * record_bytes, "{}", bytes.len());
             let record = &bytes[bytes.len() - record_bytes..];
             let field = |words: &str| {
                 let of = fields.iter().find(|(_, _, content)| content.starts_with(words));

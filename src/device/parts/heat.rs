@@ -32,7 +32,7 @@ const COSINES: usize = HOT_COSINES as usize;
 
 pub const BY_ANGLE: Part = Part {
     name: "heat that depends on the angle",
-    used: |scene| scene.emits_by_angle,
+    used: |scene| scene.emits_by_angle && scene.features.emitters,
     effect: |_| "256 spectra for each hot material that is not diffuse".into(),
     is_planned: true,
     modules: &[(Place::Stage, module!("parts/heat/angle.wgsl"))],
@@ -46,7 +46,8 @@ pub const BY_ANGLE: Part = Part {
 
 pub const BY_PLACE: Part = Part {
     name: "heat that differs by place",
-    used: |scene| scene.radiators.is_some(),
+    // Where all is at 0 K nothing emits.
+    used: |scene| scene.radiators.is_some() && scene.features.emitters,
     effect: |scene| {
         let most = scene.radiators.as_ref().map_or(0, |radiators| radiators.features.records);
         format!("up to {most} records where a path meets it")
@@ -86,7 +87,7 @@ pub const BY_PLACE: Part = Part {
 /// What both have in common.
 pub const EITHER: Part = Part {
     name: "hot surfaces",
-    used: |scene| scene.emits_by_angle || scene.radiators.is_some(),
+    used: |scene| (BY_ANGLE.used)(scene) || (BY_PLACE.used)(scene),
     modules: &[(Place::Stage, module!("parts/heat/heat.wgsl"))],
     defines: |scene, _, defines| {
         let features = scene.radiators.as_ref().map(|radiators| radiators.features);

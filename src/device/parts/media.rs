@@ -56,7 +56,6 @@ pub const MEDIA: Part = Part {
     },
     state_words: 2,
     example: Some(|exhibit| exhibit.add_gas()),
-    ..Part::NOTHING
 };
 
 const VOLUME: Module = module!("parts/media/volume.wgsl");
