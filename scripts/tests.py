@@ -236,6 +236,7 @@ def main():
     parser.add_argument("--full", action="store_true")
     parser.add_argument("--jobs", type=int, default=(os.cpu_count() or 1) + 1)
     parser.add_argument("--verbose", action="store_true", help="also how much of its allowed standard error a test uses")
+    parser.add_argument("--failed", action="append", default=[], help="another check that failed, to be counted")
     parser.add_argument("words", nargs="*")
     arguments = parser.parse_args()
     global verbose
@@ -256,6 +257,9 @@ def main():
         for test in job.tests:
             if test.result == "failed":
                 say(f"failed: {test.name}")
+    for name in arguments.failed:
+        say(f"failed: {name}")
+    results["failed"] += len(arguments.failed)
     say(f"{built - began:.0f} s to build the tests, {ended - built:.0f} s to run them")
     skipped = results["skipped"] + len(left_out)
     say(f"{results['ok']} passed, {results['failed']} failed" + (f", {skipped} skipped" if skipped else ""))
