@@ -225,13 +225,15 @@ pub(super) fn parse_time(text: &str) -> std::result::Result<Duration, String> {
     let is_number = |c: char| c.is_ascii_digit() || c == '.';
     let mut rest = text.trim();
     let mut seconds = 0.0;
+    // A number alone is seconds, also one with an exponent.
+    if let Ok(alone) = rest.parse::<f64>() {
+        (seconds, rest) = (alone, "");
+    }
     while !rest.is_empty() {
         let (number, unit) = rest.split_at(rest.find(|c| !is_number(c)).unwrap_or(rest.len()));
         let unit = unit.trim_start();
         let (unit, after) = unit.split_at(unit.find(|c: char| !c.is_ascii_alphabetic()).unwrap_or(unit.len()));
         let factor = match unit {
-            // Only by itself: after a unit a bare number could be anything.
-            "" if seconds == 0.0 && after.is_empty() => 1.0,
             "s" | "sec" | "second" | "seconds" => 1.0,
             "m" | "min" | "minute" | "minutes" => 60.0,
             "h" | "hr" | "hour" | "hours" => 3600.0,

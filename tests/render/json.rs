@@ -79,7 +79,7 @@ fn the_document_names_every_event_and_field() {
         render(&[&["c.zarr"], &wide[..]].concat()),
         render(&["a.zarr"]),
         render(&["d.zarr", "--set", "film.width=0"]),
-        vec!["plan", "scene.toml", "--json"],
+        vec!["plan", "scene.toml", "--parts", "--json"],
         vec!["devices", "--json"],
         vec!["info", "a.zarr", "--json"],
         vec!["info", "a.zarr", "--json", "--watch"],
