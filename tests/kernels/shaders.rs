@@ -1,6 +1,8 @@
 //! Every shader that a scene can compose, without a device: parsed and validated by naga, made into a pipeline on wgpu's
 //! `noop` backend, small, and free of what the scene does not need.
 
+use std::sync::LazyLock;
+
 use glam::{DMat3, DVec2, DVec3};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use spectile::device::evaluator::EvaluateShape;
@@ -75,7 +77,12 @@ fn combinations() -> Vec<Features> {
 }
 
 /// Every distinct text, with a description of what it was composed for.
-fn all_sources() -> Vec<(String, Source)> {
+fn all_sources() -> &'static [(String, Source)] {
+    static ALL: LazyLock<Vec<(String, Source)>> = LazyLock::new(compose_plain);
+    &ALL
+}
+
+fn compose_plain() -> Vec<(String, Source)> {
     let mut prepared = Prepared::new(&plain_scene(), 0).unwrap();
     let shapes = [(1, true), (3, false), (25, true), (500, true), (1250, false)]
         .map(|(quads, software)| EvaluateShape::new(quads, software));
@@ -143,7 +150,7 @@ fn pipelines_on_the_noop_backend() {
         ..Default::default()
     }))
     .expect("a noop device");
-    for (what, source) in all_sources().iter().step_by(3).chain(&general_sources()) {
+    for (what, source) in all_sources().iter().step_by(3).chain(general_sources()) {
         let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some(source.label),
@@ -166,7 +173,7 @@ fn pipelines_on_the_noop_backend() {
 #[test]
 fn storage_buffers_are_counted() {
     let count = |(what, source): &(String, Source)| (storage_buffers(source).expect("a valid text"), what.clone());
-    let all: Vec<_> = general_sources().iter().chain(&all_sources()).map(count).collect();
+    let all: Vec<_> = general_sources().iter().chain(all_sources()).map(count).collect();
     let full = with_everything(&Builder(plain_scene()).roulette(1).build());
     let full = Prepared::new(&full, 0).expect("a scene that fits");
     let fullest = passes(&full, &windows(4, 4), EvaluateShape::of(&full, true));
@@ -387,7 +394,12 @@ fn disk() -> Shape {
     Shape::Disk { center: DVec3::ZERO, normal: DVec3::Z, radius: 0.5 }
 }
 
-fn general_sources() -> Vec<(String, Source)> {
+fn general_sources() -> &'static [(String, Source)] {
+    static ALL: LazyLock<Vec<(String, Source)>> = LazyLock::new(compose_general);
+    &ALL
+}
+
+fn compose_general() -> Vec<(String, Source)> {
     let mut found = std::collections::HashMap::new();
     for (i, (what, scene)) in general_scenes().into_iter().enumerate() {
         let prepared = Prepared::for_evaluator(&scene, 0, EVALUATORS[i % EVALUATORS.len()]).unwrap();
