@@ -223,7 +223,7 @@ fn textured_heat_agrees_with_the_reference() {
         .textured(plate(-0.9, -1.0), soil)
         .heated_by(warm)
         .attributes(quad_uv())
-        .conductor(plate(0.1, -1.0), slope(2.0, 9.0), slope(5.0, 20.0), [0.4, 0.1])
+        .conductor(plate(0.1, -1.0), slope(2.0, 9.0), slope(5.0, 20.0), [0.5, 0.1])
         .heated_by(hot)
         .attributes(quad_uv())
         .coated(plate(-0.9, -0.1), soil, 1.5, 0.0)

@@ -80,7 +80,7 @@ fn isothermal_cavities_of_every_material_are_black() {
         (
             "brushed metal",
             |b, _| {
-                b.conductor(disk(DVec3::ZERO, DVec3::new(0.3, 0.2, 1.0), 0.8), 5.0, 12.0, [0.5, 0.2]).at_kelvin(300.0)
+                b.conductor(disk(DVec3::ZERO, DVec3::new(0.3, 0.2, 1.0), 0.8), 5.0, 12.0, [0.5, 0.1]).at_kelvin(300.0)
             },
             400,
         ),
