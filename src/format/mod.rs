@@ -2,13 +2,20 @@
 
 pub mod envi;
 pub mod image;
+pub mod instrument;
 pub mod library;
 pub mod maps;
 pub mod modtran;
+pub mod noise;
 pub mod obj;
 pub mod plot;
 pub mod png;
+pub mod polygon;
+pub mod primaries;
 pub mod refractive;
 pub mod response;
+pub mod table;
 pub mod text;
+pub mod unit;
 pub mod volume;
+pub mod zarr;

@@ -10,8 +10,10 @@ use super::texture::is_texture;
 use super::tree::{Origin, Value};
 use super::{Spectrum, SpectrumId};
 use crate::error::Problem;
-use crate::format::refractive::{self, Index};
-use crate::format::text::{self, SpectrumTable, Unit};
+use crate::format::noise::{self, Range};
+use crate::format::refractive;
+use crate::format::text::{self, Column, SpectrumTable};
+use crate::format::unit::{Density, Kind, Measure, Unit};
 use crate::spectral::{Channels, Curve, Outside, upsample};
 
 /// Wavelengths, in nm, far beyond any channel, between which a curve's peak is looked for.
@@ -51,6 +53,11 @@ impl Quantity {
         matches!(self, Quantity::Radiance | Quantity::Intensity | Quantity::Irradiance)
     }
 
+    /// Whether it is n or k.
+    fn is_optical_constant(self) -> bool {
+        matches!(self, Quantity::Index | Quantity::CoatIndex | Quantity::Extinction)
+    }
+
     fn default_outside(self) -> Outside {
         if self.is_light() || self == Quantity::Absorption { Outside::Zero } else { Outside::Hold }
     }
@@ -76,6 +83,37 @@ impl Quantity {
             Quantity::CoatIndex => (1.0..=DENSEST).contains(&value),
             Quantity::Extinction => (0.0..=DENSEST).contains(&value),
             Quantity::Absorption => (0.0..=MOST_ABSORBING).contains(&value),
+        }
+    }
+
+    /// What measured values of it may be but for noise; `None` where there is no bound that noise could cross.
+    fn noise(self) -> Option<Range> {
+        match self {
+            Quantity::Reflectance => Some(Range::Share),
+            Quantity::Index | Quantity::CoatIndex => None,
+            _ => Some(Range::NotNegative),
+        }
+    }
+
+    /// What units of it are.
+    fn kind(self) -> Kind {
+        match self {
+            Quantity::Radiance => Kind::Radiance,
+            Quantity::Intensity => Kind::Intensity,
+            Quantity::Irradiance => Kind::Irradiance,
+            Quantity::Absorption => Kind::Absorption,
+            _ => Kind::Number,
+        }
+    }
+
+    /// The unit that Spectile takes it in.
+    fn unit(self) -> &'static str {
+        match self {
+            Quantity::Radiance => "W m-2 sr-1 nm-1",
+            Quantity::Intensity => "W sr-1 nm-1",
+            Quantity::Irradiance => "W m-2 nm-1",
+            Quantity::Absorption => "m-1",
+            _ => "1",
         }
     }
 
@@ -110,10 +148,20 @@ enum Data {
     Table {
         nm: Vec<f64>,
         value: Vec<f64>,
-        /// The file, and the line of each value in it.
-        lines: Option<(PathBuf, Vec<usize>)>,
+        /// The file that it was read from, if any.
+        file: Option<TableFile>,
     },
     Rgb([f64; 3]),
+}
+
+/// What a file says beside the numbers of a table.
+#[derive(Debug, Clone)]
+struct TableFile {
+    path: PathBuf,
+    /// The line of each value; empty where the file has no lines.
+    lines: Vec<usize>,
+    measure: Option<(Measure, String)>,
+    notes: Vec<String>,
 }
 
 /// A checked spectrum; [`Spectra::take`] makes it part of the scene.
@@ -147,6 +195,7 @@ impl<'a> Spectra<'a> {
     /// Decodes `[spectra]`. `channels` decide what a table leaves uncovered.
     pub fn new(cx: &'a Context<'a>, item: Option<Item<'a>>, channels: Option<Channels>) -> Self {
         let items = item.and_then(|item| item.named_items()).unwrap_or_default();
+        let needed = channels.as_ref().and_then(hull);
         let define = |(name, item): (&'a str, Item<'a>)| match item.node.value {
             Value::String(_) => {
                 item.error_help(
@@ -155,7 +204,7 @@ impl<'a> Spectra<'a> {
                 );
                 (name, None)
             }
-            _ => (name, source(&item)),
+            _ => (name, source(&item, needed)),
         };
         let named = items.into_iter().map(define).collect();
         Spectra { cx, named, by_name: HashMap::new(), checked: Vec::new(), scene: Vec::new(), channels }
@@ -164,7 +213,7 @@ impl<'a> Spectra<'a> {
     /// The spectrum that `item` names or spells, checked for what it is to describe.
     pub fn resolve(&mut self, item: &Item<'a>, quantity: Quantity) -> Option<Handle> {
         let Value::String(name) = &item.node.value else {
-            let source = source(item)?;
+            let source = source(item, self.channel_hull())?;
             return self.check(&source, &item.path, item, quantity);
         };
         let Some((_, definition)) = self.named.iter().find(|(known, _)| known == name) else {
@@ -192,18 +241,17 @@ impl<'a> Spectra<'a> {
     /// The complex index of refraction, n and k, in the file that `item` names.
     pub fn complex_index(&mut self, item: &Item<'a>) -> Option<(Handle, Handle)> {
         let path = item.cx.path(item.text()?);
-        let index = refractive::read(&path).map_err(|problem| report_in_file(item, *problem)).ok()?;
-        let missing = |name: &str| {
-            let help = "give both, or write `eta` and `k` instead of `nk`";
-            item.error_help(format!("{} does not give {name}", path.display()), help);
+        let index =
+            refractive::read(&path, self.channel_hull()).map_err(|problem| report_in_file(item, *problem)).ok()?;
+        let given = |name: &str, part: Option<Result<SpectrumTable, Box<Problem>>>| match part {
+            Some(table) => table.map_err(|problem| report_in_file(item, *problem)).ok(),
+            None => {
+                let help = "give both, or write `eta` and `k` instead of `nk`";
+                item.error_help(format!("{} does not give {name}", path.display()), help);
+                None
+            }
         };
-        let Index { n, k } = index;
-        if n.is_none() {
-            missing("n");
-        }
-        if k.is_none() {
-            missing("k");
-        }
+        let (n, k) = (given("n", index.n), given("k", index.k));
         let mut part = |name: &str, table: SpectrumTable, quantity: Quantity| {
             let data = table_data(table, path.clone());
             let source = Source { data, scale: 1.0, outside: None, path: item.path.clone(), at: item.at };
@@ -339,18 +387,43 @@ impl<'a> Spectra<'a> {
                 }
                 curve
             }
-            Data::Table { nm, value, lines } => {
+            Data::Table { nm, value, file } => {
+                let (mut nm, mut value, mut skipped) = (&nm[..], value.clone(), 0);
+                if let Some(file) = file {
+                    warnings.extend(file.notes.iter().map(|note| format!("{} {note}", file.path.display())));
+                    if !self.convert(file, nm, &mut value, quantity, user) {
+                        return None;
+                    }
+                    let seen = self.seen(nm);
+                    let far = |v: &[f64]| v.iter().any(|v| !quantity.allows(*v));
+                    // What lies far from all channels is nobody's concern.
+                    if quantity.is_optical_constant() && (far(&value[..seen.start]) || far(&value[seen.end..])) {
+                        warnings.push(format!(
+                            "{}: values outside of {} to {} nm, beyond all channels, are left out: some are impossible",
+                            file.path.display(),
+                            nm[seen.start],
+                            nm[seen.end - 1]
+                        ));
+                        skipped = seen.start;
+                        (nm, value) = (&nm[seen.clone()], value[seen].to_vec());
+                    }
+                    if let Some(range) = quantity.noise()
+                        && let Ok(Some(clipped)) = noise::clip(&mut value, range, |v| v)
+                    {
+                        warnings.push(format!("{} holds {}", file.path.display(), clipped.words(range)));
+                    }
+                }
                 if let Some(i) = value.iter().position(|v| !quantity.allows(scaled(*v).0)) {
                     let text = format!("{} at {} nm", scaled(value[i]).1, nm[i]);
-                    match lines {
-                        None => refuse(text),
-                        Some((file, lines)) => self.cx.push(Problem {
-                            file: file.clone(),
-                            line: Some(lines[i]),
+                    match file.as_ref().map(|file| (file, file.lines.get(skipped + i))) {
+                        Some((file, Some(line))) => self.cx.push(Problem {
+                            file: file.path.clone(),
+                            line: Some(*line),
                             key: Some(user.path.clone()),
                             message: format!("{}, but is {text}", quantity.range()),
                             ..Problem::default()
                         }),
+                        _ => refuse(text),
                     }
                     return None;
                 }
@@ -367,7 +440,7 @@ impl<'a> Spectra<'a> {
                     }));
                 }
                 let value = value.iter().map(|v| v * source.scale).collect();
-                Curve::Linear { nm: nm.clone(), value, outside }
+                Curve::Linear { nm: nm.to_vec(), value, outside }
             }
             Data::Rgb(rgb) => {
                 let colour = rgb.map(|v| v * source.scale);
@@ -385,6 +458,31 @@ impl<'a> Spectra<'a> {
         };
         self.checked.push(Checked { name: name.to_owned(), curve, warnings, taken: None });
         Some(self.checked.len() - 1)
+    }
+
+    /// Brings values into the unit of `quantity`, by what their file says of theirs.
+    fn convert(&self, file: &TableFile, nm: &[f64], value: &mut [f64], quantity: Quantity, user: &Item<'a>) -> bool {
+        let Some((measure, text)) = &file.measure else { return true };
+        match measure.to(quantity.kind()) {
+            Some(Density::Plain(1.0)) => true,
+            Some(density) => {
+                value.iter_mut().zip(nm).for_each(|(value, nm)| *value = density.apply(*value, *nm));
+                true
+            }
+            // A share of anything is what reflectances, tabulated beside other things, are without a unit.
+            None if measure.is_number() => true,
+            None => {
+                user.error_help(
+                    format!(
+                        "{} gives its values in the unit of `{text}`, which is not that of {}",
+                        file.path.display(),
+                        quantity.noun()
+                    ),
+                    format!("convert them to {}, or correct the header", quantity.unit()),
+                );
+                false
+            }
+        }
     }
 
     /// An upsampled colour means something in the visible only: beyond, its ends are held with a warning, or as the
@@ -405,6 +503,18 @@ impl<'a> Spectra<'a> {
         }
     }
 
+    fn channel_hull(&self) -> Option<[f64; 2]> {
+        self.channels.as_ref().and_then(hull)
+    }
+
+    /// The nodes of a table that the channels see: those between their ends, and one beyond either.
+    fn seen(&self, nm: &[f64]) -> std::ops::Range<usize> {
+        let Some([first, last]) = self.channel_hull() else { return 0..nm.len() };
+        let from = nm.partition_point(|x| *x <= first).saturating_sub(1);
+        let to = (nm.partition_point(|x| *x < last) + 1).min(nm.len());
+        from.min(nm.len() - 1)..to
+    }
+
     /// The parts of the channels below `first` and above `last` nm, in words.
     pub fn uncovered(&self, first: f64, last: f64) -> Option<String> {
         let bounds = &self.channels.as_ref()?.bounds;
@@ -418,8 +528,13 @@ impl<'a> Spectra<'a> {
     }
 }
 
-/// A spectrum written as a number or a table.
-fn source<'a>(item: &Item<'a>) -> Option<Source<'a>> {
+/// From the shortest to the longest wavelength of all channels, nm.
+fn hull(channels: &Channels) -> Option<[f64; 2]> {
+    channels.bounds.iter().copied().reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
+}
+
+/// A spectrum written as a number or a table. Of an index, what the wavelengths `needed` see has to be sound.
+fn source<'a>(item: &Item<'a>, needed: Option<[f64; 2]>) -> Option<Source<'a>> {
     let Value::Table(_) = &item.node.value else {
         if !matches!(item.node.value, Value::Integer(_) | Value::Float(_)) {
             item.error_help(
@@ -450,7 +565,7 @@ fn source<'a>(item: &Item<'a>) -> Option<Source<'a>> {
     };
     let kind = kind?;
     let data = match kind.path.rsplit('.').next() {
-        Some("file") => file(&kind, fields.get("column"), fields.get("unit")),
+        Some("file") => file(&kind, fields.get("column"), fields.get("unit"), needed),
         Some("constant") => kind.number().map(Data::Constant),
         Some("blackbody") => kind.positive().map(Data::Blackbody),
         Some("samples") => samples(&kind),
@@ -469,15 +584,27 @@ fn source<'a>(item: &Item<'a>) -> Option<Source<'a>> {
     Some(Source { data, scale: scale?, outside, path: kind.path, at: kind.at })
 }
 
-fn file(item: &Item, column: Option<Item>, unit: Option<Item>) -> Option<Data> {
+fn file(item: &Item, column: Option<Item>, unit: Option<Item>, needed: Option<[f64; 2]>) -> Option<Data> {
     let path = item.cx.path(item.text()?);
     let column = match &column {
-        Some(column) => Some(column.text()?),
-        None => None,
+        None => Column::Only,
+        Some(column) if matches!(column.node.value, Value::Integer(_)) => {
+            Column::Number(column.whole(1..=1_000_000)? as usize)
+        }
+        Some(column) => Column::Named(column.text()?),
     };
-    const UNITS: [(&str, Unit); 3] = [("nm", Unit::Nanometre), ("um", Unit::Micrometre), ("cm-1", Unit::Wavenumber)];
     let unit_of_x = match &unit {
-        Some(unit) => Some(unit.choice(&UNITS)?),
+        Some(item) => {
+            let written = item.text()?;
+            let unit = Unit::named(written);
+            if unit.is_none() {
+                item.error_help(
+                    format!("must be a unit of wavelength, wavenumber, frequency or energy, but is \"{written}\""),
+                    "write e.g. nm, um, angstrom, cm-1, THz or eV",
+                );
+            }
+            Some(unit?)
+        }
         None => None,
     };
     if refractive::is_yaml(&path) {
@@ -485,7 +612,7 @@ fn file(item: &Item, column: Option<Item>, unit: Option<Item>) -> Option<Data> {
             unit.error_help("goes with tables only", "remove it: these files are in um");
             return None;
         }
-        return index_file(item, path, column);
+        return index_file(item, path, column, needed);
     }
     match text::read_spectrum(&path, column, unit_of_x) {
         Ok(table) => Some(table_data(table, path)),
@@ -497,20 +624,29 @@ fn file(item: &Item, column: Option<Item>, unit: Option<Item>) -> Option<Data> {
 }
 
 /// `n` (the default) or `k` of a refractiveindex.info file.
-fn index_file(item: &Item, path: PathBuf, column: Option<&str>) -> Option<Data> {
-    let Index { n, k } = refractive::read(&path).map_err(|problem| report_in_file(item, *problem)).ok()?;
-    let (name, table) = match column {
-        None | Some("n") => ("n", n),
-        Some("k") => ("k", k),
-        Some(other) => {
-            item.error_help(format!("{} has no column \"{other}\"", path.display()), "its columns are n and k");
+fn index_file(item: &Item, path: PathBuf, column: Column, needed: Option<[f64; 2]>) -> Option<Data> {
+    let name = match column {
+        Column::Only | Column::Named("n") | Column::Number(2) => "n",
+        Column::Named("k") | Column::Number(3) => "k",
+        Column::Named(_) | Column::Number(_) => {
+            let other = match column {
+                Column::Named(name) => format!("\"{name}\""),
+                Column::Number(number) => number.to_string(),
+                Column::Only => String::new(),
+            };
+            item.error_help(format!("{} has no column {other}", path.display()), "its columns are n and k");
             return None;
         }
     };
-    if table.is_none() {
-        item.error(format!("{} does not give {name}", path.display()));
-    }
-    Some(table_data(table?, path))
+    let index = refractive::read(&path, needed).map_err(|problem| report_in_file(item, *problem)).ok()?;
+    let table = match if name == "n" { index.n } else { index.k } {
+        Some(table) => table.map_err(|problem| report_in_file(item, *problem)).ok()?,
+        None => {
+            item.error(format!("{} does not give {name}", path.display()));
+            return None;
+        }
+    };
+    Some(table_data(table, path))
 }
 
 /// The temperature that names a column: `300`, `300K`, or with words before it as in `kappa_300K`.
@@ -520,9 +656,9 @@ fn column_kelvin(name: &str) -> Option<f64> {
     number.get(start..)?.parse().ok().filter(|kelvin: &f64| kelvin.is_finite() && *kelvin > 0.0)
 }
 
-fn table_data(table: SpectrumTable, file: PathBuf) -> Data {
-    let lines = (!table.line.is_empty()).then_some((file, table.line));
-    Data::Table { nm: table.nm, value: table.value, lines }
+fn table_data(table: SpectrumTable, path: PathBuf) -> Data {
+    let SpectrumTable { nm, value, line, measure, notes } = table;
+    Data::Table { nm, value, file: Some(TableFile { path, lines: line, measure, notes }) }
 }
 
 /// A mistake in a file that `item` names: at its line there, or, if the file as a whole is wrong, at the item.
@@ -558,7 +694,7 @@ fn samples(item: &Item) -> Option<Data> {
     }
     let pairs: Vec<[f64; 2]> = pairs.into_iter().collect::<Option<_>>()?;
     let (nm, value) = pairs.into_iter().map(|[nm, value]| (nm, value)).unzip();
-    Some(Data::Table { nm, value, lines: None })
+    Some(Data::Table { nm, value, file: None })
 }
 
 fn regular(item: &Item) -> Option<Data> {
@@ -583,5 +719,5 @@ fn regular(item: &Item) -> Option<Data> {
     let value = values?;
     let last = value.len() - 1;
     let nm = (0..=last).map(|i| if i == last { to } else { from + (to - from) * (i as f64 / last as f64) }).collect();
-    Some(Data::Table { nm, value, lines: None })
+    Some(Data::Table { nm, value, file: None })
 }
