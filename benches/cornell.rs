@@ -13,9 +13,9 @@ use std::sync::Arc;
 use clock::cpu_seconds;
 use spectile::Result;
 use spectile::cube::{Cube, Existing};
+use spectile::device::prepared::Prepared;
 use spectile::gpu::adapter::{Gpu, Selection};
 use spectile::render::job::{Job, StopRule};
-use spectile::render::prepare::Prepared;
 use spectile::render::schedule::{self, Event};
 use spectile::render::wave::Budget;
 use spectile::render::worker::Worker;
@@ -58,8 +58,8 @@ fn speed(scene: &Scene, rounds: usize, samples: u32) -> Result<()> {
     let prepared = Arc::new(Prepared::new(scene, 0)?);
     let mut worker = Worker::new(Gpu::open()?, prepared, [64, 64], Budget::default())?;
     let epoch = |worker: &mut Worker, index: u32| -> Result<()> {
-        worker.submit(&[[0, 0, 64, 64]], index, samples, &mut |_| Ok(()))?;
-        worker.collect(&mut |_| Ok(()))
+        worker.submit(&[[0, 0, 64, 64]], index, samples)?;
+        worker.collect().map(drop)
     };
     epoch(&mut worker, 0)?;
     let paths = 64.0 * 64.0 * f64::from(samples);

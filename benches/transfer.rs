@@ -12,9 +12,9 @@ use std::time::Instant;
 use clock::cpu_seconds;
 use spectile::Result;
 use spectile::cube::{Existing, Header, Writer};
+use spectile::device::prepared::Prepared;
 use spectile::gpu::adapter::Gpu;
 use spectile::render::plan;
-use spectile::render::prepare::Prepared;
 use spectile::render::wave::Budget;
 use spectile::render::worker::{UnitRect, Worker};
 use spectile::scene;
@@ -38,8 +38,8 @@ fn main() -> Result<()> {
     let mut worker = Worker::new(Arc::new(Gpu::open()?), Arc::clone(&prepared), [TILE; 2], Budget::default())?;
     let unit: UnitRect = [0, 0, TILE, TILE];
     // Compiles everything.
-    worker.submit(&[unit], 0, 1, &mut |_| Ok(()))?;
-    worker.collect(&mut |_| Ok(()))?;
+    worker.submit(&[unit], 0, 1)?;
+    worker.collect()?;
 
     let portions: Vec<u32> = (0..4).map(|i| 1 << (2 * i)).filter(|n| *n <= most).collect();
     let mut seconds = vec![Vec::new(); portions.len()];
@@ -49,8 +49,8 @@ fn main() -> Result<()> {
         for (i, &portion) in portions.iter().enumerate() {
             let samples = portion.max(LEAST_SAMPLES);
             let [without, _] = timed(|| {
-                worker.submit(&[unit], 0, samples, &mut |_| Ok(()))?;
-                worker.collect(&mut |_| Ok(()))
+                worker.submit(&[unit], 0, samples)?;
+                worker.collect().map(drop)
             })?;
             let [with, wall] = timed(|| into_cube(&mut worker, &header, unit, samples, portion))?;
             let units = f64::from(samples / portion);
@@ -90,9 +90,10 @@ fn into_cube(worker: &mut Worker, header: &Header, unit: UnitRect, samples: u32,
         let committer = threads.spawn(|| cube.commit_regularly());
         let mut render = || {
             for epoch in 0..samples / portion {
-                worker.submit(&[unit], epoch, portion, &mut |c| merge(c.means))?;
+                let before = worker.submit(&[unit], epoch, portion)?;
+                before.map_or(Ok(()), |c| merge(c.means()))?;
             }
-            worker.collect(&mut |c| merge(c.means))
+            worker.collect()?.map_or(Ok(()), |c| merge(c.means()))
         };
         let rendered = render();
         // Also after an error: the committer would wait for ever.

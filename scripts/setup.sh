@@ -50,11 +50,6 @@ build() {
     quiet=""
   fi
   (cd "$root" && cargo build --release --locked $quiet)
-  # Vulkan loaders want a private runtime folder and complain on every start without one.
-  if [ -z "${XDG_RUNTIME_DIR:-}" ]; then
-    export XDG_RUNTIME_DIR=$target/runtime
-    mkdir -p -m 700 "$XDG_RUNTIME_DIR"
-  fi
 }
 
 # `spectile devices` ends with 3 where no adapter can be used, and only then.

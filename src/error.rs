@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 /// A result whose error is Spectile's own.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// Everything that can stop Spectile; [`Error::exit_code`] is the process's exit code (DESIGN section 5).
+/// Everything that can stop Spectile; [`Error::exit_code`] is the process's exit code.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// A scene, spectrum or mesh is wrong; independent mistakes are reported together.
@@ -42,7 +42,7 @@ pub enum Error {
 }
 
 impl Error {
-    /// The exit code of DESIGN section 5.
+    /// 1 a comparison or check failed, 2 bad input or usage, 3 no usable device, 4 all devices lost, 5 storage.
     pub fn exit_code(&self) -> i32 {
         match self {
             Error::BrokenPipe => 0,

@@ -1,5 +1,7 @@
 //! Files written whole or not at all: first aside under a random name, then renamed over their target. And the space
-//! for them.
+//! for them. What people name goes through [`output`].
+
+pub mod output;
 
 use std::ffi::OsString;
 use std::fs;
@@ -7,7 +9,7 @@ use std::hash::{BuildHasher, Hasher, RandomState};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use crate::{Error, Result};
+use crate::Result;
 
 /// A number that no other process or call draws, for names of files that are still being written.
 pub fn random_number() -> u64 {
@@ -28,108 +30,17 @@ pub fn sibling(path: &Path, extension: &str) -> PathBuf {
     path.with_file_name(name)
 }
 
-/// Writes `bytes` to `path`, replacing what was there in one step: a reader sees the old file or the new one, never a
-/// part, and a failure leaves the old one.
+/// Writes `bytes` to `path`, a file that is Spectile's own whatever it holds, replacing it in one step: a reader sees the
+/// old file or the new one, never a part, and a failure leaves the old one.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
-    check_target(path)?;
     let aside = sibling(path, "part");
     let written =
         fs::File::create_new(&aside).and_then(|mut file| file.write_all(bytes)).and_then(|()| fs::rename(&aside, path));
     written.map_err(|error| {
         // The write has failed already; a leftover that cannot be removed either changes nothing about that.
         let _ = fs::remove_file(&aside);
-        Error::storage(path, format!("cannot be written: {error}"))
+        output::cannot_write(path, &error)
     })
-}
-
-/// A file that is written piece by piece under a hidden name beside its own, and takes its place in one step when it is
-/// whole. One that never is, is removed.
-pub struct Replacement {
-    target: PathBuf,
-    aside: PathBuf,
-    file: fs::File,
-    finished: bool,
-}
-
-impl Replacement {
-    pub fn create(target: &Path) -> Result<Replacement> {
-        check_target(target)?;
-        let aside = sibling(target, "part");
-        let failed = |error| Error::storage(target, format!("cannot be written: {error}"));
-        let file = fs::File::create_new(&aside).map_err(failed)?;
-        Ok(Replacement { target: target.to_owned(), aside, file, finished: false })
-    }
-
-    pub fn file(&mut self) -> &mut fs::File {
-        &mut self.file
-    }
-
-    /// The error of a write that failed.
-    pub fn failed(&self, error: impl std::fmt::Display) -> Error {
-        Error::storage(&self.target, format!("cannot be written: {error}"))
-    }
-
-    /// Replaces what was there.
-    pub fn finish(mut self) -> Result<()> {
-        fs::rename(&self.aside, &self.target).map_err(|error| self.failed(error))?;
-        self.finished = true;
-        Ok(())
-    }
-}
-
-impl Drop for Replacement {
-    fn drop(&mut self) {
-        if !self.finished {
-            // Writing has failed already; that error is the one to report.
-            let _ = fs::remove_file(&self.aside);
-        }
-    }
-}
-
-/// A folder that is filled under a hidden name beside its own, and takes its place in one step. One that never does is
-/// removed.
-pub struct NewFolder {
-    target: PathBuf,
-    aside: PathBuf,
-    finished: bool,
-}
-
-impl NewFolder {
-    /// Refuses where there is something already.
-    pub fn create(target: &Path) -> Result<NewFolder> {
-        if target.symlink_metadata().is_ok() {
-            return Err(Error::Usage(format!(
-                "{} exists already; remove it, or choose another name",
-                target.display()
-            )));
-        }
-        let aside = sibling(target, "part");
-        let failed = |error| Error::storage(target, format!("cannot be written: {error}"));
-        fs::create_dir(&aside).map_err(failed)?;
-        Ok(NewFolder { target: target.to_owned(), aside, finished: false })
-    }
-
-    /// Where it is filled.
-    pub fn path(&self) -> &Path {
-        &self.aside
-    }
-
-    /// Gives it its name.
-    pub fn finish(mut self) -> Result<()> {
-        let renamed = fs::rename(&self.aside, &self.target);
-        renamed.map_err(|error| Error::storage(&self.target, format!("cannot be written: {error}")))?;
-        self.finished = true;
-        Ok(())
-    }
-}
-
-impl Drop for NewFolder {
-    fn drop(&mut self) {
-        if !self.finished {
-            // Writing has failed already; that error is the one to report.
-            let _ = fs::remove_dir_all(&self.aside);
-        }
-    }
 }
 
 /// Waits until the names in a folder are on disk.
@@ -159,17 +70,6 @@ pub fn make_folder_durably(folder: &Path) -> std::io::Result<()> {
         result => result?,
     }
     sync_folder(above)
-}
-
-/// Refuses early a target of [`write_atomically`] that has no folder, or is one.
-pub fn check_target(path: &Path) -> Result<()> {
-    if path.is_dir() {
-        return Err(Error::storage(path, "is a folder, so no file can be written under this name"));
-    }
-    match parent(path) {
-        folder if folder.is_dir() => Ok(()),
-        folder => Err(Error::storage(path, format!("cannot be written: there is no folder {}", folder.display()))),
-    }
 }
 
 /// Bytes that this user may still write to the file system of `folder`; `None` where that cannot be asked, or where the
@@ -207,6 +107,11 @@ pub fn memory_bytes() -> Option<u64> {
     total.trim().strip_suffix(" kB")?.parse::<u64>().ok()?.checked_mul(1024)
 }
 
+/// A path as text, for people and for JSON: what is not UTF-8 becomes U+FFFD.
+pub fn shown(path: &Path) -> String {
+    path.to_string_lossy().into_owned()
+}
+
 /// The folder that holds `path`, `.` for a bare name.
 pub fn parent(path: &Path) -> &Path {
     match path.parent() {
@@ -229,10 +134,10 @@ pub fn format_bytes(bytes: u64) -> String {
     if unit == "bytes" { format!("{bytes} bytes") } else { format!("{value:.1} {unit}") }
 }
 
-/// A size as people write it: bytes, or a number with kB, MB, GB, TB (powers of 1000) or KiB, MiB, GiB, TiB (of 1024).
+/// A size as people write it: bytes, or a number with kB, MB, GB, TB (powers of 1000) or KiB, MiB, GiB, TiB (of 1024). K,
+/// M, G and T alone are powers of 1024 as for sbatch, ulimit and dd.
 pub fn parse_bytes(text: &str) -> std::result::Result<u64, String> {
-    let explain =
-        || "a size is a positive number of bytes, or one with a unit, such as 512MiB, 2GiB or 1.5GB".to_owned();
+    let explain = || "a size is a positive number of bytes, or one with a unit, such as 512MiB, 2G or 1.5GB".to_owned();
     let text = text.trim();
     let (number, unit) = text.split_at(text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len()));
     let unit = match unit.to_ascii_lowercase().as_str() {
@@ -241,10 +146,10 @@ pub fn parse_bytes(text: &str) -> std::result::Result<u64, String> {
         "mb" => 1e6,
         "gb" => 1e9,
         "tb" => 1e12,
-        "kib" => f64::from(1 << 10),
-        "mib" => f64::from(1 << 20),
-        "gib" => f64::from(1 << 30),
-        "tib" => 1024.0 * f64::from(1 << 30),
+        "k" | "kib" => f64::from(1 << 10),
+        "m" | "mib" => f64::from(1 << 20),
+        "g" | "gib" => f64::from(1 << 30),
+        "t" | "tib" => 1024.0 * f64::from(1 << 30),
         _ => return Err(explain()),
     };
     let bytes = number.trim_end().parse::<f64>().map_err(|_| explain())? * unit;
@@ -267,7 +172,6 @@ mod tests {
         assert_eq!(fs::read_dir(folder.path()).expect("list").count(), 1);
         let missing = folder.path().join("no such folder/picture.png");
         assert!(write_atomically(&missing, b"x").unwrap_err().to_string().contains("picture.png: cannot be written"));
-        assert!(write_atomically(folder.path(), b"x").unwrap_err().to_string().contains("is a folder"));
     }
 
     #[test]
@@ -289,11 +193,15 @@ mod tests {
             ("64kB", 64_000),
             ("3TiB", 3 << 40),
             ("7B", 7),
+            ("2G", 2 << 30),
+            ("1.5k", 1536),
+            ("64M", 64 << 20),
+            ("1t", 1 << 40),
         ];
         for (text, bytes) in cases {
             assert_eq!(parse_bytes(text), Ok(bytes), "{text}");
         }
-        for bad in ["", "0", "-1MiB", "2G", "GiB", "1e", "nan", "inf", "1MiBs", "0.1", "9e18", "1 2MiB"] {
+        for bad in ["", "0", "-1MiB", "2Gi", "2x", "GiB", "G", "1e", "nan", "inf", "1MiBs", "0.1", "9e18", "1 2MiB"] {
             assert!(parse_bytes(bad).unwrap_err().contains("512MiB"), "{bad}");
         }
     }

@@ -1,11 +1,11 @@
 //! Spectile: a spectral image renderer.
 //!
-//! `scene` (parsed, checked, in metres and nanometres) → `render::prepare` → `gpu` → `render` (generate,
+//! `scene` (parsed, checked, in metres and nanometres) → `device::prepared` → `gpu` → `render` (generate,
 //! evaluate, transfer, merge) → `cube` (a Zarr v3 store). `reference` is an independent f64 path tracer.
 
-pub mod accel;
 pub mod cli;
 pub mod cube;
+pub mod device;
 pub mod error;
 pub mod export;
 pub mod files;
@@ -15,7 +15,6 @@ pub mod preview;
 pub mod reference;
 pub mod render;
 pub mod report;
-pub mod scattering;
 pub mod scene;
 pub mod slurm;
 pub mod spectral;
@@ -23,12 +22,14 @@ pub mod stress;
 
 // The unit tests that need a scene build it as the integration tests do, and compare cubes as they do.
 #[cfg(test)]
-#[path = "../tests/cube_files/mod.rs"]
+#[allow(dead_code, reason = "unit tests use a part of it")]
+#[path = "../tests/support/cube_files.rs"]
 mod cube_files;
 #[cfg(test)]
 extern crate self as spectile;
 #[cfg(test)]
-#[path = "../tests/scene_builder/mod.rs"]
+#[allow(dead_code, reason = "unit tests use a part of it")]
+#[path = "../tests/support/scene_builder/mod.rs"]
 mod scene_builder;
 
 pub use error::{Error, Result};

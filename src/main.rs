@@ -7,6 +7,10 @@ use spectile::Error;
 use spectile::cli::{Cli, Output};
 
 fn main() -> ExitCode {
+    // A file that would outgrow its limit is an error like a full disk, not the end of the process. Where the signal cannot
+    // be caught, it stays that.
+    #[cfg(unix)]
+    let _ = signal_hook::flag::register(nix::libc::SIGXFSZ, Default::default());
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(usage) => return explain(&usage),

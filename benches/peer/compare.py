@@ -1,6 +1,6 @@
 """Mitsuba 3 and Spectile on the Cornell box, in turns on one core: what each needs to an equal error.
 
-Error is relMSE of DESIGN section 8, mean over channels, against renders of Spectile with other seeds, whose own noise is subtracted.
+Error is relMSE (docs/METHOD.md, Errors), mean over channels, against renders of Spectile with other seeds, whose own noise is subtracted.
 Time is CPU time of the process, without compilation, and without what a render of one sample takes: others' work on the machine does
 not count, nor does tracing in Mitsuba or start-up in Spectile. Spectile writes its cube to disk, Mitsuba keeps its picture in memory.
 relMSE of independent samples goes as 1 / time, so that runs are compared by relMSE x seconds.
@@ -117,7 +117,7 @@ class Reference:
     def __init__(self, pictures):
         pictures = np.stack(pictures).astype(np.float64)
         self.mean = pictures.mean(axis=0)
-        # eps_k of DESIGN section 8; a channel without any light has no error either.
+        # eps_k = (0.01 mean)^2 keeps dark pixels from ruling; a channel without any light has no error either.
         self.scale = self.mean**2 + (0.01 * self.mean.mean(axis=0)) ** 2
         self.scale[self.scale == 0] = np.inf
         variance = pictures.var(axis=0, ddof=1) / len(pictures)

@@ -10,26 +10,25 @@ struct RecordList {
     last: u32,
 }
 
-fn append_raw(list: ptr<function, RecordList>, words: vec4<f32>) {
-    records[(*list).path * frame.max_records + (*list).count] = bitcast<vec4<u32>>(words);
+// The next record's place. A path that takes more than are planned writes over its own last one; the host is told how many it took.
+fn next_record(list: ptr<function, RecordList>) -> u32 {
+    let at = min((*list).count, frame.max_records - 1u);
     (*list).count += 1u;
+    return (*list).path * frame.max_records + at;
+}
+
+fn append_raw(list: ptr<function, RecordList>, words: vec4<f32>) {
+    records[next_record(list)] = bitcast<vec4<u32>>(words);
+}
+
+fn append_words(list: ptr<function, RecordList>, words: vec4<u32>) {
+    (*list).last = next_record(list);
+    records[(*list).last] = words;
 }
 
 fn append(list: ptr<function, RecordList>, operation: u32, ab: u32, weight: f32, parameter: f32) {
-    (*list).last = (*list).path * frame.max_records + (*list).count;
-    records[(*list).last] = vec4<u32>(operation, ab, bitcast<u32>(weight), bitcast<u32>(parameter));
-    (*list).count += 1u;
+    append_words(list, vec4<u32>(operation, ab, bitcast<u32>(weight), bitcast<u32>(parameter)));
 }
-
-#if MAP
-// The instruction that looks the map up: X = its value there over the source spectrum.
-fn append_map(list: ptr<function, RecordList>, mode: u32, place: MapPlace, weight: f32) {
-    let fraction = vec2<u32>(place.fraction * 65535.0 + 0.5);
-    (*list).last = (*list).path * frame.max_records + (*list).count;
-    records[(*list).last] = vec4<u32>(OP_MAP | mode, place.column | (place.row << 16u), bitcast<u32>(weight), fraction.x | (fraction.y << 16u));
-    (*list).count += 1u;
-}
-#endif
 
 // Lets the instructions since record `begin` add to the radiance what they built, times a source.
 fn gather(list: ptr<function, RecordList>, begin: u32, source: u32) {
@@ -37,4 +36,9 @@ fn gather(list: ptr<function, RecordList>, begin: u32, source: u32) {
         records[(*list).last].x |= MODE_GATHER | (source << 16u);
         (*list).used = (*list).count;
     }
+}
+
+// Lets the throughput take what was built.
+fn advance(list: ptr<function, RecordList>) {
+    records[(*list).last].x |= MODE_ADVANCE;
 }

@@ -1,7 +1,7 @@
 // What the operations of records (common/record.wgsl) mean, for a quad of channels.
 
 #if OP_FRESNEL
-// Reflectance of a boundary at cosine `c`, index `eta` beyond over before (`scattering::fresnel`: no differences of nearly equal
+// Reflectance of a boundary at cosine `c`, index `eta` beyond over before (`spectral::hemisphere::fresnel`: no differences of nearly equal
 // numbers).
 fn fresnel_dielectric(c: f32, eta: vec4<f32>) -> vec4<f32> {
     let excess = (eta - 1.0) * (eta + 1.0);

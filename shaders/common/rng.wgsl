@@ -46,15 +46,15 @@ fn pascal(index: u32) -> u32 {
 // Two random numbers in [0, 2^32) for one pair of dimensions.
 fn random_pair_bits(key: u32, dimension: u32, index: u32, epoch_mask: u32) -> vec2<u32> {
     let seed = hash(key + dimension * 0x9e3779b9u);
-#if INDEPENDENT
-    let h = hash(seed ^ index);
-    return vec2<u32>(h, hash(h ^ 0x85ebca6bu));
-#else
+#if SOBOL
     // The first two Sobol dimensions, padded: each pair visits the points of its epoch in an order of its own.
     let i = reverseBits(permute_upwards(reverseBits(index), seed)) & epoch_mask;
     let x = reverseBits(permute_upwards(i, hash(seed ^ 0x68bc21ebu)));
     let y = reverseBits(permute_upwards(pascal(i), hash(seed ^ 0x02e5be93u)));
     return vec2<u32>(x, y);
+#else
+    let h = hash(seed ^ index);
+    return vec2<u32>(h, hash(h ^ 0x85ebca6bu));
 #endif
 }
 

@@ -1,11 +1,10 @@
-// Structures shared by the passes; `src/gpu/layout.rs` holds their Rust twins and a test compares both.
+// Structures shared by the kernels; `src/device/words.rs` holds their Rust twins and a test compares both.
 
 const PI: f32 = 3.14159265;
 const INV_PI: f32 = 0.318309886;
-const NONE: u32 = 0xffffffffu;
+#constants NONE
 const INFINITE: f32 = 3.0e38;
-// A path that goes no further; stands in the last word of its state.
-const ENDED: u32 = 0xffffffffu;
+#constants ENDED
 
 // What stays the same during a render. Lengths are in device units: recentred, and scaled by a power of two so that
 // the scene spans about [-1, 1].
@@ -98,9 +97,7 @@ struct Emitter {
     area: f32,
 }
 
-// Bits of Emitter.spectrum.
-const EMITS_BOTH_SIDES: u32 = 0x80000000u;
-const SPECTRUM_MASK: u32 = 0xffffu;
+#constants EMITTERS
 
 // `factor`: spectrum of the throughput, NONE where nothing is scattered. `albedo`: its largest value over the channels,
 // rounded up to a step of the random numbers, so that it is the probability with which roulette lets a path go on.
@@ -111,17 +108,4 @@ struct Material {
     unused: u32,
 }
 
-// Indices into the counters that every pass may raise.
-const COUNTER_OVERFLOW: u32 = 0u;
-const COUNTER_NON_FINITE: u32 = 1u;
-const COUNTER_NEGATIVE: u32 = 2u;
-// Where: the pixel slot that reported first, and the largest sample index + 1 reported.
-const COUNTER_BAD_SLOT: u32 = 3u;
-const COUNTER_BAD_SAMPLE: u32 = 4u;
-// Rays traced by the paths that ended: low and high word.
-const COUNTER_RAYS: u32 = 5u;
-const COUNTER_RAYS_HIGH: u32 = 6u;
-// Proof that all took place: samples folded, of pixels all of whose paths have ended in the same wave (of all pixel slots,
-// by each workgroup of a pixel, modulo 2^32), and the sequence number of the last wave.
-const COUNTER_FOLDED: u32 = 7u;
-const COUNTER_SEQUENCE: u32 = 8u;
+#constants COUNTERS

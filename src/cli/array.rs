@@ -4,7 +4,6 @@
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use std::thread;
 use std::time::{Duration, Instant};
 
 use super::Output;
@@ -14,12 +13,13 @@ use super::progress::{Reporter, short};
 use super::scene::SceneArgs;
 use super::submit::submit_array;
 use crate::cube::{Cube, Existing, Run, RunFile, RunState, SlurmTask, Stand, Verification, Work, node_name, now_s};
+use crate::gpu::adapter::of_task;
+use crate::render::interrupt::Interrupt;
 use crate::render::job::{self, StopRule};
 use crate::render::schedule;
-use crate::render::worker::{Interrupt, check_interrupt};
 use crate::scene::Scene;
 use crate::slurm::{self, Job, client};
-use crate::{Error, Result, files};
+use crate::{Error, Result};
 
 /// What the probe prints where it feels the lock that `submit` holds, and where it does not.
 pub const FELT: &str = "spectile: locked";
@@ -42,6 +42,7 @@ pub fn probe(args: &Args) -> Result<()> {
     let job = Job::read(&args.cube)?;
     scene_of(&job)?;
     let felt = Cube::open(&args.cube)?.probe_from_here().map_err(on_node)?;
+    of_task(job.allow_software).map_err(on_node)?;
     println!("{}", if felt { FELT } else { NOT_FELT });
     Ok(())
 }
@@ -74,6 +75,7 @@ fn on_node(error: Error) -> Error {
             });
             Error::Input(each.collect())
         }
+        Error::NoDevice(what) => Error::NoDevice(format!("{node}: {what}")),
         error => error,
     }
 }
@@ -146,12 +148,13 @@ fn requeue<'r>(
 fn render(cube: &Path, job: &Job, number: u32, interrupt: &std::sync::Arc<Interrupt>, output: &Output) -> Result<()> {
     let tiles = job.range(number);
     let scene = scene_of(job)?;
+    let devices = of_task(job.allow_software).map_err(on_node)?;
     let mut reporter = Reporter::new(false, output);
     wait_until_free(&Cube::open(cube)?, &tiles, interrupt)?;
     let job = job::Job {
         scene,
         output: cube.to_owned(),
-        existing: Existing::Join,
+        existing: Existing::Resume,
         tiles: Some(tiles),
         seed: job.seed,
         tile: job.tile,
@@ -159,7 +162,7 @@ fn render(cube: &Path, job: &Job, number: u32, interrupt: &std::sync::Arc<Interr
         stop: StopRule { samples: Some(job.samples), ..StopRule::default() },
         preview: None,
         profile: false,
-        devices: Default::default(),
+        devices,
         memory: job.memory,
         feed: None,
     };
@@ -179,8 +182,7 @@ fn wait_until_free(cube: &Cube, tiles: &std::ops::Range<u32>, interrupt: &Interr
             say(&format!("another worker is at the tiles {}..{}; waiting for it", held.start, held.end));
             said = true;
         }
-        check_interrupt(interrupt)?;
-        thread::sleep(Duration::from_secs(1));
+        interrupt.sleep(Duration::from_secs(1))?;
     }
 }
 
@@ -214,8 +216,8 @@ pub fn end(args: &Args) -> Result<()> {
         submit_array(&mut job, &args.cube, &tasks, except)?;
     }
     let summary = summarise(&args.cube, &job, &work, &verified, wanted.len(), &verdict);
-    files::write_atomically(&slurm::summary_path(&args.cube), summary.as_bytes())?;
     say(summary.trim_end());
+    slurm::SUMMARY.write(&slurm::summary_path(&args.cube), summary.as_bytes())?;
     match verdict {
         Verdict::GiveUp(why) => Err(Error::Check(format!("{}: not finished: {why}", args.cube.display()))),
         _ => Ok(()),

@@ -9,10 +9,11 @@ use serde_json::json;
 use super::Output;
 use super::output::say;
 use super::render::parse_time;
+use crate::device::example::with_everything;
+use crate::files::shown;
 use crate::gpu::adapter::{Gpu, Selection};
-use crate::render::worker::{Interrupt, check_interrupt};
+use crate::render::interrupt::Interrupt;
 use crate::report::bench::{Frames, Part, Report, Row};
-use crate::report::everything::with_everything;
 use crate::report::throughput::{Trial, frames, measure};
 use crate::report::{Circumstances, make_folder, write};
 use crate::scene::{self, Evaluator, Scene};
@@ -100,7 +101,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
             missing.display()
         )));
     }
-    make_folder(&args.output)?;
+    make_folder(&args.output, "bench")?;
     let gpu = Arc::new(Gpu::open_all(&args.devices)?.remove(0));
     let mut report = Report {
         circumstances: Circumstances::now(&gpu),
@@ -109,7 +110,10 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         frames: Vec::new(),
         missing: Vec::new(),
     };
-    output.event("start", json!({ "scenes": files, "device": gpu.name }))?;
+    output.event(
+        "start",
+        json!({ "scenes": files.iter().map(|file| shown(file)).collect::<Vec<_>>(), "device": gpu.name }),
+    )?;
     let began = Instant::now();
     for step in steps(args, &files) {
         let name = name_of(step.file);
@@ -118,7 +122,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
             (Part::LeftOut, _) => format!("{name}, its own kernels and all of them"),
             _ => format!("{name}, {} channels", step.channels),
         };
-        check_interrupt(&interrupt)?;
+        interrupt.check()?;
         if began.elapsed() > args.budget {
             report.missing.push(format!("{what}: the time of --budget was over"));
         } else {
@@ -130,7 +134,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     for (file, side) in files.iter().flat_map(|file| args.frames.iter().map(move |&side| (file, side))) {
         let name = name_of(file);
         let what = format!("{name}, frames of {side} x {side} pixels");
-        check_interrupt(&interrupt)?;
+        interrupt.check()?;
         if began.elapsed() > args.budget {
             report.missing.push(format!("{what}: the time of --budget was over"));
         } else {
@@ -141,7 +145,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         }
         write(&args.output, "bench", &report.csv(), &report.json(), &report.html()?)?;
     }
-    output.event("done", json!({ "report": report.json(), "folder": args.output }))?;
+    output.event("done", json!({ "report": report.json(), "folder": shown(&args.output) }))?;
     output.text(&format!("{}{}\n", report.summary(), args.output.join("bench.html").display()))
 }
 
@@ -184,7 +188,7 @@ fn measure_step(
     };
     let (mut trials, mut measured) = (Vec::new(), Vec::new());
     for (evaluator, everything, scene) in ways {
-        check_interrupt(interrupt)?;
+        interrupt.check()?;
         match Trial::new(&scene, gpu, step.pool, interrupt) {
             Ok(trial) => {
                 trials.push(trial);

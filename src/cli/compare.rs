@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 
 use super::Output;
 use crate::cube::{Comparison, Cube, compare};
+use crate::files::shown;
 use crate::{Error, Result};
 
 /// Compare a cube with a reference, channel by channel
@@ -85,8 +86,8 @@ fn facts(args: &Args, cube: &Cube, comparison: &Comparison, passed: Option<bool>
         })
     });
     json!({
-        "cube": args.a,
-        "reference": args.b,
+        "cube": shown(&args.a),
+        "reference": shown(&args.b),
         "pixels": comparison.pixels,
         "pixels_in_all": comparison.pixels_in_all,
         "rel_mse": { "mean": mean_rel_mse(comparison), "largest": largest, "channel": worst },

@@ -11,9 +11,10 @@ use super::output::say;
 use super::render::parse_time;
 use super::scene::SceneArgs;
 use crate::cube::Cube;
+use crate::files::shown;
 use crate::gpu::adapter::{Gpu, Selection};
+use crate::render::interrupt::Interrupt;
 use crate::render::plan;
-use crate::render::worker::Interrupt;
 use crate::report::converge::{Curve, Report};
 use crate::report::convergence::{Limit, Reference, measure, render};
 use crate::report::{Circumstances, make_folder, write};
@@ -81,11 +82,11 @@ pub struct Args {
 pub fn run(args: &Args, output: &Output) -> Result<()> {
     let interrupt = super::interrupt::watch()?;
     let scenes = scenes(args)?;
-    make_folder(&args.output)?;
+    make_folder(&args.output, "converge")?;
     let gpu = Arc::new(Gpu::open_all(&args.devices)?.remove(0));
     let file = args.scene.scene.display().to_string();
     let mut report = Report { scene: file, circumstances: Circumstances::now(&gpu), curves: Vec::new() };
-    output.event("start", json!({ "scene": args.scene.scene, "curves": scenes.len(), "device": gpu.name }))?;
+    output.event("start", json!({ "scene": shown(&args.scene.scene), "curves": scenes.len(), "device": gpu.name }))?;
     let mut references: Vec<(&Channels, Reference)> = Vec::new();
     for (name, scene) in &scenes {
         let channels = &scene.channels;
@@ -108,7 +109,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
             write(&args.output, "converge", &report.csv(), &report.json(), &report.html()?)
         })?;
     }
-    output.event("done", json!({ "report": report.json(), "folder": args.output }))?;
+    output.event("done", json!({ "report": report.json(), "folder": shown(&args.output) }))?;
     output.text(&format!("{}{}\n", report.summary(), args.output.join("converge.html").display()))
 }
 

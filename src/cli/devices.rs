@@ -6,7 +6,7 @@ use super::Output;
 use crate::Result;
 use crate::files::format_bytes;
 use crate::gpu::adapter::{self, Gpu};
-use crate::gpu::self_test;
+use crate::render::self_test;
 
 /// List the adapters of this machine and what each can do
 ///

@@ -3,13 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::Output;
 use super::bands::Bands;
+use super::output::say;
 use crate::cube::{Cube, Quantity, Rect, View};
 use crate::export::{self, Shown};
 use crate::format::envi::Interleave;
+use crate::format::png::PICTURE;
 use crate::spectral::colour::{Observer, Projection};
 use crate::spectral::tone::Tone;
 use crate::{Error, Result, files};
@@ -36,12 +38,16 @@ Examples:
   spectile export cube.zarr -o cube.img                                 ENVI, and cube.hdr
   spectile export cube.zarr -o thermal.exr --bands 8um..14um
   spectile export cube.zarr -o part.zarr --crop 100,100,356,356 --bands 0..50,120
+  spectile export cube.zarr -o - --format csv --bands 550nm | head      to a pipe
   spectile export cube.zarr -o blocks --format envi --blocks 1024       a folder of files, and index.json")]
 pub struct Args {
     /// The cube, a folder
     pub cube: PathBuf,
 
-    /// The file to write; an existing one is replaced
+    /// The file to write; - is the standard output
+    ///
+    /// A new name, or a file of the same format, which is replaced; through a link the file behind it. CSV and PNG may go to a
+    /// pipe, a device or the standard output too. Nothing else is ever replaced.
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
 
@@ -160,8 +166,18 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         None => guess(&args.output)?,
     };
     check_options(args, format)?;
+    let to_standard_output = match format {
+        Format::Png => PICTURE.is_standard_output(&args.output),
+        Format::Csv => export::TABLE.is_standard_output(&args.output),
+        _ => false,
+    };
+    if to_standard_output && args.json {
+        return Err(Error::Usage("--json and -o -: only one of them can have the standard output".into()));
+    }
+    let output = &Said { output, aside: to_standard_output };
     let cube = Cube::open(&args.cube)?;
     if format == Format::Png {
+        PICTURE.check_target(&args.output)?;
         return write_png(args, &cube, output);
     }
     let view = view(args, &cube)?;
@@ -171,7 +187,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
             let split = args.exr_split.map(|n| n as usize);
             let channels = split.unwrap_or(usize::MAX).min(view.channels().len()) + 3;
             if channels > export::WIDELY_READ {
-                output.warn(&format!(
+                output.output.warn(&format!(
                     "{channels} channels in one OpenEXR file: OpenImageIO and what uses it read {} at most; --exr-split 1000 \
                      makes several files",
                     export::WIDELY_READ
@@ -182,8 +198,40 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         Format::Zarr => export::Format::Zarr { shards: !args.zarr_no_shards },
         Format::Csv | Format::Png => export::Format::Csv,
     };
+    match args.blocks {
+        Some(_) => export::BLOCKS.check_target(&args.output)?,
+        None => format.check_target(&args.output)?,
+    }
     let files = write(args, &view, format)?;
+    if let (export::Format::Envi { .. }, None) = (format, args.blocks)
+        && let Some(other) = export::other_header(&args.output)
+    {
+        output.output.warn(&format!(
+            "{} is there too: GDAL and QGIS read it instead of the header just written; remove it if it is not meant",
+            other.display()
+        ))?;
+    }
     report(args, &view, format, &files, output)
+}
+
+/// What is said about an export: beside it, where that itself has the standard output.
+struct Said<'a> {
+    output: &'a Output,
+    aside: bool,
+}
+
+impl Said<'_> {
+    fn text(&self, text: &str) -> Result<()> {
+        if !self.aside {
+            return self.output.text(text);
+        }
+        say(text.trim_end());
+        Ok(())
+    }
+
+    fn event(&self, event: &str, fields: Value) -> Result<()> {
+        self.output.event(event, fields)
+    }
 }
 
 /// Options that mean nothing for the format are mistakes.
@@ -260,7 +308,7 @@ fn write(args: &Args, view: &View, format: export::Format) -> Result<Vec<PathBuf
     })
 }
 
-fn report(args: &Args, view: &View, format: export::Format, written: &[PathBuf], output: &Output) -> Result<()> {
+fn report(args: &Args, view: &View, format: export::Format, written: &[PathBuf], output: &Said) -> Result<()> {
     let progress = view.cube().progress()?;
     let missing = progress.tiles - progress.tiles_started;
     let ([width, height], channels) = (view.size(), view.channels().len());
@@ -268,9 +316,9 @@ fn report(args: &Args, view: &View, format: export::Format, written: &[PathBuf],
     output.event(
         "done",
         json!({
-            "file": args.output,
+            "file": files::shown(&args.output),
             "format": format.name(),
-            "files": written,
+            "files": written.iter().map(|path| files::shown(path)).collect::<Vec<_>>(),
             "size": [width, height],
             "bands": channels,
             "integrated": args.integrated,
@@ -287,7 +335,7 @@ fn report(args: &Args, view: &View, format: export::Format, written: &[PathBuf],
     Ok(())
 }
 
-fn write_png(args: &Args, cube: &Cube, output: &Output) -> Result<()> {
+fn write_png(args: &Args, cube: &Cube, output: &Said) -> Result<()> {
     let usage = |what: String| Error::Usage(format!("{}: {what}", args.cube.display()));
     let mut view = View::whole(cube);
     if let Some(crop) = args.crop {
@@ -347,7 +395,7 @@ fn write_png(args: &Args, cube: &Cube, output: &Output) -> Result<()> {
     output.event(
         "done",
         json!({
-            "file": args.output,
+            "file": files::shown(&args.output),
             "format": "png",
             "size": view.size(),
             "exposure_ev": ev,
@@ -367,7 +415,7 @@ fn picture(args: &Args, view: &View, shown: &Shown, tone: Option<Tone>) -> Resul
 }
 
 /// A colour map of the bands of `view` together.
-fn write_map(args: &Args, view: &View, output: &Output) -> Result<()> {
+fn write_map(args: &Args, view: &View, output: &Said) -> Result<()> {
     let (map, of, unit) = match (args.temperature, args.integrated) {
         (true, _) => (export::Map::Temperature, "brightness temperature", "K"),
         (_, true) => (export::Map::Integrated, "radiance", "W m-2 sr-1"),
@@ -383,7 +431,7 @@ fn write_map(args: &Args, view: &View, output: &Output) -> Result<()> {
     output.event(
         "done",
         json!({
-            "file": args.output,
+            "file": files::shown(&args.output),
             "format": "png",
             "size": view.size(),
             "range": range,
@@ -404,7 +452,7 @@ fn missing(cube: &Cube) -> Result<[u32; 2]> {
     Ok([progress.tiles - progress.tiles_started, progress.tiles])
 }
 
-fn say_missing([missing, tiles]: [u32; 2], output: &Output) -> Result<()> {
+fn say_missing([missing, tiles]: [u32; 2], output: &Said) -> Result<()> {
     if missing == 0 {
         return Ok(());
     }
@@ -420,6 +468,9 @@ fn guess(path: &Path) -> Result<Format> {
         "exr" => Ok(Format::Exr),
         "zarr" => Ok(Format::Zarr),
         "csv" => Ok(Format::Csv),
+        "" if path.as_os_str() == "-" => {
+            Err(Error::Usage("-o - names no format; say --format csv or --format png".into()))
+        }
         _ => Err(Error::Usage(format!(
             "{}: the extension names no format; use .png, .img, .exr, .zarr or .csv, or say --format",
             path.display()

@@ -9,8 +9,9 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 
 use super::Output;
-use super::standing::{Standing, list};
+use super::tile_states::{TileStates, list};
 use crate::cube::{Cube, Progress, Verification};
+use crate::files::shown;
 use crate::spectral::Channels;
 use crate::spectral::colour::ProjectionKind;
 use crate::{Error, Result};
@@ -53,7 +54,7 @@ pub struct Args {
     pub json: bool,
 }
 
-/// Epochs below which an error estimate is only rough (DESIGN section 8).
+/// Epochs below which an error estimate is only rough: it is itself one from so few values.
 const ROUGH_BELOW: u32 = 8;
 
 pub fn run(args: &Args, output: &Output) -> Result<()> {
@@ -79,13 +80,14 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         }
         (Err(error), ..) | (_, Err(error), _) => return Err(error),
     };
-    let work = Standing::of(&cube, &samples)?;
-    let found = Found { progress: Progress::of(&samples), estimate, work, verified, cube };
+    let work = TileStates::of(&cube, &samples)?;
+    let lost = cube.lost(&samples);
+    let found = Found { progress: Progress::of(&samples), estimate, work, verified, lost, cube };
     output.event("done", found.facts())?;
     output.text(&found.describe())?;
     match &found.verified {
         Some(Verification { damage, .. }) if !damage.is_empty() => Err(damaged(damage)),
-        _ => Ok(()),
+        _ => found.lost.first().map_or(Ok(()), |lost| found.cube.check_files(lost.start)),
     }
 }
 
@@ -94,8 +96,10 @@ struct Found {
     cube: Cube,
     progress: Progress,
     estimate: Vec<f64>,
-    work: Standing,
+    work: TileStates,
     verified: Option<Verification>,
+    /// Tiles that were rendered and lack a file.
+    lost: Vec<Range<u32>>,
 }
 
 /// Says how the tiles stand, again and again until all are done.
@@ -108,7 +112,7 @@ fn watch(args: &Args, output: &Output) -> Result<()> {
     loop {
         let began = Instant::now();
         let cube = Cube::open(&args.cube)?;
-        let standing = Standing::of(&cube, &cube.all_samples()?)?;
+        let standing = TileStates::of(&cube, &cube.all_samples()?)?;
         if last.as_ref() != Some(&standing) {
             output.event("progress", standing.facts())?;
             if draws {
@@ -152,7 +156,7 @@ impl Found {
             })
         });
         json!({
-            "cube": cube.path(),
+            "cube": shown(cube.path()),
             "size": header.size,
             "origin": header.origin,
             "tile": header.tile,
@@ -160,6 +164,8 @@ impl Found {
             "tiles_started": progress.tiles_started,
             "tiles_missing": pairs(&progress.missing),
             "tiles_behind": pairs(&progress.behind),
+            "tiles_lost": pairs(&self.lost),
+            "only_read": cube.is_only_read(),
             "tiles_in_use": self.work.first_in_use().map(|tiles| [tiles.start, tiles.end]),
             "verified_files": self.verified.as_ref().map(|verified| verified.files),
             "damage": self.verified.as_ref().map(|verified| &verified.damage),
@@ -199,7 +205,13 @@ impl Found {
         if !progress.behind.is_empty() {
             row("tiles behind", list(&progress.behind));
         }
+        if !self.lost.is_empty() {
+            row("lost tiles", format!("{}: files of them are missing", list(&self.lost)));
+        }
         self.work.rows().into_iter().for_each(|(name, value)| row(name, value));
+        if let Some(why) = cube.is_only_read() {
+            row("to be read only", format!("{why}; to go on, render into a new cube"));
+        }
         row("error estimate", describe_estimate(cube, progress, estimate));
         if header.has_uncertainty() {
             let epochs = epochs(cube, progress);
@@ -242,7 +254,7 @@ fn describe_samples(progress: &Progress) -> String {
 }
 
 fn describe_estimate(cube: &Cube, progress: &Progress, estimate: &[f64]) -> String {
-    if cube.header().attributes.contains_key("derived") {
+    if cube.is_derived() {
         return "unknown: made of the channels of another cube, whose errors belong together".into();
     }
     let epochs = epochs(cube, progress);

@@ -7,6 +7,7 @@ mod compare;
 mod converge;
 mod devices;
 mod export;
+mod help;
 mod info;
 mod interrupt;
 mod output;
@@ -17,9 +18,9 @@ mod scene;
 mod sensor;
 mod sinks;
 mod spectrum;
-mod standing;
 mod stress;
 mod submit;
+mod tile_states;
 mod view;
 
 use clap::{Parser, Subcommand};
@@ -35,6 +36,7 @@ pub use output::Output;
     version,
     max_term_width = 110,
     arg_required_else_help = true,
+    disable_help_subcommand = true,
     long_about = "Spectile renders spectral images: for every pixel, the radiance of a scene in K channels of \
         wavelength, anywhere from 380 to 20,000 nm. The result is a cube: a Zarr v3 store that xarray and zarr open, \
         also while it is being rendered.",
@@ -52,6 +54,7 @@ Examples:
   spectile converge scene.toml -o report                error against run time, as a report
   spectile bench -o report                              evaluators side by side, as a report
   spectile stress                                       stiff and extreme cases against their answers
+  spectile help scene                                   every section and key of a scene file
 
 Radiance is in W m-2 sr-1 nm-1, wavelengths are in nm (vacuum), pixels are counted from 0 at the top left.
 
@@ -80,6 +83,7 @@ enum Command {
     Converge(converge::Args),
     Bench(bench::Args),
     Stress(stress::Args),
+    Help(help::Args),
     /// A task of an array job (written into the batch script by `submit`)
     #[command(hide = true)]
     ArrayTask(array::Args),
@@ -107,7 +111,8 @@ impl Cli {
             Command::Bench(args) => args.json,
             Command::Stress(args) => args.json,
             Command::Submit(args) => args.json,
-            Command::Spectrum(_) | Command::ArrayTask(_) | Command::ArrayEnd(_) | Command::ArrayProbe(_) => false,
+            Command::Spectrum(_) | Command::Help(_) => false,
+            Command::ArrayTask(_) | Command::ArrayEnd(_) | Command::ArrayProbe(_) => false,
         }
     }
 
@@ -126,6 +131,7 @@ impl Cli {
             Command::Converge(args) => converge::run(args, output),
             Command::Bench(args) => bench::run(args, output),
             Command::Stress(args) => stress::run(args, output),
+            Command::Help(args) => help::run(args, output),
             Command::Submit(args) => submit::run(args, output),
             Command::ArrayTask(args) => array::task(args, output),
             Command::ArrayEnd(args) => array::end(args),

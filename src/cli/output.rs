@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use serde_json::{Map, Value, json};
 
+use crate::files::shown;
 use crate::{Error, Result};
 
 /// The standard output of one command.
@@ -69,7 +70,7 @@ impl Output {
         if let Error::Input(problems) = error {
             let each = problems.iter().map(|problem| {
                 json!({
-                    "file": problem.file,
+                    "file": shown(&problem.file),
                     "line": problem.line,
                     "column": problem.column,
                     "key": problem.key,

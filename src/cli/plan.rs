@@ -10,12 +10,17 @@ use super::output::say;
 use super::progress::short;
 use super::scene::SceneArgs;
 use crate::cube::Header;
-use crate::files::format_bytes;
+use crate::device::evaluator::EvaluateShape;
+use crate::device::facts;
+use crate::device::part::OnDevice;
+use crate::device::prepared::Prepared;
+use crate::device::windows::Windows;
+use crate::files::{format_bytes, shown};
 use crate::gpu::adapter::{Gpu, Selection};
+use crate::gpu::pass::storage_buffers;
 use crate::render::job::StopRule;
 use crate::render::plan;
 use crate::render::pool::MERGE_THREADS;
-use crate::render::prepare::Prepared;
 use crate::render::wave::{Budget, WavePlan};
 use crate::render::worker::Worker;
 use crate::scene::Scene;
@@ -29,6 +34,7 @@ use crate::{Error, Result};
 #[command(after_long_help = "\
 Examples:
   spectile plan scene.toml
+  spectile plan scene.toml --parts
   spectile plan scene.toml --size 4096x4096 --set channels.equal.count=2000 --spp 256
   spectile plan scene.toml --devices 2 --memory 512MiB")]
 pub struct Args {
@@ -48,6 +54,10 @@ pub struct Args {
     /// Samples per pixel to predict the time for, rounded up as by `render`
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
     pub spp: u32,
+
+    /// Print the table of all parts of the renderer too: what each adds to kernels, buffers, records and paths
+    #[arg(long)]
+    pub parts: bool,
 
     /// One JSON object a line on stdout, instead of text
     #[arg(long)]
@@ -140,8 +150,8 @@ fn measure(gpu: Gpu, prepared: &Arc<Prepared>, scene: &Scene, tile: [u32; 2], bu
     let [x, y] = [(width - tile[0]) / 2 + scene.film.crop[0], (height - tile[1]) / 2 + scene.film.crop[1]];
     let unit = [x, y, x + tile[0], y + tile[1]];
     let mut epoch = |samples: u32, index: u32| -> Result<()> {
-        worker.submit(&[unit], index, samples, &mut |_| Ok(()))?;
-        worker.collect(&mut |_| Ok(()))
+        worker.submit(&[unit], index, samples)?;
+        worker.collect().map(drop)
     };
     epoch(1, 0)?;
     let setup_s = started.elapsed().as_secs_f64();
@@ -166,6 +176,12 @@ struct Plan<'a> {
 }
 
 impl Plan<'_> {
+    fn on_device(&self) -> OnDevice<'_> {
+        // Waves were planned with the same limit.
+        let windows = Windows::of(&self.prepared.accel, self.waves.limits.binding).unwrap_or(Windows::WHOLE);
+        OnDevice { prepared: self.prepared, windows }
+    }
+
     fn paths(&self) -> f64 {
         self.header.size.iter().map(|&s| f64::from(s)).product::<f64>() * f64::from(self.samples)
     }
@@ -193,17 +209,18 @@ impl Plan<'_> {
                 "paths_per_s": m.paths_per_s,
             })
         });
-        let features = plan::feature_lines(self.prepared, &self.waves);
+        let features = facts::parts(&self.on_device());
         let features = features.iter().map(|f| json!({ "name": f.name, "used": f.used, "effect": f.effect }));
-        json!({
-            "scene": self.args.scene.scene,
+        let mut facts = json!({
+            "scene": shown(&self.args.scene.scene),
             "size": self.header.size,
             "channels": self.header.channels.len(),
             "tile": self.header.tile,
             "tiles": self.header.grid().count(),
             "evaluator": self.prepared.evaluator.name(),
             "features": features.collect::<Vec<_>>(),
-            "spectra": plan::table_bounds(self.prepared),
+            "spectra": facts::table_bounds(self.prepared),
+            "storage_buffers": self.storage_buffers(),
             "primitives": self.prepared.accel.primitives.len(),
             "bvh_nodes": self.prepared.accel.nodes.len(),
             "emitters": self.prepared.emitters.len(),
@@ -220,7 +237,19 @@ impl Plan<'_> {
             "paths_per_s": self.paths_per_s(),
             "samples": self.samples,
             "predicted_s": self.predicted_s(),
-        })
+        });
+        if self.args.parts {
+            facts["parts"] = facts::table(&self.on_device()).iter().map(facts::PartRow::json).collect();
+        }
+        facts
+    }
+
+    /// Storage buffers that a kernel binds at most.
+    fn storage_buffers(&self) -> u32 {
+        let scene = self.on_device();
+        let kernels = scene.kernels(EvaluateShape::of(self.prepared, true));
+        // Texts that do not parse are refused where they are compiled.
+        kernels.all().filter_map(|source| storage_buffers(source).ok()).max().unwrap_or(0)
     }
 
     fn describe(&self) -> String {
@@ -241,7 +270,8 @@ impl Plan<'_> {
             p.emitters.len()
         );
         text += &format!("evaluator {}\n", p.evaluator.name());
-        let lines = plan::feature_lines(p, &self.waves);
+        text += &format!("kernels   bind {} storage buffers at most\n", self.storage_buffers());
+        let lines = facts::parts(&self.on_device());
         for (title, used) in [("used", true), ("left out", false)] {
             for (i, line) in lines.iter().filter(|l| l.used == used).enumerate() {
                 text += &format!("{:9} {} ({})\n", if i == 0 { title } else { "" }, line.name, line.effect);
@@ -296,6 +326,10 @@ impl Plan<'_> {
                 );
             }
             _ => text += "time      unknown without a device\n",
+        }
+        if self.args.parts {
+            text += "parts     used; what each adds to kernels, stages of generate, buffers, records of a path, words of its state\n";
+            facts::table(&self.on_device()).iter().for_each(|row| text += &row.line());
         }
         text
     }

@@ -9,14 +9,14 @@ use serde_json::{Value, json};
 use super::Output;
 use super::output::say;
 use crate::cube::{Cube, Existing, Progress, reduction};
-use crate::files::format_bytes;
+use crate::files::{format_bytes, shown};
+use crate::preview::Status;
 use crate::render::job::Job;
 use crate::render::plan;
-use crate::render::schedule::{Event, PREVIEW_PIXELS, Status, Summary};
-use crate::render::worker::check_interrupt;
+use crate::render::schedule::{Event, PREVIEW_PIXELS, Summary};
 use crate::{Error, Result};
 
-/// Epochs below which an error estimate is only rough (DESIGN section 8).
+/// Epochs below which an error estimate is only rough: it is itself one from so few values.
 const ROUGH_BELOW: u32 = 8;
 /// Without a bar: lines about an epoch come at most this often, and some line at least this often.
 const LINE_EVERY: Duration = Duration::from_secs(1);
@@ -38,7 +38,7 @@ pub fn watched<T>(json: bool, work: impl FnOnce(Steps) -> Result<T>) -> Result<T
             bar.set_length(all);
             bar.set_position(done);
         }
-        check_interrupt(&interrupt)
+        interrupt.check()
     });
     if let Some(bar) = &bar {
         bar.finish_and_clear();
@@ -131,7 +131,7 @@ impl<'a> Reporter<'a> {
         self.emit(
             "start",
             json!({
-                "scene": job.scene.file, "scene_digest": job.scene.digest, "output": job.output, "seed": job.seed,
+                "scene": shown(&job.scene.file), "scene_digest": job.scene.digest, "output": shown(&job.output), "seed": job.seed,
                 "size": [width, height], "channels": channels, "tile": tile, "disk_bytes": disk,
                 "tiles": job.tiles.as_ref().map(|tiles| [tiles.start, tiles.end]), "samples_asked": job.stop.samples, "samples_limit": samples_limit,
                 "time_limit_s": job.stop.time.map(|t| t.as_secs_f64()), "error_limit": job.stop.error,
@@ -216,7 +216,7 @@ impl<'a> Reporter<'a> {
         };
         let status = &summary.status;
         let mut done = fields(status);
-        done["output"] = json!(job.output);
+        done["output"] = json!(shown(&job.output));
         done["exposure_ev"] = json!(summary.exposure);
         if job.profile {
             done["profile"] = profile_fields(&summary);
@@ -243,7 +243,7 @@ impl<'a> Reporter<'a> {
 
     /// What an interrupted render leaves behind.
     fn interrupted(&self, job: &Job) -> String {
-        let goes_on = matches!(job.existing, Existing::Resume | Existing::Join);
+        let goes_on = job.existing == Existing::Resume;
         let found = Cube::open(&job.output).and_then(|cube| cube.progress()).ok();
         let Some(progress) = found.filter(|found| self.merged || (goes_on && found.tiles_started > 0)) else {
             return "interrupted before anything was rendered".into();

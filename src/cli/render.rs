@@ -9,6 +9,8 @@ use super::progress::Reporter;
 use super::scene::SceneArgs;
 use super::sinks::Sinks;
 use crate::cube::Existing;
+use crate::files::output::real_path;
+use crate::format::png::KEPT;
 use crate::gpu::adapter::Selection;
 use crate::render::job::{Job, Preview, StopRule};
 use crate::render::schedule;
@@ -49,7 +51,7 @@ pub struct Args {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub spp: Option<u32>,
 
-    /// Stop after this time, e.g. 90s, 10m or 1.5h
+    /// Stop after this time, e.g. 90s, 10m, 2min or 1.5h
     ///
     /// Seconds where there is no unit. An epoch that would not finish in time is not started.
     #[arg(long, value_name = "TIME", value_parser = parse_time)]
@@ -79,17 +81,19 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
 
-    /// Go on with OUT.zarr, which an earlier render of the same scene and settings has begun
+    /// Go on with OUT.zarr, which an earlier render of the same scene and settings has begun; begin it where there is none
     ///
     /// To finish what was interrupted, or to add samples. Every tile is compared with its checksums first; one that is
     /// damaged is rendered again, with a warning. Everything that decides the values must be as it was (scene, --set, --size,
-    /// --tile, --seed); limits, devices, memory and preview may differ.
+    /// --tile, --seed); limits, devices, memory and preview may differ. What others have put into the store, such as notes
+    /// among its attributes, stays. Cubes of format 1 and copies without .spectile can be read, not gone on with.
     #[arg(long, conflicts_with = "overwrite")]
     pub resume: bool,
 
     /// Replace OUT.zarr if it exists
     ///
-    /// Only a Spectile cube that nobody works on is ever replaced; any other folder or file is refused.
+    /// Only a Spectile cube that nobody works on is ever replaced; any other folder or file is refused, and so is a cube in
+    /// which others have put something.
     #[arg(long)]
     pub overwrite: bool,
 
@@ -114,7 +118,7 @@ pub struct Args {
     #[arg(long, value_name = "all|N|LIST", default_value = "all")]
     pub devices: Selection,
 
-    /// Memory to use on each device, such as 512MiB, 2GiB, 1.5GB or a number of bytes; else what is worth using
+    /// Memory to use on each device, such as 512MiB, 2G, 1.5GB or a number of bytes; else what is worth using
     ///
     /// It covers all that Spectile holds there: the scene, the paths under way, a tile or several with all channels, and
     /// two transfers. A small budget makes small steps and changes no bit of the cube; what does not fit at all is refused,
@@ -123,6 +127,9 @@ pub struct Args {
     pub memory: Option<u64>,
 
     /// Keep a picture of the cube as it grows (PNG, 8-bit sRGB)
+    ///
+    /// A new file, or a PNG picture that is there already and is replaced; through a link the file behind it. It is written
+    /// again and again, so pipes and devices are refused.
     #[arg(long, value_name = "FILE.png")]
     pub preview: Option<PathBuf>,
 
@@ -140,6 +147,12 @@ pub struct Args {
     /// the address that is printed holds a token, without which nothing is answered. docs/http.md is for scripts.
     #[arg(long, value_name = "IP:PORT", value_parser = super::view::parse_address)]
     pub listen: Option<SocketAddr>,
+
+    /// A name by which a proxy is reached that passes requests on to the page of --listen: NAME or NAME:PORT (repeatable)
+    ///
+    /// With it every request needs the token that is printed, also from this machine. docs/http.md has more.
+    #[arg(long, value_name = "NAME", requires = "listen", value_parser = super::view::parse_host)]
+    pub public_host: Vec<String>,
 
     /// Stream the picture to tev, an image viewer, usually at 127.0.0.1:14158
     ///
@@ -166,20 +179,27 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     if args.exposure.is_some() && args.preview.is_none() && args.listen.is_none() {
         return Err(Error::Usage("--exposure is that of --preview or --listen, and neither is there".into()));
     }
+    if let Some(preview) = &args.preview {
+        KEPT.check_target(preview)?;
+        args.scene.refuse_as_output(preview)?;
+        if real_path(preview) == real_path(&args.output) {
+            let what = "the cube and --preview cannot have one name";
+            return Err(Error::Usage(format!("{}: {what}", preview.display())));
+        }
+    }
     let interrupt = super::interrupt::watch()?;
     let scene = args.scene.load()?;
     let mut reporter = Reporter::new(args.quiet, output);
     for warning in &scene.warnings {
         reporter.warn(warning)?;
     }
-    let sinks = Sinks::start(args, &interrupt, &mut reporter)?;
+    let sinks = Sinks::start(args, &mut reporter)?;
     let job = Job {
         output: args.output.clone(),
-        existing: match (args.resume, args.overwrite, &args.tiles) {
-            (true, ..) => Existing::Resume,
-            (_, true, _) => Existing::Replace,
-            (.., Some(_)) => Existing::Join,
-            _ => Existing::Refuse,
+        existing: match args.overwrite {
+            true => Existing::Replace,
+            false if args.resume || args.tiles.is_some() => Existing::Resume,
+            false => Existing::Refuse,
         },
         tiles: args.tiles.clone(),
         seed: args.seed,
@@ -199,16 +219,29 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     reporter.finish(&job, summary)
 }
 
-/// A duration as a number of seconds, or with a unit s, m or h.
+/// A duration: seconds, or numbers with units, such as 10m, 2 min or 1h30m.
 pub(super) fn parse_time(text: &str) -> std::result::Result<Duration, String> {
-    let explain = || "a time is a positive number with s, m or h, such as 90s, 10m or 1.5h".to_owned();
-    let (number, unit) = match text.char_indices().next_back() {
-        Some((last, 's')) => (&text[..last], 1.0),
-        Some((last, 'm')) => (&text[..last], 60.0),
-        Some((last, 'h')) => (&text[..last], 3600.0),
-        _ => (text, 1.0),
-    };
-    let seconds = number.trim_end().parse::<f64>().map_err(|_| explain())? * unit;
+    let explain = || "a time is a positive number with s, min or h, such as 90s, 10m, 2min or 1.5h".to_owned();
+    let is_number = |c: char| c.is_ascii_digit() || c == '.';
+    let mut rest = text.trim();
+    let mut seconds = 0.0;
+    // A number alone is seconds, also one with an exponent.
+    if let Ok(alone) = rest.parse::<f64>() {
+        (seconds, rest) = (alone, "");
+    }
+    while !rest.is_empty() {
+        let (number, unit) = rest.split_at(rest.find(|c| !is_number(c)).unwrap_or(rest.len()));
+        let unit = unit.trim_start();
+        let (unit, after) = unit.split_at(unit.find(|c: char| !c.is_ascii_alphabetic()).unwrap_or(unit.len()));
+        let factor = match unit {
+            "s" | "sec" | "second" | "seconds" => 1.0,
+            "m" | "min" | "minute" | "minutes" => 60.0,
+            "h" | "hr" | "hour" | "hours" => 3600.0,
+            _ => return Err(explain()),
+        };
+        seconds += number.parse::<f64>().map_err(|_| explain())? * factor;
+        rest = after.trim_start();
+    }
     if seconds > 0.0 { Duration::try_from_secs_f64(seconds).map_err(|_| explain()) } else { Err(explain()) }
 }
 
@@ -257,10 +290,23 @@ mod tests {
 
     #[test]
     fn times_have_units() {
-        for (text, seconds) in [("90", 90.0), ("90s", 90.0), ("10m", 600.0), ("1.5h", 5400.0), ("0.5 s", 0.5)] {
+        for (text, seconds) in [
+            ("90", 90.0),
+            ("90s", 90.0),
+            ("10m", 600.0),
+            ("1.5h", 5400.0),
+            ("0.5 s", 0.5),
+            ("2min", 120.0),
+            ("2 minutes", 120.0),
+            ("3hr", 10_800.0),
+            ("1h30m", 5400.0),
+            ("1 h 5 sec", 3605.0),
+        ] {
             assert_eq!(parse_time(text), Ok(Duration::from_secs_f64(seconds)), "{text}");
         }
-        for bad in ["", "m", "0", "-5s", "nan", "inf", "5d", "1e300h", "10m30"] {
+        for bad in
+            ["", "m", "0", "-5s", "nan", "inf", "5d", "1e300h", "10m30", "1.2.3s", "2ms", "9999999999999999999999s"]
+        {
             assert!(parse_time(bad).unwrap_err().contains("1.5h"), "{bad}");
         }
     }

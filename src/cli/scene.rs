@@ -1,9 +1,10 @@
 //! The arguments that choose a scene and change it.
 
-use std::path::PathBuf;
+use std::fs;
+use std::path::{Path, PathBuf};
 
-use crate::Result;
 use crate::scene::{self, Scene};
+use crate::{Error, Result, files};
 
 /// Arguments of every command that reads a scene.
 #[derive(Debug, clap::Args)]
@@ -50,6 +51,37 @@ impl SceneArgs {
             overrides.push(("film.height".into(), height.to_string()));
         }
         scene::load(&self.scene, &overrides)
+    }
+}
+
+impl SceneArgs {
+    /// Refuses an output that would take the place of the scene, or of a file that it names.
+    pub fn refuse_as_output(&self, output: &Path) -> Result<()> {
+        let Ok(output_there) = fs::canonicalize(output) else { return Ok(()) };
+        let mut named = vec![self.scene.clone()];
+        let mut note = |text: &str| named.push(files::parent(&self.scene).join(text));
+        let scene = fs::read_to_string(&self.scene).unwrap_or_default();
+        if let Ok(scene) = scene.parse::<toml::Table>() {
+            scene.values().for_each(|value| each_text(value, &mut note));
+        }
+        self.overrides.iter().for_each(|(_, value)| note(value.trim_matches(['"', '\''])));
+        match named.iter().any(|file| fs::canonicalize(file).is_ok_and(|file| file == output_there)) {
+            true => Err(Error::Usage(format!(
+                "{}: the scene is read from this file; choose another name",
+                output.display()
+            ))),
+            false => Ok(()),
+        }
+    }
+}
+
+/// Calls `each` with every text in a TOML value.
+fn each_text(value: &toml::Value, each: &mut impl FnMut(&str)) {
+    match value {
+        toml::Value::String(text) => each(text),
+        toml::Value::Array(items) => items.iter().for_each(|item| each_text(item, each)),
+        toml::Value::Table(fields) => fields.values().for_each(|field| each_text(field, each)),
+        _ => {}
     }
 }
 

@@ -6,6 +6,7 @@ use serde_json::json;
 
 use super::Output;
 use crate::cube::{Cube, Existing, integrate};
+use crate::files::shown;
 use crate::format::response;
 use crate::{Error, Result};
 
@@ -92,7 +93,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     output.event(
         "done",
         json!({
-            "cube": args.output,
+            "cube": shown(&args.output),
             "bands": made.channels().names,
             "left_out": findings.left_out.iter().map(left_out).collect::<Vec<_>>(),
             "too_wide": findings.wide.iter().map(wide).collect::<Vec<_>>(),

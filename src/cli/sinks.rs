@@ -2,14 +2,12 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 
 use super::progress::Reporter;
 use super::render::Args;
 use super::view;
 use crate::cube::Cube;
 use crate::preview::{Feed, Source, Stage, Tev};
-use crate::render::worker::Interrupt;
 use crate::{Error, Result};
 
 /// The feed of a render and those that read it; none where nobody is to watch.
@@ -21,7 +19,7 @@ pub struct Sinks {
 }
 
 impl Sinks {
-    pub fn start(args: &Args, interrupt: &Interrupt, reporter: &mut Reporter) -> Result<Sinks> {
+    pub fn start(args: &Args, reporter: &mut Reporter) -> Result<Sinks> {
         if args.listen.is_none() && args.tev.is_none() {
             return Ok(Sinks {
                 feed: None,
@@ -30,12 +28,7 @@ impl Sinks {
                 tev: None,
             });
         }
-        let end = Arc::clone(&interrupt.end);
-        // As if by Ctrl-C, unless a signal has asked for the end already.
-        let stop = move || {
-            let _ = end.compare_exchange(0, signal_hook::consts::SIGINT as usize, Ordering::SeqCst, Ordering::SeqCst);
-        };
-        let feed = Feed::of_render(Arc::clone(&interrupt.report), stop);
+        let feed = Feed::of_render();
         let name = view::name_of(&args.output);
         #[cfg(not(feature = "web"))]
         if args.listen.is_some() {
@@ -49,9 +42,11 @@ impl Sinks {
 
                 use crate::preview::web::{About, Server};
                 let about = About { name: name.clone(), exposure: args.exposure, controls: true };
-                let server = Server::start(address, Arc::clone(&feed), about)?;
+                let server = Server::start_behind(&args.public_host, address, Arc::clone(&feed), about)?;
                 let fields = json!({ "url": server.url(), "token": server.token() });
-                reporter.listening(&format!("watch it at {}", server.url()), fields)?;
+                let through = view::through_proxies(&args.public_host, server.token());
+                let through = through.map_or_else(String::new, |through| format!("; {}", through.trim_end()));
+                reporter.listening(&format!("watch it at {}{through}", server.url()), fields)?;
                 Ok(server)
             })
             .transpose()?;

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use super::Output;
 use crate::cube::Cube;
-use crate::files::write_atomically;
 use crate::format::{plot, text};
 use crate::{Error, Result};
 
@@ -32,11 +31,20 @@ pub struct Args {
     pub y: u32,
 
     /// Draw the spectrum too, as SVG: every channel a level over its own interval
+    ///
+    /// An earlier plot of that name is replaced; nothing else is.
     #[arg(long, value_name = "FILE.svg")]
     pub plot: Option<PathBuf>,
 }
 
 pub fn run(args: &Args, output: &Output) -> Result<()> {
+    if let Some(path) = &args.plot {
+        plot::PLOT.check_target(path)?;
+        if plot::PLOT.is_standard_output(path) {
+            let what = "--plot: the values go to the standard output; give the plot a file of its own";
+            return Err(Error::Usage(what.into()));
+        }
+    }
     let cube = Cube::open(&args.cube)?;
     let Some(spectrum) = cube.spectrum(args.x, args.y)? else {
         let what = format!("pixel {} {} has no samples yet; try again when its tile is rendered", args.x, args.y);
@@ -47,7 +55,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         let samples = cube.samples(cube.grid().tile_at(args.x, args.y))?;
         let title = format!("{}, column {}, row {}, {samples} samples", args.cube.display(), args.x, args.y);
         let plot = plot::spectrum(cube.channels(), &spectrum, errors.as_deref(), &title)?;
-        write_atomically(path, plot.as_bytes())?;
+        plot::PLOT.write(path, plot.as_bytes())?;
     }
     output.text(&text::spectrum_csv(cube.channels(), &spectrum, errors.as_deref()))
 }

@@ -54,12 +54,12 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         return Ok(());
     }
     let interrupt = super::interrupt::watch()?;
+    if let Some(folder) = &args.output {
+        report::make_folder(folder, "stress")?;
+    }
     let gpu = Arc::new(Gpu::open_all(&args.devices)?.remove(0));
     let circumstances = Circumstances::now(&gpu);
     let machine = Machine { gpu, devices: args.devices.clone(), interrupt };
-    if let Some(folder) = &args.output {
-        report::make_folder(folder)?;
-    }
     output.event("start", json!({ "cases": cases.len(), "measured": circumstances.facts() }))?;
     let mut outcomes = Vec::new();
     for case in cases {

@@ -10,10 +10,10 @@ use super::Output;
 use super::output::say;
 use super::scene::SceneArgs;
 use crate::cube::{Cube, Existing, Header, check_target, make, now_s};
+use crate::device::prepared::Prepared;
 use crate::files::{self, format_bytes};
 use crate::render::job::StopRule;
 use crate::render::plan;
-use crate::render::prepare::Prepared;
 use crate::slurm::client::{self, Tried};
 use crate::slurm::{self, Job, Request, Submitted, script};
 use crate::{Error, Result};
@@ -67,9 +67,16 @@ pub struct Args {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub tasks: Option<u32>,
 
-    /// GPUs of every task; 0: none, software devices render on the CPUs of the task
+    /// GPUs of every task; 0: none, software devices render on the CPUs of the task (as if with --allow-software)
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(..=64))]
     pub gpus_per_task: u32,
+
+    /// Use software devices on nodes where no GPU is found
+    ///
+    /// By default such a node is refused, since it renders at a hundredth of a GPU's speed, if that: the one that is asked at
+    /// once, if any is free, and each that gets a task. Those are not used again.
+    #[arg(long)]
+    pub allow_software: bool,
 
     /// The cluster's partition, if not its default one
     #[arg(long, value_name = "NAME")]
@@ -93,7 +100,8 @@ pub struct Args {
     #[arg(long, value_name = "SIZE", value_parser = files::parse_bytes)]
     pub memory: Option<u64>,
 
-    /// Go on with OUT.zarr, which an earlier `submit` or `render` of the same scene and settings has begun
+    /// Go on with OUT.zarr, which an earlier `submit` or `render` of the same scene and settings has begun; begin it where
+    /// there is none
     ///
     /// Only tasks with tiles that lack samples are submitted.
     #[arg(long)]
@@ -143,6 +151,13 @@ fn parse_options(text: &str) -> std::result::Result<Options, String> {
 
 pub fn run(args: &Args, output: &Output) -> Result<()> {
     let cube = std::path::absolute(&args.output).map_err(|error| Error::storage(&args.output, error))?;
+    let program = std::env::current_exe().map_err(|error| Error::storage(Path::new("spectile"), error))?;
+    for path in [&cube, &args.scene.scene, &program] {
+        if path.to_str().is_none() {
+            let what = "is not UTF-8, which neither batch scripts nor Slurm's options take; give it another name";
+            return Err(Error::Usage(format!("{} {what}", path.display())));
+        }
+    }
     let scene = args.scene.load()?;
     for warning in &scene.warnings {
         say(&format!("warning: {warning}"));
@@ -160,13 +175,15 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     let existing = if args.resume { Existing::Resume } else { Existing::Refuse };
     let tiles = header.grid().count();
     check_target(&cube, &header, existing, &(0..tiles))?;
+    slurm::SCRIPT.check_target(&slurm::script_path(&cube))?;
+    slurm::SUMMARY.check_target(&slurm::summary_path(&cube))?;
     if args.resume {
         refuse_while_at_work(&cube)?;
     }
 
     let job = Job {
         version: env!("CARGO_PKG_VERSION").into(),
-        program: std::env::current_exe().map_err(|error| Error::storage(Path::new("spectile"), error))?,
+        program,
         scene: scene.file.clone(),
         scene_digest: scene.digest.clone(),
         overrides: args.scene.overrides.clone(),
@@ -175,6 +192,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         seed: args.seed,
         uncertainty: args.uncertainty,
         memory: args.memory,
+        allow_software: args.allow_software || args.gpus_per_task == 0,
         samples,
         tiles,
         tasks: tasks(args, &header, samples)?,
@@ -187,7 +205,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         },
         submitted: Vec::new(),
     };
-    let wanted = if args.resume { lacking(&job, &cube)? } else { (0..job.tasks).collect() };
+    let wanted = if args.resume && cube.exists() { lacking(&job, &cube)? } else { (0..job.tasks).collect() };
     if wanted.is_empty() {
         output.event("done", facts(&job, &cube, "", None, args.dry_run))?;
         let all = format!("all {tiles} tiles have {samples} samples per pixel");
@@ -284,7 +302,7 @@ impl Submission {
     fn submit_to(&mut self, cube: &Cube, script: &Path, output: &Output) -> Result<()> {
         let job = &mut self.job;
         job.write(&self.cube)?;
-        files::write_atomically(script, self.text.as_bytes())?;
+        slurm::SCRIPT.write(script, self.text.as_bytes())?;
         let probe = cube.hold_probe()?;
         let tried =
             client::try_on_a_node(&script::probe_options(job), PROBE_S, &job.program, &["array-probe"], &self.cube)?;
@@ -332,14 +350,15 @@ fn as_on_node(code: i32, cube: &Path, what: String) -> Error {
             let what = what.strip_prefix(&format!("{}: ", cube.display())).unwrap_or(&what);
             Error::storage(cube, format!("a node of the cluster says: {what}"))
         }
+        3 => Error::NoDevice(format!("a node of the cluster says: {what}")),
         _ => Error::Usage(format!("a node of the cluster says: {what}")),
     }
 }
 
 fn facts(job: &Job, cube: &Path, tasks: &str, submitted: Option<&Submitted>, dry_run: bool) -> serde_json::Value {
     json!({
-        "output": cube,
-        "script": slurm::script_path(cube),
+        "output": files::shown(cube),
+        "script": files::shown(&slurm::script_path(cube)),
         "samples": job.samples,
         "tiles": job.tiles,
         "tasks": job.tasks,

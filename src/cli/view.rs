@@ -28,6 +28,13 @@ pub struct Args {
     #[arg(long, value_name = "IP:PORT", default_value = "127.0.0.1:8090", value_parser = parse_address)]
     pub listen: SocketAddr,
 
+    /// A name by which a proxy is reached that passes requests on to this page: NAME or NAME:PORT (repeatable)
+    ///
+    /// Without it the page answers to its own addresses only. With it every request needs the token that is printed, also from
+    /// this machine, since whoever comes through the proxy seems to. docs/http.md has more.
+    #[arg(long, value_name = "NAME", value_parser = parse_host)]
+    pub public_host: Vec<String>,
+
     /// Exposure that the page begins with, in EV; otherwise automatic
     #[arg(long, value_name = "EV", value_parser = super::parse_exposure, allow_hyphen_values = true)]
     pub exposure: Option<f64>,
@@ -45,7 +52,6 @@ pub fn name_of(cube: &std::path::Path) -> String {
 
 #[cfg(feature = "web")]
 pub fn run(args: &Args, output: &Output) -> Result<()> {
-    use std::sync::atomic::Ordering;
     use std::time::Duration;
 
     use serde_json::json;
@@ -57,15 +63,20 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     let feed = Feed::of_cube(Cube::open(&args.cube)?);
     follow(Cube::open(&args.cube)?, &feed)?;
     let about = web::About { name: name_of(&args.cube), exposure: args.exposure, controls: false };
-    let server = web::Server::start(args.listen, feed, about)?;
+    let server = web::Server::start_behind(&args.public_host, args.listen, feed, about)?;
     output.event("listening", json!({ "url": server.url(), "token": server.token() }))?;
     output.text(&format!("{}: look at {} (Ctrl-C ends it)\n", args.cube.display(), server.url()))?;
-    loop {
-        match interrupt.end.load(Ordering::SeqCst) {
-            0 => std::thread::sleep(Duration::from_millis(50)),
-            signal => return Err(crate::Error::Interrupted { signal: signal as i32 }),
-        }
+    if let Some(through) = through_proxies(&args.public_host, server.token()) {
+        output.text(&through)?;
     }
+    interrupt.sleep(Duration::MAX)
+}
+
+/// Where the page is to be had through proxies, if there are any.
+#[cfg(feature = "web")]
+pub fn through_proxies(hosts: &[String], token: &str) -> Option<String> {
+    let each: Vec<String> = hosts.iter().map(|host| format!("{host}/?token={token}")).collect();
+    (!each.is_empty()).then(|| format!("through a proxy: {}\n", each.join(", ")))
 }
 
 #[cfg(not(feature = "web"))]
@@ -82,6 +93,16 @@ pub fn without_web() -> crate::Error {
     )
 }
 
+/// The name of a proxy, as `Host` has it.
+pub fn parse_host(text: &str) -> std::result::Result<String, String> {
+    let (name, port) = text.rsplit_once(':').map_or((text, None), |(name, port)| (name, Some(port)));
+    let is_name = !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || "-._".contains(c));
+    match is_name && port.is_none_or(|port| port.parse::<u16>().is_ok_and(|port| port > 0)) {
+        true => Ok(text.to_owned()),
+        false => Err("a host is NAME or NAME:PORT, without http:// and path, such as render.example.org".into()),
+    }
+}
+
 /// An address to listen on.
 pub fn parse_address(text: &str) -> std::result::Result<SocketAddr, String> {
     let text = text.strip_prefix("localhost:").map_or_else(|| text.to_owned(), |port| format!("127.0.0.1:{port}"));
@@ -91,6 +112,16 @@ pub fn parse_address(text: &str) -> std::result::Result<SocketAddr, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn names_of_proxies() {
+        for good in ["render.example.org", "localhost:8443", "a-b_c.d"] {
+            assert_eq!(parse_host(good), Ok(good.to_owned()));
+        }
+        for bad in ["", "http://render.example.org", "a/b", "a:", "a:0", "a:b", "a b", "*"] {
+            assert!(parse_host(bad).unwrap_err().contains("render.example.org"), "{bad}");
+        }
+    }
 
     #[test]
     fn addresses() {

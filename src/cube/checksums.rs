@@ -1,30 +1,14 @@
-//! Checksums of files: those of the tiles stand in their journals, those of what is written once in a list of its own.
+//! Checksums of files: those of the tiles stand in their journals, that of the record in itself.
 
-use std::fmt;
 use std::fs;
 use std::io::{self, Write};
 use std::path::Path;
 
 use xxhash_rust::xxh3::{Xxh3, xxh3_128};
 
-/// The list of the files that are written when a cube is made and never again: `checksum  path`, a line each.
+/// The list of the files that are written when a cube is made and never again, in cubes of version 1: `checksum  path`, a
+/// line each.
 pub(super) const FILE: &str = ".spectile/checksums";
-
-/// A list that is being made.
-#[derive(Default)]
-pub(super) struct List(Vec<(String, u128)>);
-
-impl List {
-    pub fn add(&mut self, name: &str, bytes: &[u8]) {
-        self.0.push((name.to_owned(), of(bytes)));
-    }
-}
-
-impl fmt::Display for List {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.iter().try_for_each(|(name, sum)| writeln!(f, "{sum:032x}  {name}"))
-    }
-}
 
 /// Names in the list of the cube at `path` whose files are not what the list says, and how many names it has.
 pub(super) fn wrong_files(path: &Path) -> io::Result<(Vec<String>, u64)> {

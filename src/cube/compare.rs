@@ -15,7 +15,7 @@ pub struct Comparison {
     pub pixels_in_all: u64,
 }
 
-/// The metrics of DESIGN section 8 for one channel, x against ref; means over pixels.
+/// What is told of one channel, x against ref (docs/METHOD.md, Errors); means over pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChannelMetrics {
     /// mean of x, W m⁻² sr⁻¹ nm⁻¹.

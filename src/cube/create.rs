@@ -5,14 +5,22 @@ use std::io::ErrorKind;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use serde_json::Value;
-
-use super::checksums;
 use super::lock::TileLock;
-use super::metadata::Header;
-use super::store::{Cube, PRIVATE, Part, read_group};
+use super::metadata::{self, Header};
+use super::restore::{coordinates, pretty};
+use super::store::{Cube, Origin, PRIVATE, Part, RECORD};
 use super::writer::BATCH_BYTES;
+use crate::files::output::{Product, only_holds, put_folder};
 use crate::{Error, Result, files};
+
+/// A cube, as far as its name goes; what may be replaced is [`check_removable`]'s to say.
+const CUBE: Product = Product {
+    name: "a cube",
+    extensions: &["zarr"],
+    is_stream: false,
+    is_folder: true,
+    check: |path| is_cube_alone(path),
+};
 
 /// What may be at the path of a cube that is going to be written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,8 +30,6 @@ pub enum Existing {
     /// A cube, which is replaced; or nothing.
     Replace,
     /// The same cube, which is gone on with; or nothing.
-    Join,
-    /// The same cube, which is gone on with.
     Resume,
 }
 
@@ -72,7 +78,7 @@ pub(super) fn open_or_create(path: &Path, header: &Header, existing: Existing, t
     write_empty(aside.path(), header).map_err(|error| aside.error(error))?;
     let target = aside.target.clone();
     match aside.finish()? {
-        Finished::InPlace => Ok(Cube::new(&target, header.clone())),
+        Finished::InPlace => Ok(Cube::made(&target, header.clone())),
         // Another process was quicker. Joining is what was asked for, or it is an error.
         Finished::Taken(error) => match find_way(path, header, existing, tiles)? {
             Way::GoOn(cube) => Ok(*cube),
@@ -86,8 +92,8 @@ pub(super) fn open_or_create(path: &Path, header: &Header, existing: Existing, t
 pub(super) struct Aside {
     target: PathBuf,
     temporary: PathBuf,
-    /// Held on the cube that is replaced.
-    old: Option<TileLock>,
+    /// Held on the cube that is replaced; one without `.spectile` cannot be worked on.
+    old: Option<Option<TileLock>>,
     finished: bool,
 }
 
@@ -122,7 +128,8 @@ impl Aside {
             Way::GoOn(cube) => return Ok(Begun::Found(cube)),
             Way::Create(target) => (target, None),
             Way::Replace(target) => {
-                let lock = TileLock::take(&target, &target.join(PRIVATE), ALL_TILES)?;
+                let private = target.join(PRIVATE);
+                let lock = private.is_dir().then(|| TileLock::take(&target, &private, ALL_TILES)).transpose()?;
                 (target, Some(lock))
             }
         };
@@ -155,15 +162,8 @@ impl Aside {
     fn finish(mut self) -> Result<Finished> {
         let failed = |error: std::io::Error| Error::storage(&self.target, format!("cannot be created: {error}"));
         if self.old.is_some() {
-            let replaced = files::sibling(&self.target, "replaced");
-            fs::rename(&self.target, &replaced).map_err(failed)?;
-            if let Err(error) = fs::rename(&self.temporary, &self.target) {
-                fs::rename(&replaced, &self.target).map_err(failed)?;
-                return Err(failed(error));
-            }
+            put_folder(&self.temporary, &self.target, true).map_err(failed)?;
             self.finished = true;
-            let removed = fs::remove_dir_all(&replaced);
-            removed.map_err(|error| Error::storage(&replaced, format!("cannot be removed: {error}")))?;
         } else {
             match fs::rename(&self.temporary, &self.target) {
                 Ok(()) => self.finished = true,
@@ -190,10 +190,10 @@ impl Drop for Aside {
 /// What there is at `path`, and whether it is what may be there.
 fn find_way(path: &Path, header: &Header, existing: Existing, tiles: &Range<u32>) -> Result<Way> {
     header.validate().map_err(|what| Error::Usage(format!("{}: {what}", path.display())))?;
-    let there = match fs::symlink_metadata(path) {
+    let there = match fs::metadata(path) {
         Ok(_) => true,
         Err(error) if error.kind() == ErrorKind::NotFound => false,
-        Err(error) => return Err(Error::storage(path, error)),
+        Err(error) => return Err(Error::storage(path, format!("cannot be created: {error}"))),
     };
     let count = u64::from(tiles.end - tiles.start);
     match existing {
@@ -203,13 +203,13 @@ fn find_way(path: &Path, header: &Header, existing: Existing, tiles: &Range<u32>
             Err(Error::Usage(format!("{} {what}", path.display())))
         }
         Existing::Replace if there => {
+            check_removable(path)?;
             // A link to a cube on another disk stays a link.
             let target = fs::canonicalize(path).unwrap_or(path.to_owned());
-            check_removable(&target)?;
             check_space(path, files::parent(&target), header, count, files::bytes_of(&target))?;
             Ok(Way::Replace(target))
         }
-        Existing::Join | Existing::Resume if there => {
+        Existing::Resume if there => {
             let cube = open_same(path, header)?;
             let missing = tiles.clone().filter(|&tile| !cube.part_path(Part::Radiance, tile).exists()).count();
             if missing > 0 {
@@ -218,32 +218,28 @@ fn find_way(path: &Path, header: &Header, existing: Existing, tiles: &Range<u32>
             }
             Ok(Way::GoOn(Box::new(cube)))
         }
-        Existing::Resume => {
-            let what = "there is no such cube to go on with; leave --resume out to begin it";
-            Err(Error::Usage(format!("{}: {what}", path.display())))
-        }
-        Existing::Refuse | Existing::Replace | Existing::Join => {
-            let folder = files::parent(path);
-            if !folder.is_dir() {
-                let what = format!("cannot be created: there is no folder {}", folder.display());
-                return Err(Error::storage(path, what));
-            }
-            check_space(path, folder, header, count, 0)?;
-            Ok(Way::Create(path.to_owned()))
+        Existing::Refuse | Existing::Replace | Existing::Resume => {
+            let target = CUBE.new_target(path)?;
+            check_space(path, files::parent(&target), header, count, 0)?;
+            Ok(Way::Create(target))
         }
     }
 }
 
 /// The cube at `path`, if it is what rendering into `header` would have made; else the difference is named.
 pub(super) fn open_same(path: &Path, header: &Header) -> Result<Cube> {
-    let group = read_group(path)?;
-    let cube = Cube::from_group(path, &group)?;
-    let made_by = group["attributes"]["spectile_version"].as_str().unwrap_or("another version");
+    let cube = Cube::open(path)?;
+    if let Some(why) = cube.is_only_read() {
+        let what = "cannot be gone on with, only read";
+        let instead = "render the scene into a new cube with another -o";
+        return Err(Error::Usage(format!("{}: {what}: {why}; {instead}", path.display())));
+    }
     let version = env!("CARGO_PKG_VERSION");
-    let difference = if made_by == version {
-        cube.header().difference(header)
-    } else {
-        Some(format!("version: it was begun by Spectile {made_by}, this is {version}"))
+    let difference = match cube.origin() {
+        Origin::Record { made_by } | Origin::DamagedRecord { made_by } if made_by != version => {
+            Some(format!("version: it was begun by Spectile {made_by}, this is {version}"))
+        }
+        _ => cube.header().difference(header),
     };
     match difference {
         None => Ok(cube),
@@ -256,27 +252,18 @@ pub(super) fn open_same(path: &Path, header: &Header) -> Result<Cube> {
 
 /// Writes metadata, coordinates and empty folders of a cube into a new folder, durably.
 fn write_empty(folder: &Path, header: &Header) -> Result<()> {
-    let mut checksums = checksums::List::default();
-    let mut write = |name: &str, bytes: &[u8]| -> Result<()> {
+    let write = |name: &str, bytes: &[u8]| -> Result<()> {
         let path = folder.join(name);
         files::make_folder_durably(files::parent(&path))
             .and_then(|()| files::write_durably(&path, bytes))
-            .map_err(|error| Error::storage(&path, format!("{name} cannot be written: {error}")))?;
-        checksums.add(name, bytes);
-        Ok(())
+            .map_err(|error| files::output::cannot_write(&path, &error))
     };
     let (group, arrays) = header.metadata()?;
-    for (name, array) in arrays {
-        write(&format!("{name}/zarr.json"), pretty(&array).as_bytes())?;
+    for (name, array) in &arrays {
+        write(&format!("{name}/zarr.json"), pretty(array).as_bytes())?;
     }
-    let channels = &header.channels;
-    let each = |value: &dyn Fn(usize) -> f64| doubles((0..channels.len()).map(value));
-    write("wavelength/c/0", &each(&|k| channels.centre(k)))?;
-    write("wavelength_bounds/c/0/0", &doubles(channels.bounds.iter().flatten().copied()))?;
-    write("response_integral/c/0", &each(&|k| channels.integral(k)))?;
-    for (axis, name) in ["x", "y"].into_iter().enumerate() {
-        let centres = (0..header.size[axis]).map(|i| f64::from(header.origin[axis]) + f64::from(i) + 0.5);
-        write(&format!("{name}/c/0"), &doubles(centres))?;
+    for (name, bytes) in coordinates(header) {
+        write(name, &bytes)?;
     }
     for private in ["aside", "journal"] {
         let path = folder.join(PRIVATE).join(private);
@@ -284,41 +271,27 @@ fn write_empty(folder: &Path, header: &Header) -> Result<()> {
         made.map_err(|error| Error::storage(&path, format!("cannot be created: {error}")))?;
     }
     write("zarr.json", pretty(&group).as_bytes())?;
-    let list = folder.join(checksums::FILE);
-    files::write_durably(&list, checksums.to_string().as_bytes())
-        .map_err(|error| Error::storage(&list, format!("cannot be written: {error}")))
+    write(RECORD, header.record().as_bytes())
 }
 
-fn pretty(value: &Value) -> String {
-    format!("{value:#}\n")
-}
-
-fn doubles(values: impl Iterator<Item = f64>) -> Vec<u8> {
-    values.flat_map(f64::to_le_bytes).collect()
-}
-
-/// Whether `path` is a Spectile cube and nothing else, so that replacing it loses nobody's other files.
+/// Refuses to replace what is not a Spectile cube and nothing else, so that nobody's other files are lost.
 fn check_removable(path: &Path) -> Result<()> {
-    let refuse = |what: String| {
-        Error::Usage(format!("{}: --overwrite replaces nothing but Spectile cubes: {what}", path.display()))
-    };
-    if !path.exists() {
-        return Err(refuse("this is a link to nothing".into()));
-    }
-    let group = read_group(path).map_err(|error| match error {
-        Error::Storage { what, .. } => refuse(format!("this {what}")),
-        error => error,
+    is_cube_alone(path).map_err(|what| {
+        let only = "--overwrite replaces nothing but Spectile cubes";
+        Error::Usage(format!("{}: {only}: this one {what}", path.display()))
+    })
+}
+
+fn is_cube_alone(path: &Path) -> std::result::Result<(), String> {
+    let cube = Cube::open(path).map_err(|error| match error {
+        Error::Storage { what, .. } => what,
+        error => error.to_string(),
     })?;
-    let arrays = group["consolidated_metadata"]["metadata"].as_object();
-    let known =
-        |name: &str| [PRIVATE, "zarr.json"].contains(&name) || arrays.is_some_and(|arrays| arrays.contains_key(name));
-    for entry in fs::read_dir(path).map_err(|error| Error::storage(path, error))? {
-        let name = entry.map_err(|error| Error::storage(path, error))?.file_name();
-        if !name.to_str().is_some_and(known) {
-            return Err(refuse(format!("this one also holds `{}`, which is no part of it", name.display())));
-        }
-    }
-    Ok(())
+    let arrays = metadata::arrays(cube.header(), cube.layout());
+    let known = |name: &str| [PRIVATE, "zarr.json"].contains(&name) || arrays.iter().any(|(array, _)| *array == name);
+    only_holds(path, known)?;
+    let folders = arrays.iter().map(|(array, _)| path.join(array)).filter(|folder| folder.is_dir());
+    folders.into_iter().try_for_each(|folder| only_holds(&folder, |name| ["zarr.json", "c"].contains(&name)))
 }
 
 /// Refuses what would not fit into `folder`: a cube with `tiles` more tiles than there are, `freed` bytes of the one it replaces

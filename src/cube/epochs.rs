@@ -1,4 +1,5 @@
-//! How the samples of a pixel come in epochs: 1, 1, 2, 4, … then full ones for ever (DESIGN section 2).
+//! How the samples of a pixel come in epochs: 1, 1, 2, 4, … then full ones for ever. The first picture comes at once, and
+//! a long render spends little on transfers.
 
 /// Samples of epoch `index` when a full one has `full`: 1, 1, 2, 4, … full/2, then `full` for ever.
 pub fn epoch_samples(index: u32, full: u32) -> u32 {

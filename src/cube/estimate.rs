@@ -1,4 +1,4 @@
-//! The error estimate: how far the epochs of each tile spread, gathered while merging (DESIGN section 8).
+//! The error estimate: how far the epochs of each tile spread, gathered while merging (docs/METHOD.md, Errors).
 
 use super::journal::Record;
 

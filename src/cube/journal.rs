@@ -1,4 +1,4 @@
-//! The journal of a tile: what its files must be, one fixed-size record for every commit (DESIGN section 4).
+//! The journal of a tile: what its files must be, one fixed-size record for every commit.
 //!
 //! A record, little-endian: magic, tile, K, samples per pixel, index of the last epoch merged, suffix of the files aside,
 //! five 128-bit checksums (one per [`Part`], zero for one that the cube has not), per channel Σ M2 and Σ mean² for the error estimate, and the

@@ -10,6 +10,7 @@ use std::time::{Duration, SystemTime};
 
 use super::grid::Rect;
 use super::map::Chunk;
+use super::metadata::Layout;
 use super::store::{Cube, Part};
 use super::writer::Writer;
 use super::{BLOCK, Grid};
@@ -70,12 +71,7 @@ impl<'a> Look<'a> {
         {
             return Ok(Some(file));
         }
-        let path = self.cube.part_path(part, tile);
-        match File::open(&path) {
-            Ok(file) => Ok(Some(file)),
-            Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
-            Err(error) => Err(Error::storage(&path, error)),
-        }
+        self.cube.open_part(part, tile)
     }
 
     /// Reads `values` from the file of a tile, `offset` bytes from its start; false before its first unit.
@@ -103,9 +99,8 @@ impl<'a> Look<'a> {
     }
 
     fn chunk(&self, part: Part, tile: u32) -> Result<Option<Chunk>> {
-        let (cube, grid) = (self.cube, self.cube.grid());
         let Some(file) = self.open(part, tile)? else { return Ok(None) };
-        Chunk::map(&file, &cube.part_path(part, tile), grid.rect(tile), grid.tile, cube.channels().len()).map(Some)
+        self.cube.map(&file, &self.cube.part_path(part, tile), tile).map(Some)
     }
 
     /// The K channels of a pixel, in one contiguous read; `None` before the first unit of its tile. The pixel must lie in
@@ -114,7 +109,7 @@ impl<'a> Look<'a> {
         let (grid, channels) = (self.cube.grid(), self.cube.channels().len());
         let tile = grid.tile_at(x, y);
         let rect = grid.rect(tile);
-        let pixel = u64::from(y - rect.y0) * u64::from(grid.tile[0]) + u64::from(x - rect.x0);
+        let pixel = self.cube.layout().pixel(grid.tile, x - rect.x0, y - rect.y0) as u64;
         let mut spectrum = vec![0.0f32; channels];
         let there = self.read::<f32>(Part::Radiance, tile, pixel * channels as u64 * 4, &mut spectrum)?;
         Ok(there.then_some(spectrum))
@@ -189,28 +184,71 @@ impl<'a> Look<'a> {
     fn blocks(&self, channels: &[usize], pixels: Rect, mut each: impl FnMut(u32, u32, u32, &[f32])) -> Result<()> {
         let grid = self.cube.grid();
         let [columns, rows] = grid.tile_blocks();
-        let plane = columns as usize * rows as usize;
-        let mut planes = vec![0.0f32; plane * channels.len()];
-        let mut values = vec![0.0; channels.len()];
+        let blocks = columns as usize * rows as usize;
+        // [block in the order of the file][channel].
+        let mut values = vec![0.0f32; blocks * channels.len()];
+        let mut scratch = Vec::new();
         for tile in grid.tiles_in(pixels) {
             let Some(mut file) = self.open(Part::Overview, tile)? else { continue };
-            let mut rest = &mut planes[..];
-            // Channels that follow each other lie together in the file.
-            for run in channels.chunk_by(|a, b| a + 1 == *b) {
-                let (these, others) = rest.split_at_mut(run.len() * plane);
-                self.read_from(&mut file, Part::Overview, tile, (run[0] * plane * 4) as u64, these)?;
-                rest = others;
-            }
+            self.read_blocks(&mut file, tile, channels, blocks, &mut scratch, &mut values)?;
             let part = grid.rect(tile);
-            for (i, (y, x)) in (0..rows).flat_map(|y| (0..columns).map(move |x| (y, x))).enumerate() {
+            for (y, x) in (0..rows).flat_map(|y| (0..columns).map(move |x| (y, x))) {
                 let (x0, y0) = (part.x0 + x * BLOCK, part.y0 + y * BLOCK);
                 let block = Rect { x0, y0, x1: x0 + BLOCK, y1: y0 + BLOCK };
                 // At the picture's edge a block has fewer pixels.
                 let Some(block) = block.intersection(&part).filter(|b| b.intersection(&pixels).is_some()) else {
                     continue;
                 };
-                values.iter_mut().zip(planes.chunks_exact(plane)).for_each(|(value, plane)| *value = plane[i]);
-                each(x0, y0, block.pixels() as u32, &values);
+                let i = self.cube.layout().pixel([columns, rows], x, y);
+                each(x0, y0, block.pixels() as u32, &values[i * channels.len()..][..channels.len()]);
+            }
+        }
+        Ok(())
+    }
+
+    /// Reads `channels` of all blocks of a tile to [block][channel]. Only what is wanted is read, unless that is most of the
+    /// file.
+    fn read_blocks(
+        &self,
+        file: &mut File,
+        tile: u32,
+        channels: &[usize],
+        blocks: usize,
+        scratch: &mut Vec<f32>,
+        values: &mut [f32],
+    ) -> Result<()> {
+        let (all, wanted) = (self.cube.channels().len(), channels.len());
+        let mut read =
+            |first: usize, values: &mut [f32]| self.read_from(file, Part::Overview, tile, (first * 4) as u64, values);
+        match self.cube.layout() {
+            Layout::Columns if 2 * wanted > all => {
+                scratch.resize(blocks * all, 0.0);
+                read(0, scratch)?;
+                for (values, spectrum) in values.chunks_exact_mut(wanted).zip(scratch.chunks_exact(all)) {
+                    values.iter_mut().zip(channels).for_each(|(value, &k)| *value = spectrum[k]);
+                }
+            }
+            Layout::Columns => {
+                for (block, mut values) in values.chunks_exact_mut(wanted).enumerate() {
+                    // Channels that follow each other lie together in the file.
+                    for run in channels.chunk_by(|a, b| a + 1 == *b) {
+                        let (these, others) = values.split_at_mut(run.len());
+                        read(block * all + run[0], these)?;
+                        values = others;
+                    }
+                }
+            }
+            Layout::Rows => {
+                scratch.resize(blocks * wanted, 0.0);
+                let mut rest = &mut scratch[..];
+                for run in channels.chunk_by(|a, b| a + 1 == *b) {
+                    let (these, others) = rest.split_at_mut(run.len() * blocks);
+                    read(run[0] * blocks, these)?;
+                    rest = others;
+                }
+                for (k, plane) in scratch.chunks_exact(blocks).enumerate() {
+                    plane.iter().enumerate().for_each(|(block, &value)| values[block * wanted + k] = value);
+                }
             }
         }
         Ok(())

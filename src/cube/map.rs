@@ -1,39 +1,38 @@
 //! Chunks mapped into memory: the only place that maps files.
 
 use std::fs::File;
-use std::io::ErrorKind;
 use std::path::Path;
 
 use memmap2::Mmap;
 
 use super::grid::Rect;
+use super::metadata::Layout;
 use crate::{Error, Result};
 
 #[cfg(target_endian = "big")]
 compile_error!("chunks are little-endian floats that are used in place; a big-endian host would need to swap them");
 
-/// The radiance of one tile, mapped from its file: [tile_h][tile_w][K] f32, the channel fastest. Pixels beyond the
-/// edge of the picture are NaN. It stays what it was when the tile is merged again.
+/// The radiance of one tile, mapped from its file: [tile_w][tile_h][K] f32, column by column, the channel fastest
+/// ([tile_h][tile_w][K] in cubes of version 1). Pixels beyond the edge of the picture are NaN. It stays what it was when the
+/// tile is merged again.
 pub struct Chunk {
     map: Mmap,
     rect: Rect,
-    tile_width: usize,
+    tile: [u32; 2],
     channels: usize,
+    layout: Layout,
 }
 
 impl Chunk {
-    /// Maps the chunk at `path`; `None` where the file does not exist. A file of another size is damage.
-    pub(super) fn open(path: &Path, rect: Rect, tile: [u32; 2], channels: usize) -> Result<Option<Chunk>> {
-        let file = match File::open(path) {
-            Ok(file) => file,
-            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
-            Err(error) => return Err(Error::storage(path, format!("cannot be opened: {error}"))),
-        };
-        Chunk::map(&file, path, rect, tile, channels).map(Some)
-    }
-
     /// Maps a chunk that is open; `path` is what errors name.
-    pub(super) fn map(file: &File, path: &Path, rect: Rect, tile: [u32; 2], channels: usize) -> Result<Chunk> {
+    pub(super) fn map(
+        file: &File,
+        path: &Path,
+        rect: Rect,
+        tile: [u32; 2],
+        channels: usize,
+        layout: Layout,
+    ) -> Result<Chunk> {
         // SAFETY: a mapped file must not change or shrink underneath. Spectile never writes to a chunk that bears its
         // name: a new one is written aside and renamed over it, and the old one lives on for as long as it is mapped.
         let map = unsafe { Mmap::map(file) }.map_err(|error| Error::storage(path, format!("cannot map: {error}")))?;
@@ -41,12 +40,12 @@ impl Chunk {
         if bytes != expected {
             return Err(Error::storage(path, format!("is damaged: {bytes} bytes long, not {expected}")));
         }
-        Ok(Chunk { map, rect, tile_width: tile[0] as usize, channels })
+        Ok(Chunk { map, rect, tile, channels, layout })
     }
 
-    /// All values, [tile_h][tile_w][K].
+    /// All values, as they lie in the file.
     pub fn values(&self) -> &[f32] {
-        // A mapping starts at a page, so it is aligned, and `open` has checked the length.
+        // A mapping starts at a page, so it is aligned, and `map` has checked the length.
         bytemuck::cast_slice(&self.map)
     }
 
@@ -62,13 +61,17 @@ impl Chunk {
 
     /// The K channels of a pixel of the picture that lies in this tile.
     pub fn spectrum(&self, x: u32, y: u32) -> &[f32] {
-        let pixel = (y - self.rect.y0) as usize * self.tile_width + (x - self.rect.x0) as usize;
-        &self.values()[pixel * self.channels..][..self.channels]
+        &self.spectra_from(x, y)[..self.channels]
     }
 
-    /// All values from the spectrum of a pixel of this tile on: those of the pixels to its right follow, K each.
+    /// All values from the spectrum of a pixel of this tile on. That of the pixel to its right begins [`Chunk::column_step`]
+    /// values later.
     pub(super) fn spectra_from(&self, x: u32, y: u32) -> &[f32] {
-        let pixel = (y - self.rect.y0) as usize * self.tile_width + (x - self.rect.x0) as usize;
+        let pixel = self.layout.pixel(self.tile, x - self.rect.x0, y - self.rect.y0);
         &self.values()[pixel * self.channels..]
+    }
+
+    pub(super) fn column_step(&self) -> usize {
+        self.layout.pixel(self.tile, 1, 0) * self.channels
     }
 }

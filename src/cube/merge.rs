@@ -5,6 +5,7 @@ use std::io::Write;
 use super::grid::Rect;
 use super::journal::Record;
 use super::map::Chunk;
+use super::metadata::Layout;
 use super::{BLOCK, Grid};
 use crate::spectral::colour::Projection;
 use crate::{Error, Result};
@@ -46,10 +47,11 @@ pub fn merge_bytes(header: &super::Header) -> u64 {
     let buffer = (BUFFER_BYTES as u64).max(4 * channels);
     // Error sums and a spectrum of squares: two f64 a channel as they were, and two as they become.
     let sums = 4 * 8 * channels;
-    buffer + sums + 12 * grid.tile_pixels() as u64 + (8 * blocks_x + 4 * blocks_x * blocks_y) * channels
+    buffer + sums + 12 * grid.tile_pixels() as u64 + (8 * blocks_y + 4 * blocks_x * blocks_y) * channels
 }
 
-/// One pass over the pixels of a unit: the new chunk streams out, and all that is derived from it is gathered.
+/// One pass over the pixels of a unit, in the order of the file: the new chunk streams out, and all that is derived from it is
+/// gathered.
 pub(super) struct Fold<'a> {
     grid: Grid,
     rect: Rect,
@@ -61,9 +63,9 @@ pub(super) struct Fold<'a> {
     pub square: Vec<f64>,
     /// [tile_h][tile_w][3].
     pub preview: Vec<f32>,
-    /// Sums of the blocks in the current row of blocks, [blocks_x][K].
+    /// Sums of the blocks in the current column of blocks, [blocks_y][K].
     block_sums: Vec<f64>,
-    /// [K][blocks_y][blocks_x].
+    /// [blocks_x][blocks_y][K].
     pub overview: Vec<f32>,
 }
 
@@ -78,39 +80,42 @@ impl<'a> Fold<'a> {
             distance: vec![0.0; channels],
             square: vec![0.0; channels],
             preview: vec![f32::NAN; grid.tile_pixels() * 3],
-            block_sums: vec![0.0; blocks_x * channels],
+            block_sums: vec![0.0; blocks_y * channels],
             overview: vec![f32::NAN; blocks_x * blocks_y * channels],
         }
     }
 
-    /// Folds `unit` into `old` with the weight n_unit / (n_old + n_unit) and writes the new chunk.
+    /// Folds `unit`, whose pixels lie as in `layout`, into `old` with the weight n_unit / (n_old + n_unit) and writes the new
+    /// chunk.
     pub fn run(
         &mut self,
         old: Option<&Chunk>,
         unit: &[f32],
+        layout: Layout,
         weight: f64,
         file: &mut impl Write,
     ) -> std::io::Result<()> {
         let channels = self.channels;
-        let [tile_width, tile_height] = self.grid.tile.map(|n| n as usize);
-        let [width, height] = [self.rect.width(), self.rect.height()].map(|n| n as usize);
-        let buffered = (BUFFER_BYTES / (4 * channels)).clamp(1, tile_width * tile_height);
+        let [tile_width, tile_height] = self.grid.tile;
+        let [width, height] = [self.rect.width(), self.rect.height()];
+        let buffered = (BUFFER_BYTES / (4 * channels)).clamp(1, self.grid.tile_pixels());
         let mut buffer: Vec<f32> = Vec::with_capacity(buffered * channels);
-        for y in 0..tile_height {
-            for x in 0..tile_width {
+        for x in 0..tile_width {
+            for y in 0..tile_height {
                 let start = buffer.len();
-                let values = (y * tile_width + x) * channels..(y * tile_width + x + 1) * channels;
                 if x < width && y < height {
-                    let new = &unit[values.clone()];
+                    let new = &unit[layout.pixel(self.grid.tile, x, y) * channels..][..channels];
                     match old {
                         None => buffer.extend_from_slice(new),
                         Some(old) => {
                             buffer.resize(start + channels, 0.0);
                             let mean = &mut buffer[start..];
-                            merge_pixel(&old.values()[values], new, weight, mean, &mut self.distance);
+                            let pixel = Layout::Columns.pixel(self.grid.tile, x, y);
+                            let old = &old.values()[pixel * channels..][..channels];
+                            merge_pixel(old, new, weight, mean, &mut self.distance);
                         }
                     }
-                    self.gather(x, y, &buffer[start..]);
+                    self.gather(x as usize, y as usize, &buffer[start..]);
                 } else {
                     buffer.resize(start + channels, f32::NAN);
                 }
@@ -119,8 +124,8 @@ impl<'a> Fold<'a> {
                     buffer.clear();
                 }
             }
-            if y < height && ((y + 1) % BLOCK as usize == 0 || y + 1 == height) {
-                self.finish_blocks(y);
+            if x < width && ((x + 1) % BLOCK == 0 || x + 1 == width) {
+                self.finish_blocks(x as usize);
             }
         }
         file.write_all(bytemuck::cast_slice(&buffer))
@@ -130,7 +135,7 @@ impl<'a> Fold<'a> {
     fn gather(&mut self, x: usize, y: usize, mean: &[f32]) {
         let pixel = y * self.grid.tile[0] as usize + x;
         self.preview[pixel * 3..][..3].copy_from_slice(&self.projection.rgb(mean));
-        let block = &mut self.block_sums[x / BLOCK as usize * self.channels..][..self.channels];
+        let block = &mut self.block_sums[y / BLOCK as usize * self.channels..][..self.channels];
         for ((&mean, square), block) in mean.iter().zip(&mut self.square).zip(block) {
             let mean = f64::from(mean);
             *square += mean * mean;
@@ -138,18 +143,17 @@ impl<'a> Fold<'a> {
         }
     }
 
-    /// Turns the sums of the row of blocks that ends with row `y` of the tile into means.
-    fn finish_blocks(&mut self, y: usize) {
+    /// Turns the sums of the column of blocks that ends with column `x` of the tile into means.
+    fn finish_blocks(&mut self, x: usize) {
         let block = BLOCK as usize;
-        let [blocks_x, blocks_y] = self.grid.tile_blocks().map(|n| n as usize);
-        let (row, rows) = (y / block, y % block + 1);
-        for (column, sums) in self.block_sums.chunks_exact_mut(self.channels).enumerate() {
-            let columns = (self.rect.width() as usize).saturating_sub(column * block).min(block);
-            if columns > 0 {
+        let (column, columns) = (x / block, x % block + 1);
+        let means = self.overview.chunks_exact_mut(self.block_sums.len()).nth(column).expect("a column of blocks");
+        let of_blocks = means.chunks_exact_mut(self.channels).zip(self.block_sums.chunks_exact_mut(self.channels));
+        for (row, (means, sums)) in of_blocks.enumerate() {
+            let rows = (self.rect.height() as usize).saturating_sub(row * block).min(block);
+            if rows > 0 {
                 let pixels = (rows * columns) as f64;
-                for (k, sum) in sums.iter().enumerate() {
-                    self.overview[(k * blocks_y + row) * blocks_x + column] = (sum / pixels) as f32;
-                }
+                means.iter_mut().zip(sums.iter()).for_each(|(mean, sum)| *mean = (sum / pixels) as f32);
             }
             sums.fill(0.0);
         }
@@ -171,7 +175,7 @@ impl<'a> Fold<'a> {
     }
 }
 
-/// Writes the standard errors of a tile's new means to `file`: of `unit`, the mean of the last of `epochs` equal epochs, and
+/// Writes the standard errors of a tile's new means to `file`: of `unit`, rows of pixels, the mean of the last of `epochs` equal epochs, and
 /// the mean and the standard error of those before it. With B epochs the variance of the mean is M2 / (B (B - 1)), M2 the
 /// sum that Welford's rule adds δ² (B - 1) / B to, δ the distance of the last epoch from the mean before it; so the standard
 /// error carries the sum from one epoch to the next. NaN below two epochs, and beyond the edge of the picture.
@@ -184,18 +188,21 @@ pub(super) fn write_standard_errors(
     unit: &[f32],
     file: &mut impl Write,
 ) -> std::io::Result<()> {
-    let [tile_width, tile_height] = grid.tile.map(|n| n as usize);
-    let buffered = (BUFFER_BYTES / (4 * channels)).clamp(1, tile_width * tile_height);
+    let buffered = (BUFFER_BYTES / (4 * channels)).clamp(1, grid.tile_pixels());
     let mut buffer: Vec<f32> = Vec::with_capacity(buffered * channels);
     let n = f64::from(epochs);
-    for pixel in 0..tile_width * tile_height {
-        let (x, y) = (pixel % tile_width, pixel / tile_width);
-        let is_inside = x < rect.width() as usize && y < rect.height() as usize;
-        let values = pixel * channels..(pixel + 1) * channels;
+    let [tile_width, tile_height] = grid.tile;
+    for (x, y) in (0..tile_width).flat_map(|x| (0..tile_height).map(move |y| (x, y))) {
+        let is_inside = x < rect.width() && y < rect.height();
+        let of = |layout: Layout| {
+            let pixel = layout.pixel(grid.tile, x, y);
+            pixel * channels..(pixel + 1) * channels
+        };
         match old {
             Some((mean, error)) if is_inside && epochs >= 2 => {
-                let before = mean.values()[values.clone()].iter().zip(&error.values()[values.clone()]);
-                buffer.extend(before.zip(&unit[values]).map(|((&mean, &error), &new)| {
+                let values = of(Layout::Columns);
+                let before = mean.values()[values.clone()].iter().zip(&error.values()[values]);
+                buffer.extend(before.zip(&unit[of(Layout::Rows)]).map(|((&mean, &error), &new)| {
                     let error = f64::from(error);
                     // The first of the epochs has no spread yet.
                     let spread = if epochs == 2 { 0.0 } else { error * error * (n - 1.0) * (n - 2.0) };

@@ -1,5 +1,7 @@
-//! What a cube says about itself: the header, and its form as Zarr v3 metadata with CF attributes.
+//! What a cube says about itself: the header, its form as Zarr v3 metadata with CF attributes, and the record under
+//! `.spectile/` by which Spectile knows it whatever others make of the attributes.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde_json::{Map, Value, json};
@@ -9,8 +11,36 @@ use crate::spectral::colour::{Projection, ProjectionKind};
 use crate::spectral::{Channels, Curve, Response};
 use crate::{Error, Result};
 
-/// The version of the layout, `spectile_format` among the attributes of the group.
-pub const FORMAT: u64 = 1;
+/// The version of the layout that is written, `spectile_format` among the attributes of the group.
+pub const FORMAT: u64 = 2;
+
+/// How the files of a tile are laid out in a version of the layout.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Layout {
+    /// Version 1: pixels row by row; `overview` channel by channel. Only read.
+    Rows,
+    /// Pixels column by column, in `overview` too, the channel fastest: array axes in reverse. An order that is its own
+    /// inverse, which programs that mistake a permutation for its inverse read right.
+    Columns,
+}
+
+impl Layout {
+    fn of_format(format: u64) -> Option<Layout> {
+        match format {
+            1 => Some(Layout::Rows),
+            FORMAT => Some(Layout::Columns),
+            _ => None,
+        }
+    }
+
+    /// The place in the file of the pixel in this column and row of a tile of this size.
+    pub fn pixel(self, [width, height]: [u32; 2], x: u32, y: u32) -> usize {
+        match self {
+            Layout::Rows => y as usize * width as usize + x as usize,
+            Layout::Columns => x as usize * height as usize + y as usize,
+        }
+    }
+}
 
 /// Everything about a cube that is fixed when it is created.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,6 +60,9 @@ pub struct Header {
 
 /// The attribute of cubes with standard errors.
 pub(super) const UNCERTAINTY: &str = "uncertainty";
+
+/// Of a cube that was made of another one's channels: how.
+pub(super) const DERIVED: &str = "derived";
 
 /// Attributes of the group that the header's own fields make.
 const RESERVED: [&str; 9] = [
@@ -94,7 +127,10 @@ impl Header {
         };
         let names = names + self.channels.responses.iter().map(nodes).sum::<u64>();
         let coordinates = 32 * channels + 8 * (u64::from(self.size[0]) + u64::from(self.size[1]));
-        let metadata = FIXED_BLOCKS * BLOCK_BYTES + in_blocks(names) + in_blocks(coordinates) + 5 * rows * BLOCK_BYTES;
+        // The record has the names and nodes again, and bounds as text.
+        let record = in_blocks(names + 64 * channels);
+        let metadata =
+            FIXED_BLOCKS * BLOCK_BYTES + in_blocks(names) + record + in_blocks(coordinates) + 5 * rows * BLOCK_BYTES;
         tile.saturating_mul(tiles).saturating_add(metadata)
     }
 
@@ -197,12 +233,13 @@ impl Header {
         }
     }
 
-    /// The metadata of the group and, for readers that open an array by itself, of every array.
-    pub(super) fn metadata(&self) -> Result<(Value, Vec<(&'static str, Value)>)> {
-        let mut attributes = self.attributes.clone();
-        if let Some(name) = RESERVED.iter().find(|name| attributes.contains_key(**name)) {
+    /// The attributes of the group: numbers, texts and lists of them, which netCDF can hold too. What is neither is written as
+    /// JSON.
+    fn group_attributes(&self) -> Result<Map<String, Value>> {
+        if let Some(name) = RESERVED.iter().find(|name| self.attributes.contains_key(**name)) {
             return Err(Error::Internal(format!("the attribute `{name}` of a cube is made from its header")));
         }
+        let mut attributes = self.attributes.clone();
         attributes.extend([
             ("Conventions".into(), json!("CF-1.11")),
             ("title".into(), json!("Spectral image")),
@@ -211,12 +248,20 @@ impl Header {
             ("epoch".into(), json!(self.epoch)),
             ("origin".into(), json!(self.origin)),
             ("channel_names".into(), json!(self.channels.names)),
-            ("false_colour".into(), json!(self.channels.false_colour)),
         ]);
+        if let Some(rgb) = self.channels.false_colour {
+            attributes.insert("false_colour".into(), json!(rgb));
+        }
         if !self.channels.responses.is_empty() {
             attributes.insert("responses".into(), json!(self.channels.responses));
         }
-        let arrays = arrays(self);
+        Ok(plain_attributes(attributes))
+    }
+
+    /// The metadata of the group and, for readers that open an array by itself, of every array.
+    pub(super) fn metadata(&self) -> Result<(Value, Vec<(&'static str, Value)>)> {
+        let attributes = self.group_attributes()?;
+        let arrays = arrays(self, Layout::Columns);
         let consolidated: Map<String, Value> = arrays.iter().map(|(name, v)| ((*name).into(), v.clone())).collect();
         let group = json!({
             "zarr_format": 3,
@@ -227,13 +272,73 @@ impl Header {
         Ok((group, arrays))
     }
 
-    /// The header of the cube at `path` from its group's metadata and the values of `wavelength_bounds`, which
-    /// `read_bounds(K)` gets.
+    /// All that makes a cube what it is, as JSON that only Spectile writes.
+    pub(super) fn record(&self) -> String {
+        let Channels { bounds, names, false_colour, responses } = &self.channels;
+        let content = json!({
+            "spectile_format": FORMAT,
+            "spectile_version": env!("CARGO_PKG_VERSION"),
+            "size": self.size,
+            "origin": self.origin,
+            "tile": self.tile,
+            "epoch": self.epoch,
+            "channels": { "bounds": bounds, "names": names, "false_colour": false_colour, "responses": responses },
+            "attributes": self.attributes,
+        });
+        let checksum = record_checksum(&content);
+        let about = "what Spectile knows this cube by, whatever others write into its metadata";
+        format!("{:#}\n", json!({ "about": about, "checksum": checksum, "cube": content }))
+    }
+
+    /// The cube at `path` from [`Header::record`].
+    pub(super) fn from_record(path: &Path, text: &str) -> Result<Recorded> {
+        let Ok(record) = serde_json::from_str::<Value>(text) else { return Ok(Recorded::Damaged) };
+        let content = &record["cube"];
+        if record["checksum"] != record_checksum(content) {
+            return Ok(Recorded::Damaged);
+        }
+        match content["spectile_format"].as_u64() {
+            Some(FORMAT) => {}
+            format => return Err(unknown_format(path, format.unwrap_or(0))),
+        }
+        fn take<T: serde::de::DeserializeOwned>(value: &Value) -> Option<T> {
+            serde_json::from_value(value.clone()).ok()
+        }
+        let read = || {
+            let channels = &content["channels"];
+            Some(Header {
+                size: take(&content["size"])?,
+                origin: take(&content["origin"])?,
+                tile: take(&content["tile"])?,
+                epoch: take(&content["epoch"])?,
+                channels: Channels {
+                    bounds: take(&channels["bounds"])?,
+                    names: take(&channels["names"])?,
+                    false_colour: take(&channels["false_colour"])?,
+                    responses: take(&channels["responses"])?,
+                },
+                attributes: take(&content["attributes"])?,
+            })
+        };
+        let header = read().filter(|header| header.validate().is_ok());
+        let made_by = content["spectile_version"].as_str().unwrap_or_default().to_owned();
+        Ok(header.map_or(Recorded::Damaged, |header| Recorded::Sound { header: Box::new(header), made_by }))
+    }
+
+    /// The header of the cube at `path` from its group's metadata alone, and how it is laid out. `read_bounds(K)` gets the
+    /// values of `wavelength_bounds`.
     pub(super) fn parse(
         path: &Path,
         group: &Value,
         read_bounds: impl FnOnce(usize) -> Result<Vec<[f64; 2]>>,
-    ) -> Result<Header> {
+    ) -> Result<(Header, Layout)> {
+        let layout = match group["attributes"]["spectile_format"].as_u64() {
+            Some(format) => Layout::of_format(format).ok_or_else(|| unknown_format(path, format))?,
+            None => {
+                let what = "is a Zarr store, but not a Spectile cube: it has no attribute `spectile_format`";
+                return Err(Error::storage(path, what));
+            }
+        };
         let damaged = |what: &str| Error::storage(path, format!("is a damaged Spectile cube: its zarr.json {what}"));
         let stored = &group["consolidated_metadata"]["metadata"];
         let numbers = |value: &Value| -> Option<Vec<u32>> {
@@ -247,10 +352,11 @@ impl Header {
         };
 
         let mut attributes = group["attributes"].as_object().cloned().unwrap_or_default();
+        structure_attributes(&mut attributes);
         let mut take = |name: &str| attributes.remove(name).unwrap_or_default();
         let names = serde_json::from_value(take("channel_names")).map_err(|_| damaged("has no `channel_names`"))?;
-        let false_colour =
-            serde_json::from_value(take("false_colour")).map_err(|_| damaged("has no `false_colour`"))?;
+        let false_colour = serde_json::from_value(take("false_colour"))
+            .map_err(|_| damaged("has a `false_colour` that is not three channels"))?;
         let epoch = serde_json::from_value(take("epoch")).map_err(|_| damaged("has no `epoch`"))?;
         let origin = serde_json::from_value(take("origin")).map_err(|_| damaged("has no `origin`"))?;
         let responses = attributes.remove("responses").unwrap_or_else(|| json!([]));
@@ -269,17 +375,90 @@ impl Header {
         };
         header.validate().map_err(|what| damaged(&format!("is not valid: {what}")))?;
 
-        // What is read and written as raw files must be laid out as this version does it, to the last codec.
-        for (name, array) in arrays(&header) {
-            let same = ["shape", "data_type", "chunk_grid", "chunk_key_encoding", "fill_value", "codecs"]
-                .iter()
-                .all(|key| array[key] == stored[name][key]);
-            if !same {
+        // What is read as raw files must be laid out as this version does it, to the last codec.
+        for (name, array) in arrays(&header, layout).iter().filter(|(name, _)| is_raw(name)) {
+            if !same_layout(array, &stored[*name]) {
                 return Err(damaged(&format!("describes a `{name}` of another layout")));
             }
         }
-        Ok(header)
+        Ok((header, layout))
     }
+}
+
+/// What [`Header::from_record`] finds.
+pub(super) enum Recorded {
+    Sound {
+        header: Box<Header>,
+        /// The version of Spectile that made the cube.
+        made_by: String,
+    },
+    Damaged,
+}
+
+/// Whatever the order of keys and the spaces between them.
+fn record_checksum(content: &Value) -> String {
+    fn sorted(value: &Value) -> Value {
+        match value {
+            Value::Object(fields) => {
+                let in_order: BTreeMap<&String, Value> = fields.iter().map(|(k, v)| (k, sorted(v))).collect();
+                Value::Object(in_order.into_iter().map(|(k, v)| (k.clone(), v)).collect())
+            }
+            Value::Array(items) => Value::Array(items.iter().map(sorted).collect()),
+            other => other.clone(),
+        }
+    }
+    format!("{:032x}", super::checksums::of(sorted(content).to_string().as_bytes()))
+}
+
+fn unknown_format(path: &Path, format: u64) -> Error {
+    let what = format!("is a Spectile cube of format {format}; this version reads the formats 1 and {FORMAT}");
+    Error::storage(path, what)
+}
+
+/// Attributes whose values are made of others, so that netCDF could hold them as text only.
+const STRUCTURED: [&str; 3] = ["settings", "responses", DERIVED];
+
+/// The same without values that netCDF cannot hold.
+pub fn plain_attributes(mut attributes: Map<String, Value>) -> Map<String, Value> {
+    for value in attributes.values_mut() {
+        let is_plain = |value: &Value| value.is_number() || value.is_string();
+        match value {
+            Value::Bool(is) => *value = json!(u8::from(*is)),
+            Value::Number(_) | Value::String(_) => {}
+            // Empty lists have no type, and mixed ones none in common.
+            Value::Array(items)
+                if !items.is_empty()
+                    && items.iter().all(|item| is_plain(item) && item.is_string() == items[0].is_string()) => {}
+            _ => *value = json!(value.to_string()),
+        }
+    }
+    attributes
+}
+
+/// What [`plain_attributes`] did, undone where it is known.
+fn structure_attributes(attributes: &mut Map<String, Value>) {
+    for name in STRUCTURED {
+        if let Some(value) = attributes.get_mut(name)
+            && let Some(Ok(structured)) = value.as_str().map(serde_json::from_str::<Value>)
+        {
+            *value = structured;
+        }
+    }
+    if attributes.get(UNCERTAINTY) == Some(&json!(1)) {
+        attributes.insert(UNCERTAINTY.into(), Value::Bool(true));
+    }
+}
+
+/// Whether the files of an array are read and written as they are.
+pub(super) fn is_raw(name: &str) -> bool {
+    super::store::Part::ALL.iter().any(|part| part.name() == name)
+}
+
+/// Whether the files of an array hold the same in both descriptions.
+pub(super) fn same_layout(a: &Value, b: &Value) -> bool {
+    ["shape", "data_type", "chunk_grid", "chunk_key_encoding", "fill_value", "codecs"]
+        .iter()
+        .all(|key| a[key] == b[key])
 }
 
 /// Dotted key and both values of the first difference between two JSON values.
@@ -294,8 +473,8 @@ fn first_difference(key: &str, a: &Value, b: &Value) -> Option<(String, String, 
     }
 }
 
-/// The arrays of DESIGN section 4, by name.
-fn arrays(header: &Header) -> Vec<(&'static str, Value)> {
+/// The arrays of a cube, by name.
+pub(super) fn arrays(header: &Header, layout: Layout) -> Vec<(&'static str, Value)> {
     let channels = header.channels.len() as u64;
     let [width, height] = header.size.map(u64::from);
     let [tile_width, tile_height] = header.tile.map(u64::from);
@@ -315,7 +494,7 @@ fn arrays(header: &Header) -> Vec<(&'static str, Value)> {
         (
             "radiance",
             Array {
-                codecs: channel_fastest(),
+                codecs: channel_fastest(layout),
                 attributes: json!({
                     "long_name": "mean spectral radiance over the channel",
                     "units": radiance_units,
@@ -379,6 +558,7 @@ fn arrays(header: &Header) -> Vec<(&'static str, Value)> {
         (
             "overview",
             Array {
+                codecs: if layout == Layout::Rows { plain() } else { channel_fastest(layout) },
                 attributes: json!({ "long_name": "radiance, mean over blocks of 8 x 8 pixels", "units": radiance_units }),
                 ..Array::new("float32", &[channels, blocks_y, blocks_x], &["wavelength", "overview_y", "overview_x"])
             }
@@ -387,7 +567,7 @@ fn arrays(header: &Header) -> Vec<(&'static str, Value)> {
     ];
     if header.has_uncertainty() {
         let errors = Array {
-            codecs: channel_fastest(),
+            codecs: channel_fastest(layout),
             attributes: json!({
                 "long_name": "standard error of radiance, from the spread of equal epochs; NaN below two of them",
                 "units": radiance_units,
@@ -399,12 +579,20 @@ fn arrays(header: &Header) -> Vec<(&'static str, Value)> {
     arrays
 }
 
-/// `radiance` is encoded as [y, x, wavelength]: the chunk is the raw tile, a pixel's spectrum contiguous.
-fn channel_fastest() -> Value {
+/// The axes [wavelength, y, x] in another order: a chunk is the raw tile, a pixel's spectrum contiguous.
+fn channel_fastest(layout: Layout) -> Value {
+    let order = match layout {
+        Layout::Rows => [1, 2, 0],
+        Layout::Columns => [2, 1, 0],
+    };
     json!([
-        { "name": "transpose", "configuration": { "order": [1, 2, 0] } },
+        { "name": "transpose", "configuration": { "order": order } },
         { "name": "bytes", "configuration": { "endian": "little" } },
     ])
+}
+
+fn plain() -> Value {
+    json!([{ "name": "bytes", "configuration": { "endian": "little" } }])
 }
 
 /// The metadata of one array, made into a Zarr v3 document by naming its chunks.
@@ -425,7 +613,7 @@ impl Array {
             shape: shape.to_vec(),
             dimensions: dimensions.to_vec(),
             fill: json!("NaN"),
-            codecs: json!([{ "name": "bytes", "configuration": { "endian": "little" } }]),
+            codecs: plain(),
             attributes: json!({}),
         }
     }

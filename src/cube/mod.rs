@@ -1,5 +1,4 @@
-//! The working cube: a Zarr v3 store with raw, memory-mapped chunks that other tools can open at any moment (DESIGN
-//! section 4).
+//! The working cube: a Zarr v3 store with raw, memory-mapped chunks that other tools can open at any moment.
 //!
 //! A tile of pixels with all its channels is one chunk, and one file. Units (tile, epoch) are merged into it one at a
 //! time: the new chunk is written aside, journalled, and renamed over the old one, never changed in place. So are the
@@ -28,6 +27,7 @@ mod preview;
 #[cfg(all(test, unix))]
 mod protocol_tests;
 mod recover;
+mod restore;
 mod runs;
 mod sensor;
 mod store;
@@ -42,7 +42,7 @@ pub use grid::{Grid, Rect};
 pub use look::{Look, RegionMean, Seen, Window};
 pub use map::Chunk;
 pub use merge::{merge_bytes, merge_means};
-pub use metadata::{FORMAT, Header};
+pub use metadata::{FORMAT, Header, plain_attributes};
 pub use preview::reduction;
 pub use runs::{Run, RunFile, RunState, SlurmTask, Stand, Work, node_name, now_s};
 pub use sensor::{Findings, integrate};

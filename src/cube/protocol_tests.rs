@@ -49,7 +49,7 @@ fn unit(tile: u32, epoch: u32) -> Vec<f32> {
 
 /// Merges what is missing until every tile has `epochs` epochs, as a render would.
 fn work(path: &Path, epochs: u32, warn: &mut dyn FnMut(String)) -> Result<()> {
-    let cube = Writer::open(path, &header(), Existing::Join, 0..TILES, warn)?;
+    let cube = Writer::open(path, &header(), Existing::Resume, 0..TILES, warn)?;
     for epoch in 0..epochs {
         for tile in cube.tiles() {
             if epochs_in(cube.found()[tile as usize], 4) <= epoch {
@@ -348,7 +348,7 @@ fn who_has_lost_its_lock_stops() {
     let bench = Bench::new();
     let path = bench.cube();
     let open =
-        || Writer::open(&path, &header(), Existing::Join, 0..TILES, &mut |what| panic!("{what}")).expect("a cube");
+        || Writer::open(&path, &header(), Existing::Resume, 0..TILES, &mut |what| panic!("{what}")).expect("a cube");
     let first = open();
     // A lock file that was removed locks nobody out any more.
     fs::remove_file(path.join(".spectile/lock")).expect("removed");

@@ -1,5 +1,5 @@
-//! Putting a tile in order, under its lock: what a killed process, a full disk, a power cut or bit rot left of it
-//! (DESIGN section 4). Every step may be the last one and is done again by the next recovery.
+//! Putting a tile in order, under its lock: what a killed process, a full disk, a power cut or bit rot left of it.
+//! Every step may be the last one and is done again by the next recovery.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
@@ -155,7 +155,8 @@ fn rebuild(cube: &Cube, record: &Record, parts: &[Part], folders: &mut BTreeSet<
     let chunk =
         cube.chunk(tile)?.ok_or_else(|| Error::storage(&cube.part_path(Part::Radiance, tile), "has vanished"))?;
     let mut fold = Fold::new(grid, grid.rect(tile), cube.channels().len(), cube.projection());
-    fold.run(None, chunk.values(), 1.0, &mut std::io::sink()).map_err(|error| Error::storage(cube.path(), error))?;
+    fold.run(None, chunk.values(), cube.layout(), 1.0, &mut std::io::sink())
+        .map_err(|error| Error::storage(cube.path(), error))?;
     for &part in parts {
         let samples = record.samples.to_le_bytes();
         let bytes: &[u8] = match part {

@@ -247,7 +247,13 @@ impl Cube {
         let folder = self.private();
         let failed = |error| Error::storage(&folder, error);
         let mut runs = Vec::new();
-        for entry in fs::read_dir(&folder).map_err(failed)? {
+        let entries = match fs::read_dir(&folder) {
+            Ok(entries) => entries,
+            // A copy without it.
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(runs),
+            Err(error) => return Err(failed(error)),
+        };
+        for entry in entries {
             let entry = entry.map_err(failed)?;
             let name = entry.file_name();
             if !name.to_str().is_some_and(|name| name.starts_with("run-") && name.ends_with(".json")) {

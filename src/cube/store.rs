@@ -1,7 +1,7 @@
 //! The cube as a folder: opening and reading it.
 
-use std::fs;
-use std::io::ErrorKind;
+use std::fs::{self, File};
+use std::io::{ErrorKind, Read};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -12,13 +12,18 @@ use super::grid::Grid;
 use super::journal::Journal;
 use super::lock::{Probe, TileLock};
 use super::map::Chunk;
-use super::metadata::{FORMAT, Header};
+use super::metadata::{DERIVED, Header, Layout, Recorded};
 use crate::spectral::Channels;
 use crate::spectral::colour::Projection;
 use crate::{Error, Result, files};
 
 /// Folder of everything that is not plain Zarr.
 pub(super) const PRIVATE: &str = ".spectile";
+/// What the cube is known by, in it.
+pub(super) const RECORD: &str = ".spectile/cube.json";
+
+/// Folder of the journals, there.
+pub(super) const JOURNALS: &str = "journal";
 
 /// The arrays that each tile has a file of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,7 +60,22 @@ impl Part {
 pub struct Cube {
     path: PathBuf,
     header: Header,
+    layout: Layout,
+    origin: Origin,
     projection: Projection,
+}
+
+/// By what a cube is known, which decides whether it can be gone on with.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Origin {
+    /// Its record under `.spectile/`; the version of Spectile that made it.
+    Record { made_by: String },
+    /// Its metadata, since the record is damaged.
+    DamagedRecord { made_by: String },
+    /// Its metadata: somebody has copied it without `.spectile/`, where its journals are.
+    Copy,
+    /// Its metadata, in version 1 of the layout.
+    Older { made_by: String },
 }
 
 /// How far a cube has got.
@@ -87,21 +107,65 @@ impl Progress {
 impl Cube {
     /// Opens a cube that another process may be rendering at this moment.
     pub fn open(path: &Path) -> Result<Cube> {
-        Cube::from_group(path, &read_group(path)?)
-    }
-
-    /// The cube at `path`, whose group's metadata have been read.
-    pub(super) fn from_group(path: &Path, group: &Value) -> Result<Cube> {
-        let header = Header::parse(path, group, |count| {
+        check_folder(path)?;
+        let damaged = match fs::read_to_string(path.join(RECORD)) {
+            Ok(text) => match Header::from_record(path, &text)? {
+                Recorded::Sound { header, made_by } if path.join(PRIVATE).join(JOURNALS).is_dir() => {
+                    return Ok(Cube::new(path, *header, Layout::Columns, Origin::Record { made_by }));
+                }
+                Recorded::Sound { header, .. } => {
+                    return Ok(Cube::new(path, *header, Layout::Columns, Origin::Copy));
+                }
+                Recorded::Damaged => true,
+            },
+            Err(error) if error.kind() == ErrorKind::NotFound => false,
+            // Bytes that are no text.
+            Err(error) if error.kind() == ErrorKind::InvalidData => true,
+            Err(error) => return Err(Error::storage(&path.join(RECORD), error)),
+        };
+        let group = read_group(path)?;
+        let (header, layout) = Header::parse(path, &group, |count| {
             let values = read_doubles(&path.join("wavelength_bounds/c/0/0"), 2 * count)?;
             Ok(values.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect())
         })?;
-        Ok(Cube::new(path, header))
+        let made_by = group["attributes"]["spectile_version"].as_str().unwrap_or("another version").to_owned();
+        let origin = match layout {
+            Layout::Rows => Origin::Older { made_by },
+            Layout::Columns if damaged => Origin::DamagedRecord { made_by },
+            Layout::Columns => Origin::Copy,
+        };
+        Ok(Cube::new(path, header, layout, origin))
     }
 
-    pub(super) fn new(path: &Path, header: Header) -> Cube {
+    pub(super) fn new(path: &Path, header: Header, layout: Layout, origin: Origin) -> Cube {
         let projection = Projection::new(&header.channels);
-        Cube { path: path.to_owned(), header, projection }
+        Cube { path: path.to_owned(), header, layout, origin, projection }
+    }
+
+    /// A cube that this version has just made.
+    pub(super) fn made(path: &Path, header: Header) -> Cube {
+        Cube::new(path, header, Layout::Columns, Origin::Record { made_by: env!("CARGO_PKG_VERSION").into() })
+    }
+
+    pub(super) fn layout(&self) -> Layout {
+        self.layout
+    }
+
+    pub(super) fn origin(&self) -> &Origin {
+        &self.origin
+    }
+
+    /// Why this cube can be read, but not gone on with, if so.
+    pub fn is_only_read(&self) -> Option<String> {
+        match &self.origin {
+            Origin::Record { .. } | Origin::DamagedRecord { .. } => None,
+            Origin::Copy => {
+                Some(format!("it is a copy without {PRIVATE}, where the journals are by which a render goes on"))
+            }
+            Origin::Older { made_by } => {
+                Some(format!("its layout is that of version 1, by Spectile {made_by}, which this one reads only"))
+            }
+        }
     }
 
     pub fn path(&self) -> &Path {
@@ -127,15 +191,65 @@ impl Cube {
 
     /// Samples per pixel merged into a tile so far.
     pub fn samples(&self, tile: u32) -> Result<u32> {
-        let path = self.part_path(Part::Samples, tile);
-        match fs::read(&path) {
-            Ok(bytes) => {
-                let bytes = bytes.try_into().map_err(|_| Error::storage(&path, "is damaged: not 4 bytes long"))?;
-                Ok(u32::from_le_bytes(bytes))
-            }
-            Err(error) if error.kind() == ErrorKind::NotFound => Ok(0),
-            Err(error) => Err(Error::storage(&path, error)),
+        let mut bytes = Vec::new();
+        if let Some(mut file) = self.open_part(Part::Samples, tile)? {
+            let path = self.part_path(Part::Samples, tile);
+            file.read_to_end(&mut bytes).map_err(|error| Error::storage(&path, error))?;
+            let bytes = bytes.try_into().map_err(|_| Error::storage(&path, "is damaged: not 4 bytes long"))?;
+            return Ok(u32::from_le_bytes(bytes));
         }
+        Ok(0)
+    }
+
+    /// The file of a tile in one of the arrays, as the last commit left it; `None` before the tile's first unit. One that is
+    /// gone although the tile is known to have been rendered is an error.
+    pub(super) fn open_part(&self, part: Part, tile: u32) -> Result<Option<File>> {
+        let path = self.part_path(part, tile);
+        let open = |path: &Path| match File::open(path) {
+            Ok(file) => Ok(Some(file)),
+            Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+            Err(error) => Err(Error::storage(path, format!("cannot be opened: {error}"))),
+        };
+        if let Some(file) = open(&path)? {
+            return Ok(Some(file));
+        }
+        let journal = Journal::of(self, tile);
+        let is_orphan = || self.origin == Origin::Copy && self.part_path(Part::Radiance, tile).exists();
+        let witness = match part {
+            Part::Samples if journal.last()?.is_some() => "its journal",
+            Part::Samples if is_orphan() => "`radiance`",
+            Part::Samples => return Ok(None),
+            _ if self.open_part(Part::Samples, tile)?.is_none() => return Ok(None),
+            _ => "`samples`",
+        };
+        // The files of a commit take their places one after the other, and whoever did that may have been killed: the rest
+        // still lies aside. Or it has come to its place by now, which no file in place ever leaves. So the journal is read
+        // after what says that there is something, and the place after that.
+        if let Some(record) = journal.last()?
+            && let Some(file) = open(&self.aside_path(part, tile, record.suffix))?
+        {
+            return Ok(Some(file));
+        }
+        if let Some(file) = open(&path)? {
+            return Ok(Some(file));
+        }
+        let mend = match self.is_only_read() {
+            None => "restore it from a copy, or have the tile rendered again by the same command with --resume",
+            Some(_) => "restore it from where the cube comes from",
+        };
+        Err(Error::storage(&path, format!("is missing, although {witness} says that tile {tile} was rendered; {mend}")))
+    }
+
+    /// The error of a tile that was rendered and of which a file is gone.
+    pub fn check_files(&self, tile: u32) -> Result<()> {
+        self.parts().iter().try_for_each(|&part| self.open_part(part, tile).map(drop))
+    }
+
+    /// Tiles of which a file is gone, among those that have `samples`.
+    pub fn lost(&self, samples: &[u32]) -> Vec<Range<u32>> {
+        let is_lost = |tile: u32| self.check_files(tile).is_err();
+        let lost: Vec<u32> = (0..).zip(samples).map(|(tile, &n)| u32::from(n > 0 && is_lost(tile))).collect();
+        ranges(&lost, |lost| lost == 1)
     }
 
     /// Samples per pixel of every tile.
@@ -150,20 +264,35 @@ impl Cube {
 
     /// The radiance of a tile, mapped into memory; `None` before its first unit.
     pub fn chunk(&self, tile: u32) -> Result<Option<Chunk>> {
-        self.mapped(&self.part_path(Part::Radiance, tile), tile)
+        self.chunk_of(Part::Radiance, tile)
     }
 
     /// The standard errors of a tile, mapped into memory like [`Cube::chunk`]: NaN below two epochs. `None` before its
     /// first unit, and in cubes without them.
     pub fn error_chunk(&self, tile: u32) -> Result<Option<Chunk>> {
         match self.header.has_uncertainty() {
-            true => self.mapped(&self.part_path(Part::StandardError, tile), tile),
+            true => self.chunk_of(Part::StandardError, tile),
             false => Ok(None),
         }
     }
 
+    fn chunk_of(&self, part: Part, tile: u32) -> Result<Option<Chunk>> {
+        let Some(file) = self.open_part(part, tile)? else { return Ok(None) };
+        self.map(&file, &self.part_path(part, tile), tile).map(Some)
+    }
+
+    /// Maps a file of a tile that has all channels of every pixel; `path` is what errors name.
+    pub(super) fn map(&self, file: &File, path: &Path, tile: u32) -> Result<Chunk> {
+        Chunk::map(file, path, self.grid().rect(tile), self.header.tile, self.channels().len(), self.layout)
+    }
+
+    /// The same of a file that may not be there.
     pub(super) fn mapped(&self, path: &Path, tile: u32) -> Result<Option<Chunk>> {
-        Chunk::open(path, self.grid().rect(tile), self.header.tile, self.channels().len())
+        match File::open(path) {
+            Ok(file) => self.map(&file, path, tile).map(Some),
+            Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+            Err(error) => Err(Error::storage(path, format!("cannot be opened: {error}"))),
+        }
     }
 
     /// The parts that each tile of this cube has.
@@ -194,11 +323,11 @@ impl Cube {
         Err(Error::Usage(format!("{}: {what}", self.path.display())))
     }
 
-    /// The error estimate of every channel (DESIGN section 8), from the spread of the epochs: sqrt(Σ variance of the
+    /// The error estimate of every channel, from the spread of the epochs (docs/METHOD.md, Errors): sqrt(Σ variance of the
     /// mean / Σ mean²), sums over the pixels of all tiles begun. NaN while any of those has fewer than two epochs, 0
     /// where a channel is all zero. NaN in a cube made of another one's channels: these spread together.
     pub fn error_estimate(&self) -> Result<Vec<f64>> {
-        if self.header.attributes.contains_key("derived") {
+        if self.is_derived() {
             return Ok(vec![f64::NAN; self.channels().len()]);
         }
         let mut totals = estimate::Totals::new(self.channels().len(), self.header.epoch);
@@ -208,6 +337,11 @@ impl Cube {
             }
         }
         Ok(totals.error_estimate())
+    }
+
+    /// Whether it was made of another cube's channels.
+    pub fn is_derived(&self) -> bool {
+        self.header.attributes.contains_key(DERIVED)
     }
 
     /// Tiles that some process works on at this moment: those of the first range found.
@@ -242,7 +376,7 @@ impl Cube {
     }
 
     pub(super) fn journal_folder(&self) -> PathBuf {
-        self.private().join("journal")
+        self.private().join(JOURNALS)
     }
 
     /// The file of a tile in one of the arrays.
@@ -282,29 +416,27 @@ fn read_doubles(path: &Path, count: usize) -> Result<Vec<f64>> {
     Ok(bytes.as_chunks().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect())
 }
 
-/// The metadata of the Zarr group at `path`, if that is a Spectile cube of a layout this version knows.
-pub(super) fn read_group(path: &Path) -> Result<Value> {
-    let refuse = |what: &str| Err(Error::storage(path, what));
+fn check_folder(path: &Path) -> Result<()> {
     match fs::metadata(path) {
-        Err(error) if error.kind() == ErrorKind::NotFound => return refuse("there is no such cube"),
-        Err(error) => return Err(Error::storage(path, error)),
-        Ok(found) if !found.is_dir() => return refuse("is a file; a cube is a folder, usually NAME.zarr"),
-        Ok(_) => {}
+        Err(error) if error.kind() == ErrorKind::NotFound => Err(Error::storage(path, "there is no such cube")),
+        Err(error) => Err(Error::storage(path, error)),
+        Ok(found) if !found.is_dir() => Err(Error::storage(path, "is a file; a cube is a folder, usually NAME.zarr")),
+        Ok(_) => Ok(()),
     }
-    let text = match fs::read_to_string(path.join("zarr.json")) {
+}
+
+/// The metadata of the Zarr group at `path`.
+fn read_group(path: &Path) -> Result<Value> {
+    let refuse = |what: &str| Err(Error::storage(path, what));
+    let text = match fs::read(path.join("zarr.json")) {
         Ok(text) => text,
         Err(error) if error.kind() == ErrorKind::NotFound => {
             return refuse("is not a Spectile cube: it holds no zarr.json");
         }
         Err(error) => return Err(Error::storage(&path.join("zarr.json"), error)),
     };
-    let group: Value = match serde_json::from_str(&text) {
-        Ok(group) => group,
-        Err(error) => return refuse(&format!("is not a Spectile cube: its zarr.json is not JSON ({error})")),
-    };
-    match group["attributes"]["spectile_format"].as_u64() {
-        Some(FORMAT) => Ok(group),
-        Some(newer) => refuse(&format!("is a Spectile cube of format {newer}; this version reads format {FORMAT}")),
-        None => refuse("is a Zarr store, but not a Spectile cube: it has no attribute `spectile_format`"),
+    match serde_json::from_slice(&text) {
+        Ok(group) => Ok(group),
+        Err(error) => refuse(&format!("is not a Spectile cube: its zarr.json is not JSON ({error})")),
     }
 }

@@ -1,14 +1,15 @@
 //! Whether a cube is what its journals say: bit rot, and files that somebody else changed.
 
-use std::sync::atomic::{AtomicU32, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use super::checksums;
+use rayon::prelude::*;
+
 use super::journal::{Journal, Record};
 use super::lock::TileLock;
 use super::recover::checksum_of;
-use super::store::{Cube, Part};
+use super::restore;
+use super::store::{Cube, Origin, PRIVATE, Part};
 use crate::{Error, Result};
 
 /// What [`Cube::verify`] found.
@@ -25,50 +26,33 @@ pub struct Verification {
 /// A tile that somebody works on is looked at again, so often at most.
 const ATTEMPTS: u32 = 20;
 const PAUSE: Duration = Duration::from_millis(100);
-const MAX_THREADS: usize = 8;
+
+impl Verification {
+    /// With what was found in later tiles.
+    fn and(mut self, mut later: Verification) -> Verification {
+        self.files += later.files;
+        self.damage.append(&mut later.damage);
+        self.tiles.append(&mut later.tiles);
+        self
+    }
+}
 
 impl Cube {
     /// Compares every file with its checksum. The cube may be being rendered.
     pub fn verify(&self) -> Result<Verification> {
-        let mut found = Verification::default();
-        let wrong = checksums::wrong_files(self.path());
-        let list = self.path().join(checksums::FILE);
-        let (wrong, count) = wrong.map_err(|error| Error::storage(&list, format!("cannot be read: {error}")))?;
-        found.files += count;
-        found.damage.extend(wrong.into_iter().map(|name| format!("{name} is not what was written")));
-        // Reading is what takes the time, and disks of many machines want several readers.
-        let (next, count) = (AtomicU32::new(0), self.grid().count());
-        let threads = thread::available_parallelism().map_or(1, usize::from).min(MAX_THREADS);
-        let work = || -> Result<Vec<(u32, Verification)>> {
-            let mut tiles: Vec<(u32, Verification)> = Vec::new();
-            loop {
-                let tile = next.fetch_add(1, Ordering::Relaxed);
-                if tile >= count {
-                    return Ok(tiles);
-                }
-                let mut of_tile = Verification::default();
-                self.verify_tile(tile, &mut of_tile)?;
-                match tiles.last_mut() {
-                    // Sound tiles are only counted.
-                    Some((_, last)) if of_tile.damage.is_empty() => last.files += of_tile.files,
-                    _ => tiles.push((tile, of_tile)),
-                }
-            }
-        };
-        let parts: Vec<_> = thread::scope(|scope| {
-            let threads: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
-            threads.into_iter().map(|t| t.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
-        });
-        let mut tiles = parts.into_iter().collect::<Result<Vec<_>>>()?.concat();
-        tiles.sort_by_key(|(tile, _)| *tile);
-        for (tile, of_tile) in tiles {
-            found.files += of_tile.files;
-            if !of_tile.damage.is_empty() {
-                found.tiles.push(tile);
-                found.damage.extend(of_tile.damage);
-            }
+        if *self.origin() == Origin::Copy {
+            let what =
+                format!("is a copy without {PRIVATE}, so nothing tells what its files must be; verify the original");
+            return Err(Error::Usage(format!("{} {what}", self.path().display())));
         }
-        Ok(found)
+        let (files, damage) = restore::verify(self)?;
+        let found = Verification { files, damage, tiles: Vec::new() };
+        // Reading is what takes the time, and disks of many machines want several readers.
+        let of_tiles = (0..self.grid().count())
+            .into_par_iter()
+            .try_fold(Verification::default, |mut found, tile| self.verify_tile(tile, &mut found).map(|()| found))
+            .try_reduce(Verification::default, |first, second| Ok(first.and(second)))?;
+        Ok(found.and(of_tiles))
     }
 
     fn verify_tile(&self, tile: u32, found: &mut Verification) -> Result<()> {
@@ -87,7 +71,10 @@ impl Cube {
             }
             if wrong.is_empty() || !(was_in_use || is_in_use()) || attempt == ATTEMPTS {
                 found.files += u64::from(last.is_some()) * (self.parts().len() as u64 + 1);
-                found.damage.extend(wrong);
+                if !wrong.is_empty() {
+                    found.tiles.push(tile);
+                    found.damage.extend(wrong);
+                }
                 return Ok(());
             }
             thread::sleep(PAUSE);

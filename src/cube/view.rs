@@ -199,7 +199,7 @@ impl Reader<'_> {
                         continue;
                     };
                     let first = chunk.spectra_from(x0, y);
-                    let stride = view.cube.channels().len();
+                    let stride = chunk.column_step();
                     if let Convert::Xyz(weights) = convert {
                         for x in pixels.clone() {
                             let spectrum = chunk.spectrum(x, y);

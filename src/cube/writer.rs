@@ -1,4 +1,4 @@
-//! A process's hold on tiles of a cube: units are merged aside, and committed in batches (DESIGN section 4).
+//! A process's hold on tiles of a cube: units are merged aside, and committed in batches.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
@@ -18,9 +18,9 @@ use super::lock::TileLock;
 use super::look::Window;
 use super::map::Chunk;
 use super::merge::{Fold, check_portion, write_standard_errors};
-use super::metadata::Header;
-use super::recover;
+use super::metadata::{Header, Layout};
 use super::store::{Cube, Part};
+use super::{recover, restore};
 use crate::spectral::tone::Picture;
 use crate::{Error, Result, files};
 
@@ -94,6 +94,7 @@ impl Writer {
             return Err(Error::storage(cube.path(), what));
         }
         let cube = open_same(cube.path(), header)?;
+        restore::restore(&cube)?;
         let mut totals = Totals::new(cube.channels().len(), cube.header().epoch);
         let mut found = Vec::with_capacity(tiles.len());
         for record in recover::recover(&cube, tiles.clone(), warn)? {
@@ -274,8 +275,8 @@ impl Writer {
                 if !state.open.is_empty() && since >= COMMIT_EVERY {
                     break;
                 }
-                let patience = if state.open.is_empty() { COMMIT_EVERY } else { COMMIT_EVERY - since };
-                state = self.changed.wait_timeout(state, patience).unwrap_or_else(PoisonError::into_inner).0;
+                let time_limit = if state.open.is_empty() { COMMIT_EVERY } else { COMMIT_EVERY - since };
+                state = self.changed.wait_timeout(state, time_limit).unwrap_or_else(PoisonError::into_inner).0;
             }
             drop(state);
             self.flush()?;
@@ -308,7 +309,8 @@ impl Writer {
         result
     }
 
-    /// The protocol of DESIGN section 4. The files lie aside already.
+    /// Makes a batch durable; its files lie aside already. First the journals speak of them, synced; then the renames, and the folders
+    /// synced: whoever dies between two steps leaves what `recover` can finish.
     fn commit(&self, batch: &BTreeMap<u32, Arc<Pending>>) -> Result<()> {
         if let Err(error) = self.journal(batch) {
             // What no journal speaks of is nothing but wasted space, which may be what is missing. The rest is in order
@@ -419,7 +421,8 @@ impl<'a> Aside<'a> {
         let (cube, tile) = (self.cube, self.tile);
         let mut fold = Fold::new(cube.grid(), cube.grid().rect(tile), cube.channels().len(), cube.projection());
         let weight = f64::from(n_unit) / f64::from(samples);
-        let radiance = self.file(Part::Radiance, |file| fold.run(base.map(Base::chunk), unit, weight, file))?;
+        let radiance =
+            self.file(Part::Radiance, |file| fold.run(base.map(Base::chunk), unit, Layout::Rows, weight, file))?;
         if let Some(k) = fold.square.iter().position(|v| !v.is_finite()) {
             let what = format!("a unit of tile {tile} holds a value in channel {k} that is not finite");
             return Err(Error::Internal(what));

@@ -1,28 +1,89 @@
 //! ENVI: raw numbers beside a header.
 
+use std::fs;
 use std::io::{Seek, SeekFrom, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use super::{PIECE_BYTES, Progress, check_space, default_bands, long_name};
 use crate::cube::{Quantity, Reader, Rect, Strides, View};
-use crate::files::Replacement;
-use crate::format::envi::{Image, Interleave};
+use crate::files::output::{Product, Replacement};
+use crate::format::envi::{self, Image, Interleave};
 use crate::{Error, Result};
+
+/// The numbers that [`write`] writes, and the header without which they are none.
+const DATA: Product = Product {
+    name: "ENVI data with a header beside it",
+    extensions: &["img", "bil", "bip", "bsq"],
+    is_stream: false,
+    is_folder: false,
+    check: is_data,
+};
+const HEADER: Product =
+    Product { name: "an ENVI header", extensions: &["hdr"], is_stream: false, is_folder: false, check: is_header };
+
+/// Whether the header beside it describes just these bytes.
+fn is_data(path: &Path) -> std::result::Result<(), String> {
+    let header = header_of(path);
+    let bytes = fs::read(&header).map_err(|error| format!("has no header {} ({error})", header.display()))?;
+    let described = envi::parse(&bytes, &header).map_err(|_| format!("has a {} that is none", header.display()))?;
+    let length = fs::metadata(path).map_err(|error| format!("cannot be read ({error})"))?.len();
+    match described.data_bytes() {
+        Some(bytes) if bytes == length => Ok(()),
+        _ => Err(format!("has {length} bytes, and {} describes other data", header.display())),
+    }
+}
+
+fn is_header(path: &Path) -> std::result::Result<(), String> {
+    let bytes = fs::read(path).map_err(|error| format!("cannot be read ({error})"))?;
+    envi::parse(&bytes, path).map(drop).map_err(|problem| problem.message)
+}
+
+/// The header that belongs to a data file.
+fn header_of(data: &Path) -> PathBuf {
+    data.with_extension("hdr")
+}
+
+/// A header that GDAL, and so QGIS, reads instead of the one that is written.
+pub fn other_header(path: &Path) -> Option<PathBuf> {
+    let mut name = data_of(path).into_os_string();
+    name.push(".hdr");
+    let other = PathBuf::from(name);
+    other.exists().then_some(other)
+}
+
+/// The data file of an export to `path`, which may name its header.
+fn data_of(path: &Path) -> PathBuf {
+    let is_header = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("hdr"));
+    if is_header { path.with_extension("img") } else { path.to_owned() }
+}
+
+/// Refuses early what cannot be written to: both files are new, or both are there and belong together.
+pub fn check_target(path: &Path) -> Result<()> {
+    let data = data_of(path);
+    let header = header_of(&data);
+    if data.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("zarr")) {
+        return Err(Error::Usage(format!("{}: GDAL opens no ENVI file of this name; use .img", data.display())));
+    }
+    DATA.check_target(&data)?;
+    HEADER.check_target(&header)?;
+    if header.exists() && !data.exists() {
+        let what = format!("is the header of other data: there is no {}; so it is not replaced", data.display());
+        return Err(Error::Usage(format!("{} {what}; choose another name", header.display())));
+    }
+    Ok(())
+}
 
 /// What stands where nothing is rendered: no radiance and no temperature is negative.
 const MISSING: f32 = -9999.0;
 
 /// Writes the data file and, last, its header beside it. `path` may name either.
 pub fn write(view: &View, path: &Path, interleave: Interleave, progress: &mut Progress) -> Result<Vec<PathBuf>> {
-    let is_header = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("hdr"));
-    let data = if is_header { path.with_extension("img") } else { path.to_owned() };
-    let header = data.with_extension("hdr");
-    if data.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("zarr")) {
-        return Err(Error::Usage(format!("{}: GDAL opens no ENVI file of this name; use .img", data.display())));
-    }
+    let data = data_of(path);
+    let header = header_of(&data);
+    check_target(path)?;
     check_space(&data, view.bytes())?;
-    let mut file = Replacement::create(&data)?;
+    let mut file = Replacement::create(&data, DATA)?;
     let mut pieces = Pieces { view, reader: view.reader(), file: &mut file, values: Vec::new(), progress };
     match interleave {
         Interleave::Bil => pieces.by_line()?,
@@ -48,10 +109,11 @@ pub fn write(view: &View, path: &Path, interleave: Interleave, progress: &mut Pr
         fwhm_nm: each(&|k| channels.fwhm(k)),
         names: channels.names.clone(),
     };
-    // Both are whole before either takes its place.
-    let mut about = Replacement::create(&header)?;
+    // Both are whole before either takes its place. The data goes first: it is known by the header of the old one.
+    let mut about = Replacement::create(&header, HEADER)?;
     let written = about.file().write_all(image.header().as_bytes());
-    written.map_err(|error| about.failed(error))?;
+    written.map_err(|error| about.failed(&error))?;
+    check_target(path)?;
     file.finish()?;
     about.finish()?;
     Ok(vec![data, header])
@@ -118,7 +180,7 @@ impl Pieces<'_, '_> {
                     let file = self.file.file();
                     let written =
                         file.seek(SeekFrom::Start(at)).and_then(|_| file.write_all(bytemuck::cast_slice(values)));
-                    written.map_err(|error| self.file.failed(error))?;
+                    written.map_err(|error| self.file.failed(&error))?;
                 }
                 self.values = values;
             }
@@ -150,7 +212,7 @@ impl Pieces<'_, '_> {
 
     fn write(&mut self) -> Result<()> {
         let written = self.file.file().write_all(bytemuck::cast_slice(&self.values));
-        written.map_err(|error| self.file.failed(error))
+        written.map_err(|error| self.file.failed(&error))
     }
 
     fn tell(&mut self, rows: Rect) -> Result<()> {

@@ -14,12 +14,21 @@ use exr::meta::attribute::{
 use exr::meta::header::Header;
 use exr::meta::{BlockDescription, MetaData};
 use exr::prelude::Compression;
+use rayon::prelude::*;
 use smallvec::SmallVec;
 
 use super::{Progress, check_space};
 use crate::cube::{Quantity, Rect, Strides, View};
-use crate::files::Replacement;
+use crate::files::output::{Product, Replacement, cannot_write};
 use crate::{Error, Result};
+
+/// What [`write`] writes. Where its chunks lie stands at the beginning, and is known at the end: no pipe takes it.
+pub const IMAGE: Product =
+    Product { name: "an OpenEXR image", extensions: &["exr"], is_stream: false, is_folder: false, check: is_exr };
+
+fn is_exr(path: &Path) -> std::result::Result<(), String> {
+    MetaData::read_from_file(path, false).map(drop).map_err(|_| "does not begin like one".into())
+}
 
 /// OpenImageIO, and what is built on it, refuses files with more channels unless told otherwise.
 pub const WIDELY_READ: usize = 1024;
@@ -112,7 +121,7 @@ fn write_file(view: &View, path: &Path, strict_units: bool, progress: &mut Progr
     let sources: Vec<Source> = named.iter().map(|(_, source)| *source).collect();
     let header = header(view, &named, strict_units)?;
 
-    let mut replacement = Replacement::create(path)?;
+    let mut replacement = Replacement::create(path, IMAGE)?;
     let mut ended = None;
     let mut file = BufWriter::with_capacity(1 << 20, replacement.file());
     let result = exr::block::write(&mut file, SmallVec::from_vec(vec![header]), true, |meta, writer| {
@@ -129,8 +138,8 @@ fn write_file(view: &View, path: &Path, strict_units: bool, progress: &mut Progr
     if let Some(error) = ended {
         return Err(error);
     }
-    result.map_err(|error| replacement.failed(error))?;
-    flushed.map_err(|error| replacement.failed(error))?;
+    result.map_err(failed(path))?;
+    flushed.map_err(|error| replacement.failed(&error))?;
     Ok(replacement)
 }
 
@@ -193,6 +202,13 @@ fn header(view: &View, named: &[(String, Source)], strict_units: bool) -> Result
     Ok(header)
 }
 
+fn failed(path: &Path) -> impl Fn(exr::error::Error) -> Error + Copy + use<'_> {
+    move |error| match error {
+        exr::error::Error::Io(error) => cannot_write(path, &error),
+        error => Error::storage(path, format!("cannot be written: {error}")),
+    }
+}
+
 /// One tile after another, several of them compressed at the same time.
 fn write_tiles(
     view: &View,
@@ -205,25 +221,18 @@ fn write_tiles(
     let header = &meta.headers[0];
     let side = header.max_block_pixel_size().x() as u32;
     let tile_bytes = (side * side) as usize * sources.len() * 4;
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
     // Compression holds a tile twice.
-    let together = threads.min(TILE_BYTES / tile_bytes).max(1);
-    let failed = |error: exr::error::Error| Error::storage(path, format!("cannot be written: {error}"));
+    let together = rayon::current_num_threads().min(TILE_BYTES / tile_bytes).max(1);
+    let failed = failed(path);
     let indices: Vec<_> = exr::block::enumerate_ordered_header_block_indices(&meta.headers).collect();
     let mut tiles = Tiles { view, reader: view.reader(), sources, bands: Vec::new(), colours: Vec::new() };
     let mut done = 0;
     for group in indices.chunks(together) {
         let blocks = group.iter().map(|(at, index)| Ok((*at, tiles.block(*index)?))).collect::<Result<Vec<_>>>()?;
-        let compressed: Vec<_> = std::thread::scope(|scope| {
-            let compress = |(at, block): (usize, UncompressedBlock)| {
-                scope.spawn(move || block.compress_to_chunk(&meta.headers).map(|chunk| (at, chunk)))
-            };
-            let running: Vec<_> = blocks.into_iter().map(compress).collect();
-            running.into_iter().map(|thread| thread.join()).collect()
-        });
-        for chunk in compressed {
-            let chunk = chunk.map_err(|_| Error::Internal("a thread that compresses panicked".into()))?;
-            let (at, chunk) = chunk.map_err(failed)?;
+        let compress = |(at, block): (usize, UncompressedBlock)| Ok((at, block.compress_to_chunk(&meta.headers)?));
+        let compressed: Vec<_> =
+            blocks.into_par_iter().with_max_len(1).map(compress).collect::<exr::error::Result<_>>().map_err(failed)?;
+        for (at, chunk) in compressed {
             writer.write_chunk(at, chunk).map_err(failed)?;
         }
         done += group.iter().map(|(_, index)| index.pixel_size.area() as u64).sum::<u64>();

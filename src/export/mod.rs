@@ -50,6 +50,16 @@ impl Format {
         }
     }
 
+    /// Refuses early what cannot be written to.
+    pub fn check_target(self, path: &Path) -> Result<()> {
+        match self {
+            Format::Envi { .. } => envi::check_target(path),
+            Format::Exr { .. } => exr::IMAGE.check_target(path),
+            Format::Zarr { .. } => zarr::STORE.check_target(path),
+            Format::Csv => table::TABLE.check_target(path),
+        }
+    }
+
     /// Of files in this format.
     fn extension(self) -> &'static str {
         if let Format::Envi { .. } = self { "img" } else { self.name() }
@@ -59,7 +69,8 @@ impl Format {
 /// Called with the pixels done so far, of all; an error ends the export.
 pub type Progress<'a> = dyn FnMut(u64, u64) -> Result<()> + 'a;
 
-/// Writes `view` to `path`, which is replaced if it is a file, and returns the files (or the one folder) written.
+/// Writes `view` to `path`, new or one of the same format that is replaced, and returns the files (or the one folder)
+/// written.
 pub fn write(view: &View, path: &Path, format: Format, progress: &mut Progress) -> Result<Vec<PathBuf>> {
     match format {
         Format::Envi { interleave } => envi::write(view, path, interleave, progress),
@@ -69,11 +80,13 @@ pub fn write(view: &View, path: &Path, format: Format, progress: &mut Progress) 
     }
 }
 
-pub use blocks::write as write_blocks;
+pub use blocks::{BLOCKS, write as write_blocks};
+pub use envi::other_header;
+pub use table::TABLE;
 
 /// Refuses what would not fit on the disk of `path`, where `bytes` are known to be written.
 fn check_space(path: &Path, bytes: u64) -> Result<()> {
-    match files::free_bytes(files::parent(path)) {
+    match files::free_bytes(&files::output::real_folder(path)) {
         Some(free) if free < bytes => Err(Error::Usage(format!(
             "{}: the export needs {}, and {} are free there; choose fewer bands or pixels, or another disk",
             path.display(),

@@ -1,25 +1,56 @@
 //! CSV: a line a pixel, a column a band.
 
 use std::fmt::Write as _;
-use std::io::{BufWriter, Write};
+use std::fs::File;
+use std::io::{BufRead, BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use super::{PIECE_BYTES, Progress};
 use crate::Result;
 use crate::cube::{Rect, Strides, View};
-use crate::files::Replacement;
+use crate::files::output::{Product, Replacement};
+
+/// What [`write`] writes.
+pub const TABLE: Product = Product {
+    name: "a table of spectra as CSV",
+    extensions: &["csv", "txt"],
+    is_stream: true,
+    is_folder: false,
+    check: is_table,
+};
+
+/// Whether the first lines are the header `x,y,…` and a pixel.
+fn is_table(path: &Path) -> std::result::Result<(), String> {
+    let unreadable = |error: std::io::Error| format!("cannot be read as text ({error})");
+    let mut lines = BufReader::new(File::open(path).map_err(unreadable)?).lines();
+    let mut next = || lines.next().transpose().map_err(unreadable);
+    let header = next()?.unwrap_or_default();
+    if !header.starts_with("x,y,") {
+        return Err("does not begin with the columns x and y".into());
+    }
+    // Names may hold commas in quotation marks; a pixel has numbers alone.
+    let is_pixel = |line: &str| {
+        let mut cells = line.split(',');
+        let is_position = (0..2).all(|_| cells.next().is_some_and(|cell| cell.parse::<u32>().is_ok()));
+        is_position && cells.all(|cell| cell.is_empty() || cell.parse::<f32>().is_ok())
+    };
+    match next()? {
+        Some(line) if is_pixel(&line) => Ok(()),
+        _ => Err("does not have a pixel on its second line".into()),
+    }
+}
 
 /// Columns `x`, `y` (on the full film), then one a band, named after it. Numbers have as many digits as bring back the
 /// stored ones exactly; what is not rendered is empty.
 pub fn write(view: &View, path: &Path, progress: &mut Progress) -> Result<Vec<PathBuf>> {
-    let mut replacement = Replacement::create(path)?;
+    let mut replacement = Replacement::create(path, TABLE)?;
     let mut file = BufWriter::with_capacity(1 << 20, replacement.file());
     let result = write_rows(view, &mut file, progress);
     let flushed = file.flush();
     drop(file);
     match result {
-        Ok(Ok(())) => flushed.map_err(|error| replacement.failed(error))?,
-        Ok(Err(error)) => return Err(replacement.failed(error)),
+        Ok(Ok(())) => flushed.map_err(|error| replacement.failed(&error))?,
+        Ok(Err(error)) => return Err(replacement.failed(&error)),
         Err(error) => return Err(error),
     }
     replacement.finish()?;

@@ -7,12 +7,54 @@ use std::sync::Arc;
 
 use serde_json::{Map, Value, json};
 use zarrs::array::{Array, ArrayBytes, ArrayMetadata};
-use zarrs::filesystem::FilesystemStore;
+use zarrs::storage::store::MemoryStore;
+use zarrs::storage::{ReadableStorageTraits, WritableStorageTraits};
 
 use super::{PIECE_BYTES, Progress, check_space, long_name, units};
-use crate::cube::{Quantity, Rect, Strides, View};
-use crate::files::NewFolder;
-use crate::{Error, Result};
+use crate::cube::{Quantity, Rect, Strides, View, plain_attributes};
+use crate::files::output::{NewFolder, Product, cannot_write, only_holds};
+use crate::{Error, Result, files};
+
+/// What [`write`] writes.
+pub const STORE: Product = Product {
+    name: "a Zarr store that `export` wrote",
+    extensions: &["zarr"],
+    is_stream: false,
+    is_folder: true,
+    check: is_store,
+};
+
+/// The attribute that tells who wrote a store.
+const SOURCE: &str = "source";
+const SOURCE_BEGINS: &str = "Spectile ";
+/// All arrays that stores may have.
+const ARRAYS: [&str; 10] = [
+    "radiance",
+    "standard_error",
+    "brightness_temperature",
+    "xyz",
+    "wavelength",
+    "wavelength_width",
+    "wavelength_bounds",
+    "response_integral",
+    "x",
+    "y",
+];
+
+/// Whether the group was made by an export, and holds nothing else. A cube is not.
+fn is_store(folder: &Path) -> std::result::Result<(), String> {
+    let text = fs::read(folder.join("zarr.json")).map_err(|_| "holds no zarr.json")?;
+    let group: Value = serde_json::from_slice(&text).map_err(|_| "holds a zarr.json that is not JSON")?;
+    if group["attributes"]["spectile_format"] != Value::Null || folder.join(".spectile").exists() {
+        return Err("is a cube".into());
+    }
+    if !group["attributes"][SOURCE].as_str().is_some_and(|source| source.starts_with(SOURCE_BEGINS)) {
+        return Err("is a store of somebody else".into());
+    }
+    only_holds(folder, |name| name == "zarr.json" || ARRAYS.contains(&name))?;
+    let arrays = ARRAYS.iter().map(|name| folder.join(name)).filter(|array| array.is_dir());
+    arrays.into_iter().try_for_each(|array| only_holds(&array, |name| ["zarr.json", "c"].contains(&name)))
+}
 
 /// About so many bands and pixels a side go into a chunk: 256 KiB.
 const CHUNK_BANDS: usize = 64;
@@ -49,26 +91,26 @@ impl Layout {
     }
 }
 
-/// Writes a store, which must not exist yet.
+/// Writes a store, new or in the place of one.
 pub fn write(view: &View, path: &Path, shards: bool, progress: &mut Progress) -> Result<Vec<PathBuf>> {
     // As if nothing could be compressed.
     check_space(path, view.bytes())?;
-    let folder = NewFolder::create(path)?;
+    let folder = NewFolder::create(path, STORE)?;
     let failed = |what: &dyn std::fmt::Display| Error::storage(path, format!("cannot be written: {what}"));
     let layout = Layout::new(view, shards);
     let arrays = arrays(view, &layout)?;
-    let store = FilesystemStore::new(folder.path()).map_err(|error| failed(&error))?;
-    let store = Arc::new(store);
     for (name, metadata) in &arrays {
-        let target = folder.path().join(name);
+        let target = folder.aside().join(name);
         fs::create_dir_all(&target)
             .and_then(|()| fs::write(target.join("zarr.json"), format!("{metadata:#}\n")))
-            .map_err(|error| failed(&error))?;
+            .map_err(|error| cannot_write(path, &error))?;
     }
-    let open = |name: &str| -> Result<Array<FilesystemStore>> {
+    let open = |name: &str| -> Result<Chunks> {
         let metadata = arrays.iter().find(|(of, _)| *of == name).map_or(Value::Null, |(_, metadata)| metadata.clone());
         let metadata: ArrayMetadata = serde_json::from_value(metadata).map_err(|error| failed(&error))?;
-        Array::new_with_metadata(Arc::clone(&store), &format!("/{name}"), metadata).map_err(|error| failed(&error))
+        let memory = Arc::new(MemoryStore::new());
+        let array = Array::new_with_metadata(Arc::clone(&memory), &format!("/{name}"), metadata);
+        Ok(Chunks { array: array.map_err(|error| failed(&error))?, memory, folder: folder.aside(), target: path })
     };
     let channels = view.channels();
     let each = |value: &dyn Fn(usize) -> f64| (0..channels.len()).map(value).collect::<Vec<f64>>();
@@ -83,27 +125,44 @@ pub fn write(view: &View, path: &Path, shards: bool, progress: &mut Progress) ->
         ("y", vec![0], centres(top, height)),
     ] {
         let bytes: Vec<u8> = bytemuck::cast_slice(&values).to_vec();
-        open(name)?.store_chunk(&indices, ArrayBytes::new_flen(bytes)).map_err(|error| failed(&error))?;
+        open(name)?.put(&indices, bytes)?;
     }
     let views = views(view)?;
     let (count, pixels) = (views.len() as u64, view.rect().pixels());
     for (i, of) in (0..).zip(&views) {
         let mut tell = |done: u64, _: u64| progress(i * pixels + done, count * pixels);
-        write_values(of, &layout, &open(variable(of))?, &failed, &mut tell)?;
+        write_values(of, &layout, &open(variable(of))?, &mut tell)?;
     }
     let group = group(view, &arrays);
-    fs::write(folder.path().join("zarr.json"), format!("{group:#}\n")).map_err(|error| failed(&error))?;
+    fs::write(folder.aside().join("zarr.json"), format!("{group:#}\n")).map_err(|error| cannot_write(path, &error))?;
     folder.finish()?;
     Ok(vec![path.to_owned()])
 }
 
-fn write_values(
-    view: &View,
-    layout: &Layout,
-    array: &Array<FilesystemStore>,
-    failed: &dyn Fn(&dyn std::fmt::Display) -> Error,
-    progress: &mut Progress,
-) -> Result<()> {
+/// The chunks of an array, encoded in memory one at a time: a store of zarrs's on disk takes no path that is not UTF-8.
+struct Chunks<'a> {
+    array: Array<MemoryStore>,
+    memory: Arc<MemoryStore>,
+    folder: &'a Path,
+    /// What errors name.
+    target: &'a Path,
+}
+
+impl Chunks<'_> {
+    /// Writes the chunk (or shard) of these little-endian values; one that holds nothing but the fill value has no file.
+    fn put(&self, indices: &[u64], values: Vec<u8>) -> Result<()> {
+        let failed = |error: &dyn std::fmt::Display| Error::storage(self.target, format!("cannot be written: {error}"));
+        self.array.store_chunk(indices, ArrayBytes::new_flen(values)).map_err(|error| failed(&error))?;
+        let key = self.array.chunk_key(indices);
+        let Some(encoded) = self.memory.get(&key).map_err(|error| failed(&error))? else { return Ok(()) };
+        self.memory.erase(&key).map_err(|error| failed(&error))?;
+        let file = self.folder.join(key.as_str());
+        let written = fs::create_dir_all(files::parent(&file)).and_then(|()| fs::write(&file, encoded));
+        written.map_err(|error| cannot_write(self.target, &error))
+    }
+}
+
+fn write_values(view: &View, layout: &Layout, chunks: &Chunks, progress: &mut Progress) -> Result<()> {
     let (mut reader, rect, bands) = (view.reader(), view.rect(), view.channels().len());
     let [deep, side, _] = layout.file.map(|n| n as usize);
     let strides = Strides { row: side, pixel: 1, band: side * side };
@@ -117,9 +176,7 @@ fn write_values(
                 values.fill(f32::NAN);
                 let part = first..(first + deep).min(bands);
                 reader.read(Rect { x0, y0, x1, y1 }, part, strides, &mut values)?;
-                array
-                    .store_chunk(&[group, row, column], ArrayBytes::new_flen(bytemuck::cast_slice::<f32, u8>(&values)))
-                    .map_err(|error| failed(&error))?;
+                chunks.put(&[group, row, column], bytemuck::cast_slice(&values).to_vec())?;
             }
         }
         progress(u64::from(y1 - rect.y0) * u64::from(rect.width()), rect.pixels())?;
@@ -150,10 +207,12 @@ fn variable(view: &View) -> &'static str {
 fn group(view: &View, arrays: &[(&str, Value)]) -> Value {
     let header = view.cube().header();
     let mut attributes = header.attributes.clone();
+    // Of the cube, which this is no longer.
+    attributes.remove("uncertainty");
     attributes.extend([
         ("Conventions".into(), json!("CF-1.11")),
         ("title".into(), json!("Spectral image")),
-        ("source".into(), json!(format!("Spectile {}", env!("CARGO_PKG_VERSION")))),
+        (SOURCE.into(), json!(format!("{SOURCE_BEGINS}{}", env!("CARGO_PKG_VERSION")))),
         ("channel_names".into(), json!(view.channels().names)),
     ]);
     if !view.channels().responses.is_empty() {
@@ -163,7 +222,7 @@ fn group(view: &View, arrays: &[(&str, Value)]) -> Value {
     json!({
         "zarr_format": 3,
         "node_type": "group",
-        "attributes": attributes,
+        "attributes": plain_attributes(attributes),
         "consolidated_metadata": { "kind": "inline", "must_understand": false, "metadata": metadata },
     })
 }

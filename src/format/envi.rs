@@ -551,7 +551,7 @@ impl Image<'_> {
             // Writing to a string cannot fail.
             let _ = writeln!(text, "{key} = {value}");
         };
-        let list = |items: &mut dyn Iterator<Item = String>| format!("{{ {} }}", items.collect::<Vec<_>>().join(", "));
+        let list = |items: &mut dyn Iterator<Item = String>| in_lines(items);
         let numbers = |values: &[f64]| list(&mut values.iter().map(f64::to_string));
         let [samples, lines, bands] = self.size;
         entry("description", &format!("{{ {} }}", plain(self.description)));
@@ -577,6 +577,24 @@ impl Image<'_> {
         entry("band names", &list(&mut self.names.iter().map(|name| plain(name))));
         text
     }
+}
+
+/// A list in lines. GDAL, and so QGIS and rasterio, reads no further in a header than to the first line of 10,000 characters.
+fn in_lines(items: &mut dyn Iterator<Item = String>) -> String {
+    const WIDTH: usize = 100;
+    let mut text = String::from("{");
+    let mut length = WIDTH;
+    for (i, item) in items.enumerate() {
+        text += if i > 0 { "," } else { "" };
+        if length + item.len() > WIDTH {
+            text.push('\n');
+            length = 0;
+        }
+        text += " ";
+        text += &item;
+        length += item.len() + 2;
+    }
+    text + " }"
 }
 
 /// Without what would end a list or an item of one.

@@ -1,6 +1,6 @@
-//! Wavefront OBJ meshes. tobj parses the numbers, resolves indices and cuts polygons into triangles; the lines it
-//! reads come through [`Feeder`], which knows what tobj does not keep: line numbers, `usemtl` names without a .mtl
-//! file, and the difference between `o` and `g`.
+//! Wavefront OBJ meshes. tobj parses the numbers, resolves indices and cuts polygons into triangles. It is fed line by line,
+//! through [`Feeder`], since it neither says on which line a mistake stands nor keeps `usemtl` names without a .mtl file or the
+//! difference between `o` and `g`: whoever hands it the lines knows all three.
 
 use std::borrow::Cow;
 use std::io::{self, BufRead, Read};

@@ -1,9 +1,30 @@
 //! Plots as SVG, with text as text: no fonts are needed to make them.
 
+use std::path::Path;
+
 use plotters::prelude::*;
 
+use crate::files::output::Product;
 use crate::spectral::Channels;
 use crate::{Error, Result};
+
+/// What [`spectrum`] makes.
+pub const PLOT: Product = Product {
+    name: "a plot of a spectrum as SVG",
+    extensions: &["svg"],
+    is_stream: true,
+    is_folder: false,
+    check: is_plot,
+};
+
+/// The labels of both axes: no other drawing has them.
+const AXES: [&str; 2] = ["wavelength (nm)", "spectral radiance ("];
+
+fn is_plot(path: &Path) -> std::result::Result<(), String> {
+    let text = std::fs::read_to_string(path).map_err(|error| format!("cannot be read as text ({error})"))?;
+    let is_svg = text.trim_start().starts_with("<svg");
+    if is_svg && AXES.iter().all(|label| text.contains(label)) { Ok(()) } else { Err("is another drawing".into()) }
+}
 
 /// An SVG plot of one spectrum over its channels: every channel a level over its own interval, joined where intervals
 /// meet, with a band of two standard errors to both sides where `errors` has them. `radiance` in W m⁻² sr⁻¹ nm⁻¹; what is
@@ -50,13 +71,14 @@ fn draw(
         .build_cartesian_2d(from..to, low..high)?;
     let decimals = ((10.0 / (to - from)).log10().ceil().max(0.0) as usize).min(9);
     let unit = "W m⁻² sr⁻¹ nm⁻¹";
+    let [x_label, y_label] = AXES;
     let y_label = match exponent {
-        0 => format!("spectral radiance ({unit})"),
-        _ => format!("spectral radiance (10{} {unit})", superscript(exponent)),
+        0 => format!("{y_label}{unit})"),
+        _ => format!("{y_label}10{} {unit})", superscript(exponent)),
     };
     chart
         .configure_mesh()
-        .x_desc("wavelength (nm)")
+        .x_desc(x_label)
         .y_desc(y_label)
         .x_label_formatter(&|nm| format!("{nm:.decimals$}"))
         .label_style(("sans-serif", 14))

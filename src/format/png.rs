@@ -1,16 +1,29 @@
 //! 8-bit PNG pictures.
 
-use std::io::{BufWriter, Write};
+use std::fs::File;
+use std::io::{BufReader, BufWriter, Write};
 use std::path::Path;
 
-use crate::files::{Replacement, write_atomically};
+use crate::files::output::{Product, Replacement, cannot_write};
 use crate::spectral::tone::Picture;
 use crate::{Error, Result};
+
+/// What [`stream`] writes.
+pub const PICTURE: Product =
+    Product { name: "a PNG picture", extensions: &["png"], is_stream: true, is_folder: false, check: is_png };
+
+/// What [`write`] writes, again and again.
+pub const KEPT: Product = Product { name: "a PNG picture that is kept up to date", is_stream: false, ..PICTURE };
+
+fn is_png(path: &Path) -> std::result::Result<(), String> {
+    let file = File::open(path).map_err(|error| format!("cannot be read ({error})"))?;
+    png::Decoder::new(BufReader::new(file)).read_info().map(drop).map_err(|_| "does not begin like one".into())
+}
 
 /// Writes a picture at an exposure of `ev` as 8-bit sRGB, marked as such, replacing `path` in one step.
 pub fn write(path: &Path, picture: &Picture, ev: f64) -> Result<()> {
     let bytes = encode(picture.size, &picture.to_srgb8(ev));
-    write_atomically(path, &bytes.map_err(|error| Error::storage(path, format!("cannot be made: {error}")))?)
+    KEPT.write(path, &bytes.map_err(|error| Error::storage(path, format!("cannot be made: {error}")))?)
 }
 
 /// The bytes of a PNG file of 8-bit sRGB, three bytes a pixel.
@@ -29,15 +42,18 @@ pub fn stream(
     size: [u32; 2],
     each: impl FnOnce(&mut dyn FnMut(&[u8]) -> Result<()>) -> Result<()>,
 ) -> Result<()> {
-    let mut replacement = Replacement::create(path)?;
-    let failed = |error: &dyn std::fmt::Display| Error::storage(path, format!("cannot be written: {error}"));
+    let mut replacement = Replacement::create(path, PICTURE)?;
+    let failed = |error: png::EncodingError| match error {
+        png::EncodingError::IoError(error) => cannot_write(path, &error),
+        error => Error::storage(path, format!("cannot be written: {error}")),
+    };
     let mut file = BufWriter::with_capacity(1 << 20, replacement.file());
-    let mut writer = encoder(&mut file, size).write_header().map_err(|error| failed(&error))?;
-    let mut rows = writer.stream_writer_with_size(1 << 16).map_err(|error| failed(&error))?;
-    each(&mut |bytes| rows.write_all(bytes).map_err(|error| failed(&error)))?;
-    rows.finish().map_err(|error| failed(&error))?;
-    writer.finish().map_err(|error| failed(&error))?;
-    file.flush().map_err(|error| failed(&error))?;
+    let mut writer = encoder(&mut file, size).write_header().map_err(failed)?;
+    let mut rows = writer.stream_writer_with_size(1 << 16).map_err(failed)?;
+    each(&mut |bytes| rows.write_all(bytes).map_err(|error| cannot_write(path, &error)))?;
+    rows.finish().map_err(failed)?;
+    writer.finish().map_err(failed)?;
+    file.flush().map_err(|error| cannot_write(path, &error))?;
     drop(file);
     replacement.finish()
 }

@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use crate::gpu::allocation::{self, Given};
 use crate::gpu::deadline::Deadline;
+use crate::gpu::instance::instance;
 use crate::{Error, Result};
 
 /// What `spectile devices` says of one adapter.
@@ -22,6 +23,8 @@ pub struct AdapterFacts {
     /// Largest buffer that one binding can show, bytes.
     pub max_binding: u64,
     pub max_buffer: u64,
+    /// Storage buffers that one kernel can bind; how many a scene needs, `spectile plan` says.
+    pub storage_buffers: u32,
     pub timestamps: bool,
     pub is_software: bool,
     /// Why Spectile cannot use it.
@@ -56,16 +59,6 @@ pub(crate) enum Trouble {
     Other(String),
 }
 
-/// Storage buffers that the largest pass may bind at once, generate_vertex: what every scene has (3 of the scene, 4 windows
-/// each of nodes and primitives, 8 of the wave), and what materials, lights and media of general scenes add.
-pub const STORAGE_BUFFERS: u32 = 30;
-
-fn instance() -> wgpu::Instance {
-    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
-    descriptor.backends = wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12;
-    wgpu::Instance::new(descriptor)
-}
-
 fn adapters(instance: &wgpu::Instance) -> Vec<wgpu::Adapter> {
     pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()))
 }
@@ -83,16 +76,8 @@ fn rank(info: &wgpu::AdapterInfo) -> u32 {
 
 fn facts(adapter: &wgpu::Adapter) -> AdapterFacts {
     let (info, limits) = (adapter.get_info(), adapter.limits());
-    let unusable = if limits.max_storage_buffers_per_shader_stage < STORAGE_BUFFERS {
-        Some(format!(
-            "binds {} storage buffers, {STORAGE_BUFFERS} are needed",
-            limits.max_storage_buffers_per_shader_stage
-        ))
-    } else if limits.max_compute_invocations_per_workgroup < 256 {
-        Some("its compute workgroups are smaller than 256".to_owned())
-    } else {
-        None
-    };
+    let unusable = (limits.max_compute_invocations_per_workgroup < 256)
+        .then(|| "its compute workgroups are smaller than 256".to_owned());
     AdapterFacts {
         name: info.name,
         backend: info.backend.to_string(),
@@ -108,6 +93,7 @@ fn facts(adapter: &wgpu::Adapter) -> AdapterFacts {
         pci: Some(info.device_pci_bus_id).filter(|address| !address.is_empty()),
         max_binding: limits.max_storage_buffer_binding_size,
         max_buffer: limits.max_buffer_size,
+        storage_buffers: limits.max_storage_buffers_per_shader_stage,
         timestamps: adapter.features().contains(wgpu::Features::TIMESTAMP_QUERY),
         is_software: info.device_type == wgpu::DeviceType::Cpu,
         unusable,
@@ -139,6 +125,8 @@ pub enum Selection {
     Count(usize),
     /// Positions in [`list`].
     List(Vec<usize>),
+    /// Every software device, whatever else there is.
+    Software,
 }
 
 impl std::str::FromStr for Selection {
@@ -171,7 +159,10 @@ impl Selection {
             (Selection::List(_), Given::Count(_)) => &Given::Everything,
             (_, given) => given,
         };
-        let all = usable_once(listed, given)?;
+        let all = match self {
+            Selection::Software => software_among(listed),
+            _ => usable_once(listed, given)?,
+        };
         match self {
             Selection::List(positions) => {
                 for &position in positions {
@@ -202,7 +193,7 @@ impl Selection {
                      (Debian/Ubuntu: apt-get install mesa-vulkan-drivers libvulkan1)"
                 )))
             }
-            Selection::All => Ok(all),
+            Selection::All | Selection::Software => Ok(all),
             Selection::Count(count) => Ok((0..*count).map(|i| all[i % all.len()]).collect()),
         }
     }
@@ -211,15 +202,40 @@ impl Selection {
 /// Usable adapters: every GPU that was given, through the first backend that lists it; if there is none, every software
 /// adapter.
 fn usable_once(listed: &[AdapterFacts], given: &Given) -> Result<Vec<usize>> {
-    let of = |software: bool| -> Vec<usize> {
-        let usable = |facts: &AdapterFacts| facts.unusable.is_none() && facts.is_software == software;
-        let backend_of = |name: &str| listed.iter().find(|f| usable(f) && f.name == name).map(|f| &f.backend);
-        (0..listed.len())
-            .filter(|&i| usable(&listed[i]) && backend_of(&listed[i].name) == Some(&listed[i].backend))
-            .collect()
-    };
-    let gpus = given.among(listed, &of(false))?;
-    Ok(if gpus.is_empty() { of(true) } else { gpus })
+    let gpus = given.among(listed, &usable(listed, false))?;
+    Ok(if gpus.is_empty() { software_among(listed) } else { gpus })
+}
+
+fn software_among(listed: &[AdapterFacts]) -> Vec<usize> {
+    usable(listed, true)
+}
+
+/// Usable adapters that are software or are not, each through the first backend that lists it.
+fn usable(listed: &[AdapterFacts], software: bool) -> Vec<usize> {
+    let is_usable = |facts: &AdapterFacts| facts.unusable.is_none() && facts.is_software == software;
+    let backend_of = |name: &str| listed.iter().find(|f| is_usable(f) && f.name == name).map(|f| &f.backend);
+    (0..listed.len())
+        .filter(|&i| is_usable(&listed[i]) && backend_of(&listed[i].name) == Some(&listed[i].backend))
+        .collect()
+}
+
+/// The devices of a task whose job asked for GPUs. Software devices stand in only where they are allowed to: they render the
+/// same at a hundredth of the speed, which nobody wants unasked on a whole cluster.
+pub fn of_task(allow_software: bool) -> Result<Selection> {
+    let listed = list();
+    let chosen = Selection::All.choose(&listed, &allocation::given()?);
+    match chosen {
+        Ok(chosen) => match chosen.first().map(|&first| &listed[first]) {
+            Some(first) if first.is_software && !allow_software => Err(Error::NoDevice(format!(
+                "no GPU is found, only {}, which renders on the CPUs: --allow-software would use it, and --gpus-per-task 0 \
+                 asks for nothing else",
+                first.name
+            ))),
+            _ => Ok(Selection::All),
+        },
+        Err(Error::NoDevice(_)) if allow_software && !software_among(&listed).is_empty() => Ok(Selection::Software),
+        Err(error) => Err(error),
+    }
 }
 
 /// Where `now`, what another Instance lists, has the adapter `listed[index]`: by name, backend, and position among

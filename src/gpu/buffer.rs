@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+pub use wgpu::Buffer;
+
 use crate::gpu::adapter::{Gpu, Trouble};
 use crate::{Error, Result};
 
@@ -36,6 +38,18 @@ pub fn empty(gpu: &Gpu, label: &str, size: u64, usage: wgpu::BufferUsages) -> wg
         usage,
         mapped_at_creation: false,
     })
+}
+
+/// A uniform holding `bytes`.
+pub fn uniform(gpu: &Gpu, label: &str, bytes: &[u8]) -> Buffer {
+    let buffer = empty(gpu, label, bytes.len() as u64, wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST);
+    gpu.queue.write_buffer(&buffer, 0, bytes);
+    buffer
+}
+
+/// A storage buffer of `size` bytes that kernels write and [`read`] reads.
+pub fn output(gpu: &Gpu, label: &str, size: u64) -> Buffer {
+    empty(gpu, label, size, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC)
 }
 
 /// Bytes that a buffer for `size` bytes takes: at least 16 and a multiple of 16.

@@ -7,7 +7,6 @@ use std::sync::{Arc, Condvar, Mutex};
 use std::time::Duration;
 
 use crate::gpu::adapter::{Gpu, Trouble};
-use crate::gpu::layout::Wave;
 
 /// Moments in the life of a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,13 +23,6 @@ pub enum Phase {
     Merge,
     /// Before the next units are asked for.
     Between,
-}
-
-impl Phase {
-    /// When `wave` is about to be submitted.
-    pub fn of(wave: &Wave) -> Phase {
-        if wave.pixel_begin + wave.sample_begin == 0 { Phase::FirstWave } else { Phase::LaterWave }
-    }
 }
 
 /// What goes wrong.
@@ -148,12 +140,8 @@ impl Faults {
         self.hanging.load(Ordering::SeqCst)
     }
 
-    /// Silences the kernels of `wave`, if that is what goes wrong with it.
-    pub fn silence(&self, wave: &mut Wave) {
-        match self.silent.lock().expect("no panic").take() {
-            Some(Kind::SilentGenerate) => wave.path_count = 0,
-            Some(_) => wave.pixel_count = 0,
-            None => {}
-        }
+    /// Which kernels of the next wave write nothing, if that is what goes wrong.
+    pub fn silence(&self) -> Option<Kind> {
+        self.silent.lock().expect("no panic").take()
     }
 }

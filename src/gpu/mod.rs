@@ -1,4 +1,4 @@
-//! The only place, with `render::worker`, that names wgpu.
+//! wgpu: adapters, buffers, pipelines; names, bytes and texts come in. With `render::worker` the only place that names it.
 
 pub mod adapter;
 mod allocation;
@@ -6,9 +6,8 @@ pub mod buffer;
 pub mod deadline;
 #[cfg(test)]
 pub mod fault;
-pub mod layout;
+mod instance;
 pub mod pass;
-pub mod self_test;
-pub mod shader;
+pub mod source;
 pub mod timestamps;
 pub mod upload;

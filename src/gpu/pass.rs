@@ -1,7 +1,8 @@
 //! A compute pass: a composed shader, its pipeline, and bindings found by the names they have in the WGSL.
 
 use crate::gpu::adapter::Gpu;
-use crate::gpu::shader::Source;
+use crate::gpu::buffer;
+use crate::gpu::source::Source;
 use crate::{Error, Result};
 
 /// A compute pipeline whose bind groups are made from the shader's own declarations.
@@ -26,12 +27,22 @@ struct Binding {
 const DYNAMIC: &str = "step";
 
 impl Pass {
-    /// Compiles `source`, whose entry point is called like its file.
+    /// Compiles `source`, whose entry point is called like its file. Errors: a defect of the text; more storage buffers than the device
+    /// binds.
     pub fn new(gpu: &Gpu, source: &Source) -> Result<Pass> {
         let module = source.parse()?;
         let entry = module.entry_points.first().map(|e| e.name.clone());
         let entry = entry.ok_or_else(|| Error::Internal(format!("{} has no entry point", source.label)))?;
         let bindings = bindings(&module);
+        let needed = bindings.iter().filter(|b| !b.uniform).count() as u32;
+        let most = gpu.limits.max_storage_buffers_per_shader_stage;
+        if needed > most {
+            return Err(Error::NoDevice(format!(
+                "{}: {} binds {needed} storage buffers for this scene, and this device {most} at most: use another device, or a \
+                 scene with fewer kinds of materials, lights, textures or media",
+                gpu.name, source.label
+            )));
+        }
         let groups = bindings.iter().map(|b| b.group + 1).max().unwrap_or(0);
         let device = &gpu.device;
         let layouts: Vec<_> = (0..groups)
@@ -52,7 +63,7 @@ impl Pass {
             label: Some(source.label),
             source: wgpu::ShaderSource::Wgsl(source.text.as_str().into()),
         };
-        // SAFETY: bounds checks and loop bounding are left out (KERNELS section 1: 5-25 %). Every index that these
+        // SAFETY: bounds checks and loop bounding are left out, which took 5 to 25 % of kernels on lavapipe. Every index that these
         // shaders compute stays within the buffers that `render::worker` sizes for them, and every loop is bounded by
         // its own counter; the tests also run them with the checks on.
         let module = unsafe { device.create_shader_module_trusted(descriptor, gpu.shader_checks) };
@@ -93,6 +104,35 @@ impl Pass {
             entries: &entries,
         }))
     }
+
+    /// Runs it once over so many workgroups, each buffer looked up by the name of its variable, and waits for it: for kernels beside
+    /// the render.
+    pub fn run<'a>(
+        &self,
+        gpu: &Gpu,
+        [x, y]: [u32; 2],
+        find: impl Fn(&str) -> Option<wgpu::BufferBinding<'a>>,
+    ) -> Result<()> {
+        let groups =
+            (0..self.layouts.len() as u32).map(|group| self.bind(gpu, group, &find)).collect::<Result<Vec<_>>>()?;
+        let descriptor = wgpu::CommandEncoderDescriptor { label: Some(self.label) };
+        let mut encoder = gpu.device.create_command_encoder(&descriptor);
+        {
+            let mut compute = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+            compute.set_pipeline(&self.pipeline);
+            for (index, group) in groups.iter().enumerate() {
+                let dynamic = self.bindings.iter().filter(|b| b.group == index as u32 && b.name == DYNAMIC).count();
+                compute.set_bind_group(index as u32, group, &vec![0; dynamic]);
+            }
+            compute.dispatch_workgroups(x, y, 1);
+        }
+        buffer::wait(gpu, gpu.queue.submit([encoder.finish()]), buffer::WARM_UP)
+    }
+}
+
+/// Storage buffers that a kernel binds.
+pub fn storage_buffers(source: &Source) -> Result<u32> {
+    Ok(bindings(&source.parse()?).iter().filter(|b| !b.uniform).count() as u32)
 }
 
 fn bindings(module: &naga::Module) -> Vec<Binding> {

@@ -4,12 +4,13 @@
 //! the tiles themselves: a slow viewer sees fewer states, never older ones, and nobody waits for it.
 
 use std::ops::Range;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use crossbeam_channel::{Receiver, Sender, unbounded};
+
+use super::status::Status;
 use crate::cube::{Look, Seen};
-use crate::render::schedule::Status;
 
 /// Most points of the error curve. More are thinned out by half, from every second on.
 const MOST_POINTS: usize = 1000;
@@ -72,9 +73,19 @@ pub struct ErrorPoint {
 pub struct Feed {
     state: Mutex<State>,
     changed: Condvar,
-    paused: AtomicBool,
-    save: Arc<AtomicBool>,
-    stop: Box<dyn Fn() + Send + Sync>,
+    control: Sender<Control>,
+    controls: Receiver<Control>,
+}
+
+/// What whoever watches wants of a render.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Control {
+    /// To rest, or to go on.
+    Rest(bool),
+    /// To have everything merged so far on disk.
+    Save,
+    /// An orderly end.
+    Stop,
 }
 
 struct State {
@@ -123,14 +134,14 @@ pub struct Snapshot {
 }
 
 impl Feed {
-    /// A feed of a render that sets `save` to have everything merged so far on disk, and is ended by `stop`.
-    pub fn of_render(save: Arc<AtomicBool>, stop: impl Fn() + Send + Sync + 'static) -> Arc<Feed> {
-        Arc::new(Feed::new(Stage::Preparing, save, Box::new(stop)))
+    /// A feed of a render, which hears of [`Feed::controls`].
+    pub fn of_render() -> Arc<Feed> {
+        Arc::new(Feed::new(Stage::Preparing))
     }
 
     /// A feed of a cube on disk, which nothing here controls.
     pub fn of_cube(cube: crate::cube::Cube) -> Arc<Feed> {
-        let feed = Feed::new(Stage::Viewing, Arc::default(), Box::new(|| {}));
+        let feed = Feed::new(Stage::Viewing);
         feed.publish(|state| {
             state.tiles = vec![0; cube.grid().count() as usize];
             state.source = Some(Arc::new(cube));
@@ -138,7 +149,7 @@ impl Feed {
         Arc::new(feed)
     }
 
-    fn new(stage: Stage, save: Arc<AtomicBool>, stop: Box<dyn Fn() + Send + Sync>) -> Feed {
+    fn new(stage: Stage) -> Feed {
         let state = State {
             revision: 1,
             tiles: Vec::new(),
@@ -149,7 +160,8 @@ impl Feed {
             skipped: 0,
             source: None,
         };
-        Feed { state: Mutex::new(state), changed: Condvar::new(), paused: AtomicBool::new(false), save, stop }
+        let (control, controls) = unbounded();
+        Feed { state: Mutex::new(state), changed: Condvar::new(), control, controls }
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
@@ -230,11 +242,11 @@ impl Feed {
         self.state().snapshot()
     }
 
-    /// Waits until something newer than `revision` is published, but not longer than `patience`.
-    pub fn wait(&self, revision: u64, patience: Duration) -> Snapshot {
+    /// Waits until something newer than `revision` is published, but not longer than `time_limit`.
+    pub fn wait(&self, revision: u64, time_limit: Duration) -> Snapshot {
         let old = |state: &mut State| state.revision <= revision;
         let (state, _) =
-            self.changed.wait_timeout_while(self.state(), patience, old).unwrap_or_else(PoisonError::into_inner);
+            self.changed.wait_timeout_while(self.state(), time_limit, old).unwrap_or_else(PoisonError::into_inner);
         state.snapshot()
     }
 
@@ -251,23 +263,15 @@ impl Feed {
         (state.revision, ranges)
     }
 
-    /// Asks the render to rest, or to go on.
-    pub fn pause(&self, paused: bool) {
-        self.paused.store(paused, Ordering::SeqCst);
+    /// Passes on what somebody who watches wants.
+    pub fn control(&self, control: Control) {
+        // Both ends of the channel are here.
+        let _ = self.control.send(control);
     }
 
-    pub fn is_pause_wanted(&self) -> bool {
-        self.paused.load(Ordering::SeqCst)
-    }
-
-    /// Asks for everything merged so far to be on disk.
-    pub fn save(&self) {
-        self.save.store(true, Ordering::SeqCst);
-    }
-
-    /// Asks for an orderly end.
-    pub fn stop(&self) {
-        (self.stop)();
+    /// What whoever watches wants, for the render to do.
+    pub fn controls(&self) -> &Receiver<Control> {
+        &self.controls
     }
 }
 
@@ -304,8 +308,6 @@ impl State {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::atomic::AtomicUsize;
-
     use super::*;
 
     fn status(samples: u32) -> Status {
@@ -324,7 +326,7 @@ mod tests {
     }
 
     fn feed(tiles: usize) -> Arc<Feed> {
-        let feed = Feed::of_render(Arc::default(), || {});
+        let feed = Feed::of_render();
         feed.publish(|state| state.tiles = vec![0; tiles]);
         feed
     }
@@ -370,16 +372,9 @@ mod tests {
 
     #[test]
     fn controls_reach_who_renders() {
-        let (save, stopped) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicUsize::new(0)));
-        let count = Arc::clone(&stopped);
-        let feed = Feed::of_render(Arc::clone(&save), move || {
-            count.fetch_add(1, Ordering::SeqCst);
-        });
-        assert!(!feed.is_pause_wanted());
-        feed.pause(true);
-        feed.save();
-        feed.stop();
-        assert!(feed.is_pause_wanted() && save.load(Ordering::SeqCst));
-        assert_eq!(stopped.load(Ordering::SeqCst), 1);
+        let feed = Feed::of_render();
+        let all = [Control::Rest(true), Control::Save, Control::Rest(false), Control::Stop];
+        all.into_iter().for_each(|control| feed.control(control));
+        assert!(feed.controls().try_iter().eq(all));
     }
 }

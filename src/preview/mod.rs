@@ -5,10 +5,15 @@
 
 mod disk;
 mod feed;
+mod status;
 mod tev;
 #[cfg(feature = "web")]
 pub mod web;
 
 pub use disk::follow;
-pub use feed::{ErrorPoint, Feed, Progress, Snapshot, Source, Stage, Work};
+pub use feed::{Control, ErrorPoint, Feed, Progress, Snapshot, Source, Stage, Work};
+pub use status::{DeviceStatus, Status};
 pub use tev::Tev;
+
+/// The picture of a render as a file, replaced in one step again and again.
+pub use crate::format::png::{KEPT as PICTURE, write};

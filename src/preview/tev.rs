@@ -1,12 +1,13 @@
 //! Streams the picture to tev, an image viewer that listens for it (protocol by `tev_client`), tile by tile.
 
+use std::convert::Infallible;
 use std::io::ErrorKind;
 use std::net::{TcpStream, ToSocketAddrs};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::{self, JoinHandle};
-use std::time::{Duration, Instant};
+use std::thread;
+use std::time::Duration;
 
+use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
 use tev_client::{PacketCreateImage, PacketUpdateImage, TevClient};
 
 use super::{Feed, Snapshot};
@@ -26,8 +27,10 @@ const CHANNELS: [&str; 3] = ["R", "G", "B"];
 
 /// A thread that keeps one image of tev up to date, and connects again whenever tev comes back.
 pub struct Tev {
-    ending: Arc<AtomicBool>,
-    thread: JoinHandle<()>,
+    /// Closed when the thread is to end.
+    open: Sender<Infallible>,
+    /// Closed when it has.
+    done: Receiver<Infallible>,
 }
 
 impl Tev {
@@ -36,21 +39,21 @@ impl Tev {
     pub fn start(address: String, name: String, feed: Arc<Feed>) -> Result<(Tev, bool)> {
         let first = connect(&address);
         let there = first.is_ok();
-        let ending = Arc::new(AtomicBool::new(false));
-        let ended = Arc::clone(&ending);
-        let work = move || Stream { address, name, feed, ended }.run(first.ok());
-        let thread = thread::Builder::new().name("tev".into()).spawn(work);
-        let thread = thread.map_err(|error| Error::Internal(format!("no thread for tev: {error}")))?;
-        Ok((Tev { ending, thread }, there))
+        let ((open, ended), (working, done)) = (bounded(0), bounded::<Infallible>(0));
+        let work = move || {
+            let _working = working;
+            Stream { address, name, feed, ended }.run(first.ok());
+        };
+        let spawned = thread::Builder::new().name("tev".into()).spawn(work);
+        spawned.map_err(|error| Error::Internal(format!("no thread for tev: {error}")))?;
+        Ok((Tev { open, done }, there))
     }
 
     /// Sends what is left, if tev takes it soon.
     pub fn finish(self) {
-        self.ending.store(true, Ordering::SeqCst);
-        let began = Instant::now();
-        while !self.thread.is_finished() && began.elapsed() < LAST_WITHIN {
-            thread::sleep(Duration::from_millis(10));
-        }
+        drop(self.open);
+        // Either way it is over: the thread has ended, or its time is up.
+        let _ = self.done.recv_timeout(LAST_WITHIN);
     }
 }
 
@@ -58,7 +61,7 @@ struct Stream {
     address: String,
     name: String,
     feed: Arc<Feed>,
-    ended: Arc<AtomicBool>,
+    ended: Receiver<Infallible>,
 }
 
 /// A tev that has the image.
@@ -74,8 +77,10 @@ impl Stream {
     fn run(&self, mut connected: Option<TcpStream>) {
         let mut connection = None;
         let mut revision = 0;
+        // How long to wait before the next round, unless the end comes first.
+        let mut pause = Duration::ZERO;
         loop {
-            let ending = self.ended.load(Ordering::SeqCst);
+            let ending = matches!(self.ended.recv_timeout(pause), Err(RecvTimeoutError::Disconnected));
             let snapshot = self.feed.wait(revision, if ending { Duration::ZERO } else { AGAIN_AFTER });
             let sent = match &mut connection {
                 Some(connection) => self.update(connection, &snapshot),
@@ -85,6 +90,7 @@ impl Stream {
                         return;
                     }
                     revision = snapshot.revision;
+                    pause = Duration::ZERO;
                     continue;
                 }
                 None => {
@@ -101,12 +107,9 @@ impl Stream {
             if ending {
                 return;
             }
-            match connection.is_some() {
-                true => {
-                    revision = snapshot.revision;
-                    thread::sleep(PACE);
-                }
-                false => thread::sleep(AGAIN_AFTER),
+            pause = if connection.is_some() { PACE } else { AGAIN_AFTER };
+            if connection.is_some() {
+                revision = snapshot.revision;
             }
         }
     }

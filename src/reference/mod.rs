@@ -16,10 +16,8 @@ mod sky;
 mod texture;
 mod world;
 
-use std::num::NonZeroUsize;
-use std::sync::atomic::{AtomicUsize, Ordering};
-
 use path::{Path, Tracer};
+use rayon::prelude::*;
 use rng::Rng;
 
 use crate::scene::Scene;
@@ -40,8 +38,30 @@ pub struct Estimate {
 /// The result depends on the arguments only, not on the number of cores. Cost: about a microsecond per surface met
 /// in a simple scene, plus a few nanoseconds per channel.
 pub fn render(scene: &Scene, pixels: &[[u32; 2]], samples: u32, seed: u64) -> Estimate {
-    let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
-    render_on(scene, pixels, samples, seed, cores)
+    let tracer = Tracer::new(scene);
+    let blocks = samples.div_ceil(BLOCK) as usize;
+    let render_block = |path: &mut Path, job: usize| {
+        let (pixel, block) = (pixels[job / blocks], (job % blocks) as u32);
+        let mut rng = Rng::from_keys(&[seed, u64::from(pixel[0]), u64::from(pixel[1]), u64::from(block)]);
+        let mut moments = Moments::new(scene.channels.len());
+        for _ in 0..BLOCK.min(samples - block * BLOCK) {
+            tracer.trace(pixel, &mut rng, path);
+            moments.add(&path.radiance);
+        }
+        moments
+    };
+    // Merged in one order, whoever computed them. No two take the same time, so that each is given out by itself.
+    let jobs = (0..pixels.len() * blocks).into_par_iter().with_max_len(1);
+    let moments: Vec<Moments> = jobs.map_init(|| Path::new(scene), render_block).collect();
+
+    let mut estimate = Estimate { mean: Vec::new(), standard_error: Vec::new(), samples };
+    let mut moments = moments.into_iter();
+    for _ in pixels {
+        let pixel = moments.by_ref().take(blocks).reduce(Moments::merge);
+        let pixel = pixel.unwrap_or_else(|| Moments::new(scene.channels.len()));
+        pixel.finish(&mut estimate);
+    }
+    estimate
 }
 
 /// Radiance of every pixel of the crop, row by row.
@@ -53,50 +73,6 @@ pub fn render_image(scene: &Scene, samples: u32, seed: u64) -> Estimate {
 
 /// Samples of one pixel that are taken in one go, with one stream of random numbers: what threads share out.
 const BLOCK: u32 = 1024;
-
-fn render_on(scene: &Scene, pixels: &[[u32; 2]], samples: u32, seed: u64, threads: usize) -> Estimate {
-    let tracer = Tracer::new(scene);
-    let blocks = samples.div_ceil(BLOCK) as usize;
-    let jobs = pixels.len() * blocks;
-    let next = AtomicUsize::new(0);
-    let work = || {
-        let mut path = Path::new(scene);
-        let mut done = Vec::new();
-        loop {
-            let job = next.fetch_add(1, Ordering::Relaxed);
-            if job >= jobs {
-                return done;
-            }
-            let (pixel, block) = (pixels[job / blocks], (job % blocks) as u32);
-            let mut rng = Rng::from_keys(&[seed, u64::from(pixel[0]), u64::from(pixel[1]), u64::from(block)]);
-            let mut moments = Moments::new(scene.channels.len());
-            for _ in 0..BLOCK.min(samples - block * BLOCK) {
-                tracer.trace(pixel, &mut rng, &mut path);
-                moments.add(&path.radiance);
-            }
-            done.push((job, moments));
-        }
-    };
-
-    let mut blocks_done = std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..threads.clamp(1, jobs.max(1))).map(|_| scope.spawn(work)).collect();
-        let join = |worker: std::thread::ScopedJoinHandle<_>| {
-            worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-        };
-        workers.into_iter().flat_map(join).collect::<Vec<(usize, Moments)>>()
-    });
-    // Merged in one order, whoever computed them.
-    blocks_done.sort_unstable_by_key(|(job, _)| *job);
-
-    let mut estimate = Estimate { mean: Vec::new(), standard_error: Vec::new(), samples };
-    let mut blocks_done = blocks_done.into_iter().map(|(_, moments)| moments);
-    for _ in pixels {
-        let pixel = blocks_done.by_ref().take(blocks).reduce(Moments::merge);
-        let pixel = pixel.unwrap_or_else(|| Moments::new(scene.channels.len()));
-        pixel.finish(&mut estimate);
-    }
-    estimate
-}
 
 /// Running mean and sum of squared deviations per channel (Welford 1962).
 struct Moments {
@@ -205,10 +181,14 @@ mod tests {
     fn result_depends_on_arguments_only() {
         let scene = small_scene();
         let pixels = [[1, 0], [2, 0], [3, 0], [1, 1], [2, 1], [3, 1]];
-        let one = render_on(&scene, &pixels, 2500, 7, 1);
+        let on = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            pool.install(|| render(&scene, &pixels, 2500, 7))
+        };
+        let one = on(1);
         assert_eq!(one.mean.len(), 12);
         for threads in [2, 5] {
-            assert_eq!(render_on(&scene, &pixels, 2500, 7, threads), one);
+            assert_eq!(on(threads), one);
         }
         assert_eq!(render_image(&scene, 2500, 7), one);
         assert_ne!(render(&scene, &pixels, 2500, 8).mean, one.mean);

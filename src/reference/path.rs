@@ -90,7 +90,7 @@ impl<'a> Path<'a> {
         }
     }
 
-    /// Starts a path with wavelength coordinate `mu` (Eq. 4 of the method: one for all channels).
+    /// Starts a path with wavelength coordinate `mu` (Eq. 4 of Hoarau et al. 2018: one for all channels).
     fn begin(&mut self, mu: f64) {
         self.spectra.begin(mu);
         for (k, throughput) in self.throughput.iter_mut().enumerate() {

@@ -25,7 +25,7 @@ pub const SURE_EPOCHS: u32 = 8;
 pub struct StopRule {
     pub samples: Option<u32>,
     pub time: Option<Duration>,
-    /// The error estimate (DESIGN section 8) that no channel is to exceed; asked once there are [`SURE_EPOCHS`].
+    /// The error estimate (docs/METHOD.md, Errors) that no channel is to exceed; asked once there are [`SURE_EPOCHS`].
     pub error: Option<f64>,
 }
 

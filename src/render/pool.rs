@@ -2,28 +2,32 @@
 
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::mpsc::{self, Sender};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError, Weak};
+use std::sync::{Arc, OnceLock, Weak};
 use std::thread;
 use std::time::Instant;
 
+use crossbeam_channel::{Sender, unbounded};
+use rayon::ThreadPool;
+use rayon::prelude::*;
+
 use crate::cube::{Look, Writer, epoch_samples, merge_means, samples_before};
+use crate::device::prepared::Prepared;
+use crate::device::words::Counters;
 use crate::files::format_bytes;
 use crate::gpu::adapter::Gpu;
 use crate::gpu::buffer::{self, WARM_UP};
 #[cfg(test)]
 use crate::gpu::fault::Phase;
-use crate::gpu::layout::Counters;
-use crate::gpu::self_test;
 use crate::preview::Source;
-use crate::render::prepare::Prepared;
+use crate::render::interrupt::Interrupt;
 use crate::render::queue::{Group, Next, Queue};
+use crate::render::self_test;
 use crate::render::watch::{Device, Reports};
 use crate::render::wave::{Budget, WavePlan};
-use crate::render::worker::{Collected, Interrupt, Profile, UnitRect, Worker, device_limits};
+use crate::render::worker::{Collected, Profile, UnitRect, Worker, device_limits};
 use crate::{Error, Result};
 
-/// Most threads that merge what one device brings back. A tile of a GPU comes back faster than one core merges it: on an H200 at 400
+/// Threads that merge what a device brings back, at most. A tile of a GPU comes back faster than one core merges it: on an H200 at 400
 /// channels a path took 9 ns on the device, and 106 ns of one core to merge.
 pub const MERGE_THREADS: usize = 8;
 
@@ -114,8 +118,8 @@ pub struct Merged {
 /// A device at work: its number, the groups that it has under way, the oldest first, and to whom it reports.
 struct Post<'a> {
     device: usize,
-    /// Threads that merge its units.
-    merge_threads: usize,
+    /// The threads that merge its units, if not its own does.
+    mergers: Option<Arc<ThreadPool>>,
     taken: VecDeque<Taken>,
     reports: &'a Sender<(usize, Report)>,
     /// Whether it was ready once, and what it measured.
@@ -133,17 +137,16 @@ impl Post<'_> {
 impl Pool {
     /// Sets every device to work on a thread of its own.
     pub fn start(self: &Arc<Self>, gpus: Vec<Gpu>) -> Result<Reports> {
-        let (sender, receiver) = mpsc::channel();
+        let (sender, receiver) = unbounded();
         let mut devices = Vec::new();
-        let cores = thread::available_parallelism().map_or(1, usize::from);
-        let cores_each = (cores / gpus.len().max(1)).clamp(1, MERGE_THREADS);
+        let mergers = mergers(gpus.iter().filter(|gpu| !gpu.is_software).count())?;
         for (device, gpu) in gpus.into_iter().enumerate() {
             // The cores of a software device have enough to do.
-            let merge_threads = if gpu.is_software { 1 } else { cores_each };
+            let mergers = mergers.clone().filter(|_| !gpu.is_software);
             let (name, deadline) = (gpu.name.clone(), Arc::clone(&gpu.deadline));
             let (pool, sender) = (Arc::clone(self), sender.clone());
             let thread = thread::Builder::new().name(format!("device {}", device + 1));
-            let thread = thread.spawn(move || pool.work(device, merge_threads, gpu, &sender));
+            let thread = thread.spawn(move || pool.work(device, mergers, gpu, &sender));
             let thread = thread.map_err(|e| Error::Internal(format!("no thread for device {}: {e}", device + 1)))?;
             devices.push(Device::new(name, deadline, thread));
         }
@@ -151,9 +154,9 @@ impl Pool {
     }
 
     /// The life of device number `device`.
-    fn work(&self, device: usize, merge_threads: usize, gpu: Gpu, reports: &Sender<(usize, Report)>) {
+    fn work(&self, device: usize, mergers: Option<Arc<ThreadPool>>, gpu: Gpu, reports: &Sender<(usize, Report)>) {
         let gpu = Arc::new(gpu);
-        let mut post = Post { device, merge_threads, taken: VecDeque::new(), reports, ready: false, profile: None };
+        let mut post = Post { device, mergers, taken: VecDeque::new(), reports, ready: false, profile: None };
         let result = catch_unwind(AssertUnwindSafe(|| self.serve(&gpu, &mut post)));
         let result =
             result.unwrap_or_else(|_| Err(Error::Internal(format!("the thread of device {} panicked", device + 1))));
@@ -241,13 +244,14 @@ impl Pool {
                     post.taken.push_back(Taken::new(group));
                     for epoch in epochs {
                         let samples = epoch_samples(epoch, self.full_epoch);
-                        worker.submit(&units, epoch, samples, &mut |c| self.merge(&c, post))?;
+                        let before = worker.submit(&units, epoch, samples)?;
+                        before.map_or(Ok(()), |before| self.merge(&before, post))?;
                     }
                 }
-                // What this device holds back may be what others, or it itself, wait for.
                 Next::Later if worker.is_idle() => self.queue.wait(),
-                Next::Later => worker.collect(&mut |c| self.merge(&c, post))?,
-                Next::Never => return worker.collect(&mut |c| self.merge(&c, post)),
+                // What this device holds back may be what others, or it itself, wait for.
+                Next::Later => worker.collect()?.map_or(Ok(()), |last| self.merge(&last, post))?,
+                Next::Never => return worker.collect()?.map_or(Ok(()), |last| self.merge(&last, post)),
             }
         }
     }
@@ -295,8 +299,8 @@ impl Pool {
         oldest.note(counters, epoch, || self.bad_sample(collected));
         let (n_before, samples) = (samples_before(epoch, self.full_epoch), epoch_samples(epoch, self.full_epoch));
         // With responses the device has rendered parts of the channels.
-        let sums = self.prepared.integration.as_ref().map(|integration| integration.sums(collected.means));
-        let means: &[f32] = sums.as_deref().unwrap_or(collected.means);
+        let sums = self.prepared.integration.as_ref().map(|integration| integration.sums(collected.means()));
+        let means: &[f32] = sums.as_deref().unwrap_or(collected.means());
         let units = means.chunks(means.len() / collected.units.len());
         if oldest.group.epochs > 1 {
             // The same arithmetic as in the cube, but nothing is written before the last of these epochs.
@@ -308,13 +312,14 @@ impl Pool {
             if !last {
                 return Ok(());
             }
-            let means = oldest.group.tiles.iter().zip(&oldest.means);
-            side_by_side(post.merge_threads, means, |(&tile, mean)| {
-                self.cube().merge_unit(tile, 0, n_before + samples, mean)
+            let means: Vec<_> = oldest.group.tiles.iter().zip(&oldest.means).collect();
+            on_all(post.mergers.as_deref(), &means, |(tile, mean)| {
+                self.cube().merge_unit(**tile, 0, n_before + samples, mean)
             })?;
         } else {
-            side_by_side(post.merge_threads, oldest.group.tiles.iter().zip(units), |(&tile, unit)| {
-                self.cube().merge_unit(tile, n_before, samples, unit)
+            let units: Vec<_> = oldest.group.tiles.iter().zip(units).collect();
+            on_all(post.mergers.as_deref(), &units, |(tile, unit)| {
+                self.cube().merge_unit(**tile, n_before, samples, unit)
             })?;
         }
         let Some(Taken { group, tally, bad, .. }) = post.taken.pop_front() else { return Ok(()) };
@@ -350,27 +355,25 @@ impl Taken {
     }
 }
 
-/// Does `each` of `work` on so many threads, until one fails.
-fn side_by_side<T: Send>(
-    threads: usize,
-    mut work: impl ExactSizeIterator<Item = T> + Send,
-    each: impl Fn(T) -> Result<()> + Sync,
-) -> Result<()> {
-    let threads = threads.min(work.len());
+/// The threads that merge what so many devices bring back, shared by all of them; `None` where that is left to the devices' own.
+fn mergers(devices: usize) -> Result<Option<Arc<ThreadPool>>> {
+    let cores = thread::available_parallelism().map_or(1, usize::from);
+    let threads = cores.min(devices * MERGE_THREADS);
     if threads <= 1 {
-        return work.try_for_each(each);
+        return Ok(None);
     }
-    let work = Mutex::new(work);
-    let next = || work.lock().unwrap_or_else(PoisonError::into_inner).next();
-    let some = || std::iter::from_fn(&next).try_for_each(&each);
-    thread::scope(|scope| {
-        let others: Vec<_> = (1..threads).map(|_| scope.spawn(some)).collect();
-        let own = some();
-        let join = |other: thread::ScopedJoinHandle<'_, Result<()>>| {
-            other.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-        };
-        others.into_iter().map(join).fold(own, Result::and)
-    })
+    let named = rayon::ThreadPoolBuilder::new().num_threads(threads).thread_name(|i| format!("merge {}", i + 1));
+    let pool = named.build().map_err(|e| Error::Internal(format!("no threads to merge with: {e}")))?;
+    Ok(Some(Arc::new(pool)))
+}
+
+/// Does `each` of `work` on the threads of `pool`, or on this one, until one fails.
+fn on_all<T: Sync>(pool: Option<&ThreadPool>, work: &[T], each: impl Fn(&T) -> Result<()> + Sync) -> Result<()> {
+    match pool {
+        // Tiles are few and large: each is given out by itself.
+        Some(pool) if work.len() > 1 => pool.install(|| work.par_iter().with_max_len(1).try_for_each(&each)),
+        _ => work.iter().try_for_each(each),
+    }
 }
 
 #[cfg(test)]
@@ -380,19 +383,30 @@ mod tests {
     use super::*;
 
     #[test]
-    fn work_side_by_side_is_all_done_or_fails() {
-        for threads in [1, 2, 5, 100] {
+    fn work_on_all_threads_is_all_done_or_fails() {
+        let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        let work: Vec<u32> = (1..=100).collect();
+        for pool in [None, Some(pool(2)), Some(pool(5))] {
             let sum = AtomicU32::new(0);
-            let add = |x: u32| {
-                sum.fetch_add(x, Ordering::Relaxed);
+            let add = |x: &u32| {
+                sum.fetch_add(*x, Ordering::Relaxed);
                 Ok(())
             };
-            side_by_side(threads, (1..=100u32).collect::<Vec<_>>().into_iter(), add).expect("no error");
+            on_all(pool.as_ref(), &work, add).expect("no error");
             assert_eq!(sum.into_inner(), 5050);
-            let fail = |x: u32| if x == 57 { Err(Error::Usage("57".into())) } else { Ok(()) };
-            let error = side_by_side(threads, (1..=100u32).collect::<Vec<_>>().into_iter(), fail);
-            assert_eq!(error.expect_err("one fails").to_string(), "57");
-            side_by_side(threads, std::iter::empty::<u32>(), |_| Ok(())).expect("nothing to do");
+            let fail = |x: &u32| if *x == 57 { Err(Error::Usage("57".into())) } else { Ok(()) };
+            assert_eq!(on_all(pool.as_ref(), &work, fail).expect_err("one fails").to_string(), "57");
+            on_all(pool.as_ref(), &[], |_: &u32| panic!("nothing to do")).expect("nothing to do");
         }
+    }
+
+    /// The cores of the machine, and not more of them than the devices can keep busy.
+    #[test]
+    fn mergers_are_few() {
+        let cores = thread::available_parallelism().map_or(1, usize::from);
+        let threads = |devices| mergers(devices).expect("threads").map_or(0, |pool| pool.current_num_threads());
+        assert_eq!(threads(0), 0);
+        assert!([1, 2, 100].map(threads).into_iter().all(|threads| threads <= cores && threads != 1));
+        assert!(threads(1) <= MERGE_THREADS);
     }
 }

@@ -1,60 +1,31 @@
 //! The render: epochs of the whole image, decided one after the other; devices that pull their units; what is known so far.
 
 use std::collections::{BTreeMap, VecDeque};
-use std::sync::atomic::Ordering;
 use std::sync::{Arc, OnceLock};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
+use signal_hook::consts::SIGINT;
 
 use crate::cube::{Run, RunFile, Writer, check_target, epoch_samples, epochs_in, reduction, samples_before};
+use crate::device::prepared::Prepared;
 use crate::gpu::adapter::Gpu;
+use crate::preview::{Control, DeviceStatus, Status};
+use crate::render::interrupt::Interrupt;
 use crate::render::job::{Job, SURE_EPOCHS};
 use crate::render::plan;
 use crate::render::pool::{Merged, Pool, Report, Tally};
-use crate::render::prepare::Prepared;
 use crate::render::queue::Queue;
-use crate::render::watch::{Polled, Reports};
-use crate::render::worker::{Interrupt, Profile, check_interrupt};
-use crate::{Error, Result, files, format};
+use crate::render::watch::{Heard, Reports, Requests};
+use crate::render::worker::Profile;
+use crate::{Error, Result, preview};
 
 /// The preview file is rewritten at most this often, and takes at most this share of the time.
 const PREVIEW_INTERVAL: Duration = Duration::from_secs(1);
 const PREVIEW_SHARE: u32 = 20;
 /// Most pixels of the preview file: 4K. Larger pictures are reduced, so that memory does not grow with the cube.
 pub const PREVIEW_PIXELS: u64 = 3840 * 2160;
-
-/// How far a render is.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Status {
-    /// Samples per pixel in the whole image, and when the current epoch will be done.
-    pub samples: u32,
-    pub samples_next: u32,
-    /// Units of the current epoch merged, of all.
-    pub units: (u32, u32),
-    pub paths: u64,
-    pub rays: u64,
-    pub elapsed: Duration,
-    /// Seconds since the first device was ready.
-    pub rendering_s: f64,
-    /// The largest error estimate of a channel, from two full epochs on.
-    pub error_estimate: Option<f64>,
-    pub remaining: Option<Duration>,
-    pub devices: Vec<DeviceStatus>,
-}
-
-/// What one device did.
-#[derive(Debug, Clone, PartialEq)]
-pub struct DeviceStatus {
-    pub name: String,
-    pub paths: u64,
-    /// Units that it has rendered, of all epochs.
-    pub units: u64,
-    /// Seconds in which it had work, and had not.
-    pub busy_s: f64,
-    pub idle_s: f64,
-}
 
 /// What a render tells while it goes on.
 pub enum Event<'a> {
@@ -93,7 +64,7 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
     let tiles = job.tiles(&header)?;
     let there = check_target(&job.output, &header, job.existing, &tiles)?;
     if let Some(preview) = &job.preview {
-        files::check_target(&preview.file)?;
+        preview::PICTURE.check_target(&preview.file)?;
     }
     let gpus = Gpu::open_all(&job.devices)?;
     for gpu in &gpus {
@@ -129,7 +100,7 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
     let mut reports = pool.start(gpus)?;
     let (mut committer, mut run) = (None, None);
     let result = render.wait_for_devices(&mut reports, observe).and_then(|()| {
-        check_interrupt(interrupt)?;
+        interrupt.check()?;
         // Only now is anything written: whatever can be refused has been.
         let mut warnings = Vec::new();
         let opened = Writer::open(&job.output, &header, job.existing, tiles, &mut |what| warnings.push(what));
@@ -191,6 +162,7 @@ fn no_cube() -> Error {
 struct Render<'a> {
     job: &'a Job,
     interrupt: &'a Interrupt,
+    requests: Requests,
     /// Samples per pixel at which to stop, the end of an epoch.
     samples_limit: Option<u32>,
     /// Paths to trace until the limit.
@@ -201,6 +173,9 @@ struct Render<'a> {
     device_bytes: u64,
     profile: Option<Profile>,
     status: Status,
+    /// Whether somebody has asked how far it is, and whether it should rest.
+    asked: bool,
+    rest_wanted: bool,
     /// Since when the render rests, and how long it has before.
     resting: Option<Instant>,
     rested: Duration,
@@ -230,6 +205,7 @@ impl<'a> Render<'a> {
         Render {
             job,
             interrupt,
+            requests: Requests::new(interrupt, job.feed.as_ref().map(|feed| feed.controls())),
             samples_limit,
             paths_needed: None,
             started,
@@ -237,6 +213,8 @@ impl<'a> Render<'a> {
             merge_s: 0.0,
             device_bytes: 0,
             profile: None,
+            asked: false,
+            rest_wanted: false,
             resting: None,
             rested: Duration::ZERO,
             active: devices.len(),
@@ -291,18 +269,23 @@ impl<'a> Render<'a> {
         Ok(())
     }
 
-    /// What a device has to tell, if one has soon. An interrupt is noticed meanwhile.
-    fn hear(&self, reports: &mut Reports) -> Result<Option<(usize, Report)>> {
-        match reports.poll() {
-            Polled::Said(device, report) => Ok(Some((device, report))),
-            Polled::Silence => check_interrupt(self.interrupt).map(|()| None),
-            Polled::End => Err(no_cube()),
+    /// What a device has to tell, or nothing where users have asked for something: the end is an error, all else is noted.
+    fn hear(&mut self, reports: &mut Reports) -> Result<Option<(usize, Report)>> {
+        match reports.hear(&self.requests) {
+            Heard::Report(device, report) => return Ok(Some((device, report))),
+            Heard::End => self.interrupt.check()?,
+            // As if by Ctrl-C: devices look at the interrupt too.
+            Heard::Control(Control::Stop) => self.interrupt.stop(SIGINT),
+            Heard::Asked | Heard::Control(Control::Save) => self.asked = true,
+            Heard::Control(Control::Rest(rests)) => self.rest_wanted = rests,
+            Heard::AllLeft => return Err(no_cube()),
         }
+        Ok(None)
     }
 
     /// Commits and tells how far the render is, if somebody has asked.
-    fn answer(&self, cube: &Writer, observe: &mut dyn FnMut(Event) -> Result<()>) -> Result<()> {
-        if self.interrupt.report.swap(false, Ordering::SeqCst) {
+    fn answer(&mut self, cube: &Writer, observe: &mut dyn FnMut(Event) -> Result<()>) -> Result<()> {
+        if std::mem::take(&mut self.asked) {
             cube.flush()?;
             observe(Event::Asked(&self.status))?;
         }
@@ -312,7 +295,7 @@ impl<'a> Render<'a> {
     /// Rests, or goes on, as whoever watches has asked.
     fn rest_if_asked(&mut self, queue: &Queue, observe: &mut dyn FnMut(Event) -> Result<()>) -> Result<()> {
         let Some(feed) = &self.job.feed else { return Ok(()) };
-        let rests = feed.is_pause_wanted();
+        let rests = self.rest_wanted;
         if rests == self.resting.is_some() {
             return Ok(());
         }
@@ -529,11 +512,11 @@ impl<'a> Render<'a> {
 
     /// Writes the preview, if one is wanted, and says at which exposure.
     fn write_preview(&mut self, cube: &Writer) -> Result<Option<f64>> {
-        let Some(preview) = &self.job.preview else { return Ok(None) };
+        let Some(wanted) = &self.job.preview else { return Ok(None) };
         let began = Instant::now();
         let picture = cube.preview(reduction(cube.cube().header().size, PREVIEW_PIXELS))?;
-        let exposure = preview.exposure.unwrap_or_else(|| picture.auto_exposure());
-        format::png::write(&preview.file, &picture, exposure)?;
+        let exposure = wanted.exposure.unwrap_or_else(|| picture.auto_exposure());
+        preview::write(&wanted.file, &picture, exposure)?;
         self.next_preview = Some(Instant::now() + PREVIEW_INTERVAL.max(began.elapsed() * PREVIEW_SHARE));
         Ok(Some(exposure))
     }

@@ -1,20 +1,24 @@
-//! What the devices report to the thread that decides, and the watch over those that have stopped to.
+//! What the thread that decides hears: reports of the devices, what users ask for; and the watch over devices that say nothing.
 
+use std::convert::Infallible;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use crossbeam_channel::{Receiver, never, select_biased, tick};
+
 use crate::Error;
 use crate::gpu::deadline::Deadline;
+use crate::preview::Control;
+use crate::render::interrupt::Interrupt;
 use crate::render::pool::{Pool, Report};
 
-/// How often deadlines are looked at while nobody reports.
-const TICK: Duration = Duration::from_millis(200);
+/// How often deadlines are looked at.
+const TICK: Duration = Duration::from_millis(if cfg!(test) { 200 } else { 1000 });
 
 /// A thread is stuck when its deadline has passed at so many looks in a row, 10 s: when the whole process was stopped for a
 /// while, every deadline has passed, and the threads that are well need a moment to say so.
-const LOOKS: u32 = if cfg!(test) { 2 } else { 50 };
+const LOOKS: u32 = if cfg!(test) { 2 } else { 10 };
 
 /// The reports of all devices in the order of their arrival, until every device has left.
 ///
@@ -23,8 +27,43 @@ const LOOKS: u32 = if cfg!(test) { 2 } else { 50 };
 pub struct Reports {
     pool: Arc<Pool>,
     receiver: Receiver<(usize, Report)>,
+    ticks: Receiver<Instant>,
     devices: Vec<Device>,
-    last_look: Instant,
+}
+
+/// Where users ask for something.
+pub struct Requests {
+    pub end: Receiver<Infallible>,
+    pub asked: Receiver<()>,
+    pub controls: Receiver<Control>,
+}
+
+impl Requests {
+    /// Those of signals and, where somebody watches, those of viewers.
+    pub fn new(interrupt: &Interrupt, controls: Option<&Receiver<Control>>) -> Requests {
+        Requests {
+            end: interrupt.end().clone(),
+            asked: interrupt.asked().clone(),
+            controls: controls.cloned().unwrap_or_else(never),
+        }
+    }
+
+    /// Nobody asks for anything.
+    pub fn none() -> Requests {
+        Requests { end: never(), asked: never(), controls: never() }
+    }
+}
+
+/// What [`Reports::hear`] hears.
+pub enum Heard {
+    /// The number of a device, and its report.
+    Report(usize, Report),
+    /// A signal asks for the end, or how far the render is.
+    End,
+    Asked,
+    Control(Control),
+    /// Every device has left.
+    AllLeft,
 }
 
 /// A device as seen from outside.
@@ -45,17 +84,46 @@ impl Device {
 
 impl Reports {
     pub fn new(pool: Arc<Pool>, receiver: Receiver<(usize, Report)>, devices: Vec<Device>) -> Reports {
-        Reports { pool, receiver, devices, last_look: Instant::now() }
+        Reports { pool, receiver, ticks: tick(TICK), devices }
+    }
+
+    /// Waits until there is something to hear. What users ask for comes first, then reports, in the order of their arrival.
+    pub fn hear(&mut self, requests: &Requests) -> Heard {
+        loop {
+            // What has been said comes before what is found out: a stuck device may have merged units before.
+            if self.receiver.is_empty() {
+                if let Some((device, left)) = self.expel_stuck() {
+                    return Heard::Report(device, left);
+                }
+                if self.devices.iter().all(|d| d.thread.is_none()) {
+                    return Heard::AllLeft;
+                }
+            }
+            select_biased! {
+                recv(requests.end) -> _ => return Heard::End,
+                recv(requests.asked) -> _ => return Heard::Asked,
+                recv(requests.controls) -> control => if let Ok(control) = control {
+                    return Heard::Control(control);
+                },
+                recv(self.receiver) -> said => match said {
+                    Ok((device, report)) => if let Some(report) = self.accept(device, report) {
+                        return Heard::Report(device, report);
+                    },
+                    Err(_) => return Heard::AllLeft,
+                },
+                recv(self.ticks) -> _ => self.look_at_deadlines(),
+            }
+        }
+    }
+
+    fn look_at_deadlines(&mut self) {
+        for device in &mut self.devices {
+            device.late = if device.deadline.has_passed() { device.late + 1 } else { 0 };
+        }
     }
 
     /// A device whose thread is stuck: from now on it has left.
     fn expel_stuck(&mut self) -> Option<(usize, Report)> {
-        if self.last_look.elapsed() >= TICK {
-            self.last_look = Instant::now();
-            for device in &mut self.devices {
-                device.late = if device.deadline.has_passed() { device.late + 1 } else { 0 };
-            }
-        }
         let device = self.devices.iter().position(|d| d.thread.is_some() && d.late >= LOOKS)?;
         self.pool.queue.expel(device);
         self.devices[device].thread = None;
@@ -63,59 +131,30 @@ impl Reports {
         Some((device, Report::Left { result: Err(Error::DevicesLost(what)) }))
     }
 
-    /// The next report, if one comes soon.
-    pub fn poll(&mut self) -> Polled {
-        // What has been said comes first: a stuck device may have merged units before.
-        let mut said = self.receiver.try_recv().ok();
-        if said.is_none() {
-            if let Some((device, left)) = self.expel_stuck() {
-                return Polled::Said(device, left);
-            }
-            if self.devices.iter().all(|d| d.thread.is_none()) {
-                return Polled::End;
-            }
-            said = match self.receiver.recv_timeout(TICK) {
-                Ok(said) => Some(said),
-                Err(RecvTimeoutError::Timeout) => return Polled::Silence,
-                Err(RecvTimeoutError::Disconnected) => return Polled::End,
-            };
-        }
-        match said {
-            Some((device, report @ Report::Left { .. })) => {
+    /// A report, unless it is one that is not heard.
+    fn accept(&mut self, device: usize, report: Report) -> Option<Report> {
+        match report {
+            Report::Left { .. } => {
                 // Of one that has been expelled, this is no news.
-                let Some(thread) = self.devices[device].thread.take() else { return Polled::Silence };
+                let thread = self.devices[device].thread.take()?;
                 // Its work is done, and panics are part of the report.
                 let _ = thread.join();
-                Polled::Said(device, report)
+                Some(report)
             }
             // One that was expelled may have merged units before; nothing else of it counts.
-            Some((device, report)) if self.devices[device].thread.is_some() || matches!(report, Report::Merged(_)) => {
-                Polled::Said(device, report)
-            }
-            _ => Polled::Silence,
+            Report::Merged(_) => Some(report),
+            _ => self.devices[device].thread.is_some().then_some(report),
         }
     }
-}
-
-/// What [`Reports::poll`] finds.
-pub enum Polled {
-    /// The number of a device, and its report.
-    Said(usize, Report),
-    Silence,
-    /// Every device has left.
-    End,
 }
 
 impl Iterator for Reports {
     type Item = (usize, Report);
 
     fn next(&mut self) -> Option<(usize, Report)> {
-        loop {
-            match self.poll() {
-                Polled::Said(device, report) => return Some((device, report)),
-                Polled::Silence => {}
-                Polled::End => return None,
-            }
+        match self.hear(&Requests::none()) {
+            Heard::Report(device, report) => Some((device, report)),
+            _ => None,
         }
     }
 }

@@ -1,11 +1,12 @@
 //! How a unit, or several, is cut into waves: never so that it changes a bit of the result.
 
+use crate::device::facts;
+use crate::device::part::OnDevice;
+use crate::device::prepared::Prepared;
+use crate::device::windows::Windows;
+use crate::device::words::{Counters, LOOP_LIMIT, Step, Wave};
 use crate::files::format_bytes;
 use crate::gpu::buffer;
-use crate::gpu::layout::{Counters, Step, Wave};
-use crate::gpu::self_test::LOOP_LIMIT;
-use crate::gpu::upload;
-use crate::render::prepare::Prepared;
 use crate::{Error, Result};
 
 /// Bytes of a path between the passes, beside its state and its records: head (8), its places in the queues (8),
@@ -97,7 +98,7 @@ impl WavePlan {
                 "a single path exceeds what this device binds: lower integrator.max_bounces".into(),
             ));
         }
-        let windows = upload::windows(prepared, limits.binding)?;
+        let on_device = OnDevice { prepared, windows: Windows::of(&prepared.accel, limits.binding)? };
         let mut plan = WavePlan {
             tile,
             paths: LEAST_PATHS.min(most) as u32,
@@ -113,7 +114,7 @@ impl WavePlan {
             sample_by_sample: prepared.evaluator.takes_one_sample(),
             roulette: prepared.features.roulette,
             limits,
-            scene_bytes: upload::scene_bytes(prepared, &windows),
+            scene_bytes: facts::scene_bytes(&on_device, buffer::allocated),
         };
         // What is left when the smallest waves have theirs goes to paths first, then to further units.
         let mut left = match budget.memory {
@@ -302,7 +303,7 @@ impl WavePlan {
 /// Measured: on lavapipe 16 k to 64 k paths are alike, fewer pay for dispatches and more for cache misses; a GPU wants a
 /// few hundred thousand threads in flight. Many channels and long paths lengthen evaluation, at most paths x channels x
 /// records: on lavapipe 0.6 ns each on one slow core, of a modest GPU 4e10 a second are assumed, so that a dispatch ends
-/// within about 200 ms (GPU watchdogs, DESIGN section 7).
+/// within about 200 ms: GPU watchdogs end what takes seconds.
 fn wanted_paths(software: bool, channels: u64, records: u64) -> u64 {
     let (most, evaluations) = if software { (1 << 15, 1 << 29) } else { (1 << 20, 1 << 33) };
     (evaluations / (channels * records)).clamp(LEAST_PATHS, most)

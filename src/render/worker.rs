@@ -1,22 +1,25 @@
-//! One device at work: generate, evaluate, transfer. The names are the method's own.
+//! One device at work: generate, evaluate (Hoarau et al. 2018, section 5.1), transfer.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
+use crate::device::evaluator::EvaluateShape;
+use crate::device::facts;
+use crate::device::part::OnDevice;
+use crate::device::prepared::Prepared;
+use crate::device::windows::Windows;
+use crate::device::words::{Counters, Proof, Wave};
 use crate::gpu::adapter::Gpu;
 use crate::gpu::buffer;
 #[cfg(test)]
-use crate::gpu::fault::Phase;
-use crate::gpu::layout::{Counters, Proof, Wave};
+use crate::gpu::fault::{self, Phase};
 use crate::gpu::pass::Pass;
-use crate::gpu::shader;
+use crate::gpu::source::Source;
 use crate::gpu::timestamps::Timestamps;
-use crate::gpu::upload::{self, SceneBuffers};
-use crate::render::compose::EvaluateShape;
-use crate::render::patience::Patience;
-use crate::render::prepare::Prepared;
+use crate::gpu::upload::NamedBuffers;
+use crate::render::interrupt::Interrupt;
+use crate::render::time_limit::TimeLimit;
 use crate::render::wave::{Budget, DeviceLimits, WavePlan};
 use crate::{Error, Result};
 
@@ -34,23 +37,6 @@ const SLOTS: usize = 2;
 /// processor one takes up to a second, and whoever interrupts waits for all of them.
 const WAVES_AHEAD: usize = 32;
 const WAVES_AHEAD_SOFTWARE: usize = 2;
-
-/// What signal handlers set.
-#[derive(Debug, Default)]
-pub struct Interrupt {
-    /// The number of the signal that asks for an orderly end, or 0.
-    pub end: Arc<AtomicUsize>,
-    /// Whether somebody asks how far the render is, with everything so far on disk.
-    pub report: Arc<AtomicBool>,
-}
-
-/// [`Error::Interrupted`] once a signal has asked for the end.
-pub fn check_interrupt(interrupt: &Interrupt) -> Result<()> {
-    match interrupt.end.load(Ordering::SeqCst) {
-        0 => Ok(()),
-        signal => Err(Error::Interrupted { signal: signal as i32 }),
-    }
-}
 
 /// Time of the passes, seconds: the device's own where it has timestamps, else that of waiting for each.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -82,13 +68,15 @@ pub struct Worker {
     timestamps: Option<Timestamps>,
     /// Whether passes are measured by waiting for them.
     clocked: bool,
-    slots: Vec<Slot>,
+    slots: [Slot; SLOTS],
     next_slot: usize,
+    /// The units submitted last, until they are collected.
+    pending: Option<Pending>,
     /// Waves under way, the oldest first.
     waves: VecDeque<InFlight>,
     /// Waves submitted so far.
     submitted: u64,
-    patience: Patience,
+    time_limit: TimeLimit,
     /// Since when the device has been at work on the oldest wave, or will be from its submission.
     at_work_since: Instant,
     interrupt: Arc<Interrupt>,
@@ -112,30 +100,39 @@ struct Stage {
     groups: Vec<wgpu::BindGroup>,
 }
 
-/// A staging buffer and the units whose means it will hold.
+/// A staging buffer and the units whose means it holds, or will.
 struct Slot {
     staging: wgpu::Buffer,
-    pending: Option<Pending>,
+    units: Vec<UnitRect>,
+    /// Whether the host sees it, and the device must not touch it.
+    is_mapped: bool,
 }
 
+/// Units on their way into a slot.
 struct Pending {
-    units: Vec<UnitRect>,
+    slot: usize,
     submission: wgpu::SubmissionIndex,
     /// The number of its last wave.
     last_wave: u64,
     proof: Proof,
 }
 
-/// What a group of units brought back.
+/// What a group of units brought back, as it lies in its staging buffer.
 pub struct Collected<'a> {
     #[cfg(test)]
     pub gpu: &'a Gpu,
     pub units: &'a [UnitRect],
-    /// [unit][row of the full tile][column][channel]; slots outside a unit's rectangle hold zeros.
-    pub means: &'a [f32],
+    view: wgpu::BufferView,
     pub counters: Counters,
     /// Seconds in which the device had nothing to do, so far.
     pub idle_s: f64,
+}
+
+impl Collected<'_> {
+    /// [unit][row of the full tile][column][channel]; slots outside a unit's rectangle hold zeros.
+    pub fn means(&self) -> &[f32] {
+        bytemuck::cast_slice(&self.view[..self.view.len() - size_of::<Counters>()])
+    }
 }
 
 impl Worker {
@@ -149,34 +146,33 @@ impl Worker {
     /// As [`Worker::new`], with waves as planned.
     pub fn with_waves(gpu: Arc<Gpu>, prepared: Arc<Prepared>, plan: WavePlan) -> Result<Worker> {
         let _watched = gpu.deadline.watch(buffer::WARM_UP);
-        let windows = upload::windows(&prepared, plan.limits.binding)?;
-        let scene = SceneBuffers::new(&gpu, &prepared, &windows)?;
+        let windows = Windows::of(&prepared.accel, plan.limits.binding)?;
+        let on_device = OnDevice { prepared: &prepared, windows };
+        let scene = upload(&gpu, &on_device)?;
         let path_buffers = PathBuffers::new(&gpu, &plan);
-        let slots = (0..SLOTS)
-            .map(|_| {
-                let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
-                Slot { staging: buffer::empty(&gpu, "staging", plan.staging_bytes(), usage), pending: None }
-            })
-            .collect();
+        let slots = std::array::from_fn(|_| {
+            let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
+            let staging = buffer::empty(&gpu, "staging", plan.staging_bytes(), usage);
+            Slot { staging, units: Vec::new(), is_mapped: false }
+        });
         #[cfg(test)]
         gpu.faults.reach(Phase::Start, &gpu);
         // Before shaders are compiled in vain.
         gpu.check()?;
 
-        let shape = prepared.evaluate_shape(gpu.is_software);
-        let defines = prepared.defines(&windows);
-        let stage = |modules: &[shader::Module], defines: &shader::Defines| {
-            let pass = Pass::new(&gpu, &shader::compose(modules, defines))?;
+        let shape = EvaluateShape::of(&prepared, gpu.is_software);
+        let kernels = on_device.kernels(shape);
+        let stage = |source: &Source| {
+            let pass = Pass::new(&gpu, source)?;
             let groups = (0..2)
                 .map(|group| pass.bind(&gpu, group, |name| scene.find(name).or_else(|| path_buffers.find(name))))
                 .collect::<Result<_>>()?;
             Ok::<_, Error>(Stage { pass, groups })
         };
-        let camera = stage(&prepared.camera_modules(), &defines)?;
-        let bounce = stage(&prepared.bounce_modules(), &defines)?;
-        let defines = prepared.evaluate_defines(shape);
-        let update = prepared.update_modules().map(|modules| stage(&modules, &defines)).transpose()?;
-        let evaluate = stage(&prepared.evaluate_modules(), &defines)?;
+        let camera = stage(&kernels.camera)?;
+        let bounce = stage(&kernels.bounce)?;
+        let update = kernels.update.as_ref().map(stage).transpose()?;
+        let evaluate = stage(&kernels.evaluate)?;
         gpu.check()?;
         let profile = Profile::default();
         let timestamps = None;
@@ -195,9 +191,10 @@ impl Worker {
             clocked: false,
             slots,
             next_slot: 0,
+            pending: None,
             waves: VecDeque::new(),
             submitted: 0,
-            patience: Patience::default(),
+            time_limit: TimeLimit::default(),
             at_work_since: Instant::now(),
             interrupt: Arc::default(),
             idle_since: None,
@@ -217,18 +214,11 @@ impl Worker {
         self.interrupt = Arc::clone(interrupt);
     }
 
-    /// Starts one epoch of `units`; their means arrive through [`Worker::collect`]. Collects what used the same staging
-    /// buffer before, if anything, and returns when all but the last waves are done.
-    pub fn submit(
-        &mut self,
-        units: &[UnitRect],
-        epoch: u32,
-        epoch_samples: u32,
-        collected: &mut dyn FnMut(Collected) -> Result<()>,
-    ) -> Result<()> {
+    /// Starts one epoch of `units` and returns what came of those submitted before, if they were not collected yet: to be
+    /// merged while the new ones compute. All but the last waves of these are done then.
+    pub fn submit(&mut self, units: &[UnitRect], epoch: u32, epoch_samples: u32) -> Result<Option<Collected<'_>>> {
         let slot = self.next_slot;
         self.next_slot = (slot + 1) % SLOTS;
-        self.collect_slot(slot, collected)?;
         if let Some(since) = self.idle_since.take() {
             self.idle_s += since.elapsed().as_secs_f64();
         }
@@ -239,35 +229,43 @@ impl Worker {
         }
         let ahead = if self.gpu.is_software { WAVES_AHEAD_SOFTWARE } else { WAVES_AHEAD };
         for wave in self.plan.waves(units.len() as u32, epoch, epoch_samples) {
-            check_interrupt(&self.interrupt)?;
+            self.interrupt.check()?;
             while self.waves.len() >= ahead {
                 self.wait_for_wave()?;
             }
             #[cfg(test)]
-            self.gpu.faults.reach(Phase::of(&wave), &self.gpu);
+            self.gpu.faults.reach(phase(&wave), &self.gpu);
             self.submit_wave(wave)?;
         }
 
-        let _watched = self.gpu.deadline.watch(self.limit());
+        let watched = self.gpu.deadline.watch(self.limit());
         let mut encoder = self.encoder("transfer");
         let buffers = &self.path_buffers;
         let size = self.unit_bytes() * units.len() as u64;
-        let staging = &self.slots[slot].staging;
+        let Slot { staging, units: of_slot, is_mapped } = &mut self.slots[slot];
+        if std::mem::take(is_mapped) {
+            staging.unmap();
+        }
         encoder.copy_buffer_to_buffer(&buffers.means, 0, staging, 0, size);
         encoder.copy_buffer_to_buffer(&buffers.counters, 0, staging, size, size_of::<Counters>() as u64);
         encoder.clear_buffer(&buffers.counters, 0, None);
         let submission = self.gpu.queue.submit([encoder.finish()]);
         buffer::map(staging);
+        *of_slot = units.to_vec();
         let (last_wave, proof) = (self.submitted, self.proof(units, epoch_samples));
-        self.slots[slot].pending = Some(Pending { units: units.to_vec(), submission, last_wave, proof });
+        let before = self.pending.replace(Pending { slot, submission, last_wave, proof });
         #[cfg(test)]
         self.gpu.faults.reach(Phase::Transfer, &self.gpu);
-        Ok(())
+        drop(watched);
+        match before {
+            Some(before) => self.receive(before).map(Some),
+            None => Ok(None),
+        }
     }
 
     /// How long whatever is under way may take.
     fn limit(&self) -> Duration {
-        self.patience.limit(self.waves.iter().map(|wave| u64::from(wave.paths)).sum())
+        self.time_limit.limit(self.waves.iter().map(|wave| u64::from(wave.paths)).sum())
     }
 
     /// Waits for the oldest wave under way.
@@ -285,61 +283,62 @@ impl Worker {
             paths += u64::from(wave.paths);
         }
         if paths > 0 {
-            self.patience.note(paths, self.at_work_since.elapsed());
+            self.time_limit.note(paths, self.at_work_since.elapsed());
             self.at_work_since = Instant::now();
         }
         Ok(())
     }
 
-    /// Waits for everything that is under way, in the order of submission.
-    pub fn collect(&mut self, collected: &mut dyn FnMut(Collected) -> Result<()>) -> Result<()> {
-        for i in 0..SLOTS {
-            self.collect_slot((self.next_slot + i) % SLOTS, collected)?;
+    /// Waits for what is under way, if anything is.
+    pub fn collect(&mut self) -> Result<Option<Collected<'_>>> {
+        match self.pending.take() {
+            Some(last) => self.receive(last).map(Some),
+            None => Ok(None),
         }
-        Ok(())
     }
 
-    fn collect_slot(&mut self, slot: usize, collected: &mut dyn FnMut(Collected) -> Result<()>) -> Result<()> {
-        let Some(pending) = self.slots[slot].pending.take() else { return Ok(()) };
+    fn receive(&mut self, pending: Pending) -> Result<Collected<'_>> {
         self.wait(pending.submission, pending.last_wave)?;
         if self.is_idle() {
             self.idle_since = Some(Instant::now());
         }
-        let size = self.unit_bytes() * pending.units.len() as u64;
-        let staging = &self.slots[slot].staging;
-        {
-            let lost = |e| Error::DevicesLost(format!("{}: {e}", self.gpu.name));
-            let end = size + size_of::<Counters>() as u64;
-            let view = {
-                let _watched = self.gpu.deadline.watch(self.limit());
-                #[cfg(test)]
-                self.gpu.faults.reach(Phase::Mapping, &self.gpu);
-                // A shortage of memory, say, is why there may be nothing to see.
-                self.gpu.check()?;
-                staging.slice(..end).get_mapped_range().map_err(lost)?
-            };
-            let counters: Counters = bytemuck::pod_read_unaligned(&view[size as usize..]);
-            if let Some(what) = counters.missing(&pending.proof) {
-                let what = format!("{}: a unit came back incomplete: {what}", self.gpu.name);
-                return Err(Error::DevicesLost(what));
-            }
-            collected(Collected {
-                #[cfg(test)]
-                gpu: &self.gpu,
-                units: &pending.units,
-                means: bytemuck::cast_slice(&view[..size as usize]),
-                counters,
-                idle_s: self.idle_s,
-            })?;
+        let (unit_bytes, limit) = (self.unit_bytes(), self.limit());
+        let Slot { staging, units, is_mapped } = &mut self.slots[pending.slot];
+        let end = unit_bytes * units.len() as u64 + size_of::<Counters>() as u64;
+        let lost = |e| Error::DevicesLost(format!("{}: {e}", self.gpu.name));
+        let view = {
+            let _watched = self.gpu.deadline.watch(limit);
+            #[cfg(test)]
+            self.gpu.faults.reach(Phase::Mapping, &self.gpu);
+            // A shortage of memory, say, is why there may be nothing to see.
+            self.gpu.check()?;
+            staging.slice(..end).get_mapped_range().map_err(lost)?
+        };
+        *is_mapped = true;
+        let counters: Counters = bytemuck::pod_read_unaligned(&view[view.len() - size_of::<Counters>()..]);
+        if let Some(what) = counters.missing(&pending.proof) {
+            let what = format!("{}: a unit came back incomplete: {what}", self.gpu.name);
+            return Err(Error::DevicesLost(what));
         }
-        let _watched = self.gpu.deadline.watch(self.limit());
-        staging.unmap();
-        Ok(())
+        if counters.records > self.plan.max_records {
+            return Err(Error::Internal(format!(
+                "a path took {} records where {} were planned for: its unit was not merged",
+                counters.records, self.plan.max_records
+            )));
+        }
+        Ok(Collected {
+            #[cfg(test)]
+            gpu: &self.gpu,
+            units,
+            view,
+            counters,
+            idle_s: self.idle_s,
+        })
     }
 
     /// Whether nothing is under way.
     pub fn is_idle(&self) -> bool {
-        self.slots.iter().all(|slot| slot.pending.is_none())
+        self.pending.is_none()
     }
 
     /// What the counters must show after the last wave of `units`.
@@ -372,7 +371,11 @@ impl Worker {
         let paths = wave.path_count;
         let [groups, pixel_groups] = [paths.div_ceil(64), wave.pixel_count.div_ceil(self.shape.pixels)];
         #[cfg(test)]
-        self.gpu.faults.silence(&mut wave);
+        match self.gpu.faults.silence() {
+            Some(fault::Kind::SilentGenerate) => wave.path_count = 0,
+            Some(_) => wave.pixel_count = 0,
+            None => {}
+        }
 
         let _watched = self.gpu.deadline.watch(self.limit());
         self.gpu.queue.write_buffer(&self.path_buffers.wave, 0, bytemuck::bytes_of(&wave));
@@ -380,7 +383,7 @@ impl Worker {
         encoder.clear_buffer(&self.path_buffers.queue_lengths, 0, None);
         let (stride, blocks, bounces) = (self.path_buffers.step_stride, self.shape.blocks, self.bounces());
         let step = |number: u32| [number * stride];
-        let (all, pixels) = (fold(groups), fold(pixel_groups));
+        let (all, pixels) = (grid(groups), grid(pixel_groups));
         let mut pass = self.begin(&mut encoder, "generate", 0);
         self.camera.dispatch(&mut pass, &[], all, 1);
         for bounce in 0..bounces {
@@ -396,7 +399,7 @@ impl Worker {
                 pass = self.begin(&mut encoder, "evaluate", 2 * bounce + 1);
             }
             if let Some(update) = &self.update {
-                update.dispatch(&mut pass, &step(bounce), fold(paths.div_ceil(self.shape.pixels)), blocks);
+                update.dispatch(&mut pass, &step(bounce), grid(paths.div_ceil(self.shape.pixels)), blocks);
             }
         }
         if self.update.is_none() {
@@ -456,6 +459,20 @@ impl Worker {
     }
 }
 
+/// When a fault planned for `wave` happens.
+#[cfg(test)]
+fn phase(wave: &Wave) -> Phase {
+    if wave.pixel_begin + wave.sample_begin == 0 { Phase::FirstWave } else { Phase::LaterWave }
+}
+
+/// The scene's buffers on a device. Errors: one that exceeds a binding; a device that is lost, or whose memory does not hold them.
+pub fn upload(gpu: &Gpu, scene: &OnDevice) -> Result<NamedBuffers> {
+    let limits = gpu.device.limits();
+    facts::check_bindings(scene, limits.max_storage_buffer_binding_size.min(limits.max_buffer_size))?;
+    let storage = scene.buffers().into_iter().map(|buffer| (buffer.name, buffer.bytes));
+    NamedBuffers::new(gpu, ("frame", bytemuck::bytes_of(&scene.frame)), storage)
+}
+
 /// What `gpu` allows. A binding shows no more than 1 GiB, so that offsets stay within 32 bits of words, and leaves room
 /// for the counters that follow the means in a staging buffer.
 pub fn device_limits(gpu: &Gpu) -> DeviceLimits {
@@ -473,7 +490,7 @@ fn sequence(number: u64) -> u32 {
 }
 
 /// Workgroup counts in x and y for at least `groups` groups: a dimension takes at most 65,535.
-fn fold(groups: u32) -> [u32; 2] {
+fn grid(groups: u32) -> [u32; 2] {
     let y = groups.div_ceil(65_535).max(1);
     [groups.div_ceil(y), y]
 }
@@ -511,14 +528,8 @@ mod tests {
 
     /// The counters of 64 samples of 3 x 2 pixels.
     fn counters(worker: &mut Worker) -> Result<Counters> {
-        let mut found = None;
-        let mut note = |collected: Collected| {
-            found = Some(collected.counters);
-            Ok(())
-        };
-        worker.submit(&[[0, 0, 3, 2]], 0, 64, &mut note)?;
-        worker.collect(&mut note)?;
-        Ok(found.expect("collected"))
+        assert!(worker.submit(&[[0, 0, 3, 2]], 0, 64)?.is_none());
+        Ok(worker.collect()?.expect("just submitted").counters)
     }
 
     /// Without timestamps passes are clocked, and compute the same.
@@ -535,6 +546,30 @@ mod tests {
             let Profile { generate_s, evaluate_s } = again.profile;
             assert!(generate_s > 0.0 && evaluate_s > 0.0, "{:?}", again.profile);
         }
+    }
+
+    /// A path that takes more records than were planned for harms no other, and its unit is not merged.
+    #[test]
+    fn too_many_records_are_a_fault_of_their_own() {
+        let scene = Builder::new()
+            .bounces(3)
+            .plastic(room(DVec3::splat(-2.0), DVec3::splat(2.0)), 0.5, 1.5, 0.2)
+            .lamp(sphere(DVec3::new(0.0, 1.0, 0.0), 0.1), 1.0, Sides::Front)
+            .build();
+        let mut prepared = Prepared::new(&scene, 0).expect("a scene");
+        let planned = prepared.frame.max_records;
+        let mut run = |most: u32| {
+            prepared.frame.max_records = most;
+            let prepared = Arc::new(std::mem::replace(&mut prepared, Prepared::new(&scene, 0).expect("a scene")));
+            let gpu = Gpu::open().expect("a device");
+            counters(&mut Worker::new(gpu, prepared, [4, 4], Budget::default()).expect("a worker"))
+        };
+        let used = run(planned).expect("counters").records;
+        assert!(used > 8 && used <= planned, "{used} of {planned}");
+        assert_eq!(run(used).expect("just enough").records, used);
+        let error = run(used - 1).expect_err("too few");
+        let said = format!("a path took {used} records where {} were planned for", used - 1);
+        assert!(matches!(&error, Error::Internal(what) if what.contains(&said)), "{error}");
     }
 
     /// The count of rays goes on beyond 32 bits, from wherever it crosses them.

@@ -1,4 +1,5 @@
-//! The report of `bench`: the conventional path tracer and the deferred ones side by side (Fig. 4, 7, 8 and 9 of the method).
+//! The report of `bench`: the conventional path tracer and the deferred ones side by side (Fig. 4, 7, 8 and 9 of
+//! Hoarau et al. 2018).
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -15,7 +16,7 @@ use crate::scene::Evaluator;
 
 /// Pixels of the frames that frames per second are told of: 512 x 512, one sample each.
 const FRAME_PIXELS: f64 = 512.0 * 512.0;
-/// Paths and memory for which limits are told: the pools of the method, and the memory of its GPU.
+/// Paths and memory for which limits are told: the pools of Hoarau et al. 2018, and the memory of their GPU.
 const POOLS: [u64; 3] = [512 * 512, 1024 * 1024, 2048 * 2048];
 const MEMORY: u64 = 4 << 30;
 /// Channels for which the largest pool is told.
@@ -91,12 +92,13 @@ impl Row {
     }
 }
 
+/// The first line of its table.
+pub const CSV_HEADER: &str = "part,scene,evaluator,kernels,channels,pool,paths_per_s,slowest,fastest,frames_per_s_512,generate_us,evaluate_us,\
+     path_bytes,planned_bytes,allocated_bytes";
+
 impl Report {
     pub fn csv(&self) -> String {
-        let mut text = String::from(
-            "part,scene,evaluator,kernels,channels,pool,paths_per_s,slowest,fastest,frames_per_s_512,generate_us,evaluate_us,\
-             path_bytes,planned_bytes,allocated_bytes\n",
-        );
+        let mut text = format!("{CSV_HEADER}\n");
         for row in &self.rows {
             let [slowest, fastest] = row.rates.range();
             let micro = |s: f64| format!("{:.5}", 1e6 * s);

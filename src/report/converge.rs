@@ -105,10 +105,13 @@ impl Curve {
     }
 }
 
+/// The first line of its table.
+pub const CSV_HEADER: &str = "curve,channels,samples_per_pixel,seconds,group_nm,relmse,error,error_estimate";
+
 impl Report {
     /// One row a curve, epoch and group of channels.
     pub fn csv(&self) -> String {
-        let mut text = String::from("curve,channels,samples_per_pixel,seconds,group_nm,relmse,error,error_estimate\n");
+        let mut text = format!("{CSV_HEADER}\n");
         for curve in &self.curves {
             for (group, members) in curve.groups() {
                 for p in &curve.points {

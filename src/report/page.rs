@@ -13,6 +13,10 @@ fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
+/// What every page begins with.
+pub const BEGINS: &str =
+    "<!doctype html>\n<html lang=en><head><meta charset=utf-8><meta name=viewport content=\"width=device-width\">";
+
 const STYLE: &str = "\
 :root{color-scheme:light dark}\
 body{font:15px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem}\
@@ -58,8 +62,7 @@ impl Page {
 
     pub fn finish(self) -> String {
         format!(
-            "<!doctype html>\n<html lang=en><head><meta charset=utf-8><meta name=viewport content=\"width=device-width\">\
-             <title>{}</title>\n<style>{STYLE}</style></head>\n<body>\n{}</body></html>\n",
+            "{BEGINS}<title>{}</title>\n<style>{STYLE}</style></head>\n<body>\n{}</body></html>\n",
             self.title, self.body
         )
     }

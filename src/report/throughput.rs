@@ -4,18 +4,21 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use crate::Result;
+use crate::device::prepared::Prepared;
 use crate::gpu::adapter::Gpu;
-use crate::render::prepare::Prepared;
+use crate::render::interrupt::Interrupt;
 use crate::render::wave::{Budget, WavePlan};
-use crate::render::worker::{Interrupt, UnitRect, Worker};
+use crate::render::worker::{UnitRect, Worker};
 use crate::scene::Scene;
 
 /// Side of the tiles: small, so that a slow device is done with some of them soon.
-const TILE: u32 = 16;
+const TILE: u32 = 8;
 /// A full epoch of each tile.
 const SAMPLES: u32 = 64;
-/// What all trials do in a turn takes the first of them about so long, seconds.
+const TILE_PATHS: f64 = (TILE * TILE * SAMPLES) as f64;
+/// How long a turn should take, seconds; it takes longer where so few tiles do.
 const TURN_S: f64 = 0.5;
+const LEAST_TILES: usize = 4;
 
 /// A device ready to render a scene.
 pub struct Trial {
@@ -64,8 +67,8 @@ impl Trial {
         let mut worker = Worker::new(Arc::clone(gpu), prepared, [TILE, TILE], budget)?;
         worker.watch(interrupt);
         let tiles = spread(scene.film.crop);
-        worker.submit(&tiles[..1], 0, 1, &mut |_| Ok(()))?;
-        worker.collect(&mut |_| Ok(()))?;
+        worker.submit(&tiles[..1], 0, 1)?;
+        worker.collect()?;
         let allocated_bytes = gpu.allocated_bytes().zip(before).map(|(now, before)| now.saturating_sub(before));
         Ok(Trial { worker, tiles, epoch: 0, allocated_bytes })
     }
@@ -79,10 +82,24 @@ impl Trial {
         self.worker.plan.scene_bytes + self.worker.plan.wave_bytes()
     }
 
-    /// Renders an epoch of the first `count` tiles, around again after the last. Seconds.
-    fn turn(&mut self, count: usize) -> Result<f64> {
-        let tiles: Vec<UnitRect> = self.tiles.iter().copied().cycle().take(count).collect();
+    /// Renders an epoch of the first tiles, `repeats` times. Seconds.
+    fn turn(&mut self, tiles: usize, repeats: usize) -> Result<f64> {
+        let tiles = self.tiles[..tiles].repeat(repeats);
         self.render(&tiles, SAMPLES)
+    }
+
+    /// About how many tiles are rendered a second: twice as much work again and again, samples and then tiles, until it takes
+    /// half a turn. So neither a slow device is asked for much, nor a fast one judged by what does not fill it.
+    fn pace(&mut self) -> Result<f64> {
+        let (mut samples, mut count) = (1, 1);
+        loop {
+            let tiles: Vec<UnitRect> = self.tiles.iter().copied().cycle().take(count).collect();
+            let seconds = self.render(&tiles, samples)?;
+            if seconds >= 0.5 * TURN_S {
+                return Ok(f64::from(samples) / f64::from(SAMPLES) * count as f64 / seconds);
+            }
+            if samples < SAMPLES { samples *= 2 } else { count *= 2 }
+        }
     }
 
     /// Renders the next epoch of `tiles`. Seconds.
@@ -90,9 +107,9 @@ impl Trial {
         let began = Instant::now();
         self.epoch += 1;
         for units in tiles.chunks(self.worker.plan.units_at_once(samples)) {
-            self.worker.submit(units, self.epoch, samples, &mut |_| Ok(()))?;
+            self.worker.submit(units, self.epoch, samples)?;
         }
-        self.worker.collect(&mut |_| Ok(()))?;
+        self.worker.collect()?;
         Ok(began.elapsed().as_secs_f64())
     }
 }
@@ -105,26 +122,36 @@ pub fn frames(trial: &mut Trial, rounds: u32) -> Result<Vec<f64>> {
 
 /// Measures all `trials` by turns, so that what else the machine does concerns all alike, then the passes of each once more.
 pub fn measure(trials: &mut [Trial], rounds: u32) -> Result<Vec<Rates>> {
-    let Some(first) = trials.first_mut() else { return Ok(Vec::new()) };
-    // As many tiles as fill the largest waves, and then as many as take long enough.
-    let mut count = first.worker.plan.units_at_once(SAMPLES);
-    let seconds = first.turn(count)?;
-    count *= (TURN_S / seconds).ceil().max(1.0) as usize;
-    let paths = (count as u32 * TILE * TILE * SAMPLES) as f64;
+    let Some(first) = trials.first() else { return Ok(Vec::new()) };
+    let there = first.tiles.len();
+    let paces = trials.iter_mut().map(Trial::pace).collect::<Result<Vec<_>>>()?;
+    let full: Vec<usize> = trials.iter().map(|trial| trial.worker.plan.units_at_once(SAMPLES)).collect();
+    let (tiles, repeats) = turns(&paces, &full, there);
     let mut rates = vec![Rates { paths_per_s: Vec::new(), generate_s: 0.0, evaluate_s: 0.0 }; trials.len()];
+    let paths = |repeats: usize| (tiles * repeats) as f64 * TILE_PATHS;
     for _ in 0..rounds {
-        for (trial, rates) in trials.iter_mut().zip(&mut rates) {
-            rates.paths_per_s.push(paths / trial.turn(count)?);
+        for ((trial, rates), &repeats) in trials.iter_mut().zip(&mut rates).zip(&repeats) {
+            rates.paths_per_s.push(paths(repeats) / trial.turn(tiles, repeats)?);
         }
     }
-    for (trial, rates) in trials.iter_mut().zip(&mut rates) {
+    for ((trial, rates), &repeats) in trials.iter_mut().zip(&mut rates).zip(&repeats) {
         trial.worker.enable_profile();
-        trial.turn(count)?;
-        let profile = trial.worker.profile;
+        trial.turn(tiles, repeats)?;
+        let (profile, paths) = (trial.worker.profile, paths(repeats));
         rates.generate_s = profile.generate_s / paths;
         rates.evaluate_s = profile.evaluate_s / paths;
     }
     Ok(rates)
+}
+
+/// How many tiles a turn has, of those that are `there`, the same for all trials, and how often each trial renders them in
+/// one: tiles differ in what they cost, and evaluators hundredfold in what they can do. `paces` are tiles a second, `full` the
+/// tiles that fill a trial's waves.
+fn turns(paces: &[f64], full: &[usize], there: usize) -> (usize, Vec<usize>) {
+    let slowest = paces.iter().copied().fold(f64::INFINITY, f64::min);
+    let tiles = ((TURN_S * slowest) as usize).clamp(LEAST_TILES.min(there), there);
+    let enough = |(&pace, &full): (&f64, &usize)| ((TURN_S * pace).round() as usize).max(full).div_ceil(tiles);
+    (tiles, paces.iter().zip(full).map(enough).collect())
 }
 
 /// Whole tiles of a film, in an order whose beginnings are spread all over it: by the golden ratio.
@@ -144,10 +171,20 @@ fn spread([x0, y0, x1, y1]: [u32; 4]) -> Vec<UnitRect> {
 mod tests {
     use super::*;
 
+    /// The same tiles for all, as many as the slowest does in half a second, and as often as a trial needs for as long.
+    #[test]
+    fn turns_are_alike_and_long_enough() {
+        assert_eq!(turns(&[20.0, 2000.0, 37.0], &[1, 4, 8], 4096), (10, vec![1, 100, 2]));
+        // A few tiles take the slowest long; waves that hold many tiles are filled.
+        assert_eq!(turns(&[0.1, 4.0], &[1, 64], 4096), (4, vec![1, 16]));
+        // A small picture is rendered again and again.
+        assert_eq!(turns(&[500.0, 1000.0], &[1, 1], 4), (4, vec![63, 125]));
+    }
+
     #[test]
     fn tiles_are_whole_and_spread() {
         let tiles = spread([0, 0, 500, 300]);
-        assert_eq!(tiles.len(), 31 * 18);
+        assert_eq!(tiles.len(), 62 * 37);
         let left = tiles[..20].iter().filter(|tile| tile[0] < 250).count();
         let above = tiles[..20].iter().filter(|tile| tile[1] < 150).count();
         assert!((6..=14).contains(&left) && (6..=14).contains(&above), "{left}, {above}");

@@ -2,29 +2,15 @@
 
 use glam::{DVec2, DVec3};
 
-use super::decode::{Fields, Item, Keys};
-use super::overrides::CAMERAS;
+use super::decode::{Fields, Item};
+use super::keys::{CAMERA, FILM, ORTHOGRAPHIC, PERSPECTIVE, THIN_LENS};
 use super::{Camera, Film, Filter, Projection};
 
 /// Pixels along one side: places on wider films, in f32, would be off by more than 1/32 of a pixel.
 const MAX_SIDE: u32 = 131_072;
-const FILM: Keys = Keys::new(&["width", "height", "filter", "crop"]);
-const PERSPECTIVE: Keys = Keys::new(&["position", "look_at", "up", "flip_x", "medium", "fov", "fov_axis"]);
-const THIN_LENS: Keys = Keys::new(&[
-    "position",
-    "look_at",
-    "up",
-    "flip_x",
-    "medium",
-    "fov",
-    "fov_axis",
-    "aperture_radius",
-    "focus_distance",
-]);
-const ORTHOGRAPHIC: Keys = Keys::new(&["position", "look_at", "up", "flip_x", "medium", "width"]);
 
 pub fn decode_film(item: &Item) -> Option<Film> {
-    let fields = item.table(FILM)?;
+    let fields = item.table(&FILM)?;
     let side = |key: &str| fields.require(key, &format!("{key} = 512 (pixels)")).and_then(|i| i.whole(1..=MAX_SIDE));
     let (width, height) = (side("width"), side("height"));
     let filter = match fields.get("filter") {
@@ -56,27 +42,27 @@ fn decode_crop(item: &Item, width: u32, height: u32) -> Option<[u32; 4]> {
 
 /// Where the camera names the medium that fills space, if it does.
 pub fn medium<'a>(item: &Item<'a>) -> Option<Item<'a>> {
-    CAMERAS.iter().find_map(|kind| item.member(kind))?.member("medium")
+    CAMERA.one_of().find_map(|kind| item.member(kind))?.member("medium")
 }
 
 /// `film` gives the shape of the picture; without it (it was wrong) only mistakes are looked for.
 pub fn decode_camera(item: &Item, film: Option<&Film>) -> Option<Camera> {
-    let fields = item.table(Keys::new(&CAMERAS))?;
-    let kind = fields.exactly_one(&CAMERAS, "kind of camera")?;
+    let fields = item.table(&CAMERA)?;
+    let kind = fields.exactly_one("kind of camera")?;
     let size = film.map_or(DVec2::ONE, |film| DVec2::new(f64::from(film.width), f64::from(film.height)));
     let (fields, projection) = match kind.path.as_str() {
         "camera.perspective" => {
-            let fields = kind.table(PERSPECTIVE)?;
+            let fields = kind.table(&PERSPECTIVE)?;
             let projection = tan_half(&fields, size).map(|tan_half| Projection::Perspective { tan_half });
             (fields, projection)
         }
         "camera.thin_lens" => {
-            let fields = kind.table(THIN_LENS)?;
+            let fields = kind.table(&THIN_LENS)?;
             let projection = thin_lens(&fields, size);
             (fields, projection)
         }
         _ => {
-            let fields = kind.table(ORTHOGRAPHIC)?;
+            let fields = kind.table(&ORTHOGRAPHIC)?;
             let width = fields.require("width", "width = 1.0 (metres seen from left to right)");
             let half = width.and_then(|item| item.positive()).map(|width| 0.5 * width);
             let half_size = half.map(|half| DVec2::new(half, half * size.y / size.x));

@@ -1,7 +1,7 @@
 //! `[channels]`: the intervals of wavelength that are rendered.
 
-use super::decode::{Fields, Item, Keys};
-use super::overrides::CHANNEL_KINDS;
+use super::decode::{Fields, Item};
+use super::keys;
 use super::spectrum::report_in_file;
 use crate::format::response::{self, Responses};
 use crate::spectral::{Channels, Response};
@@ -17,12 +17,9 @@ const LONGEST: f64 = 20_000.0;
 const MICROMETRES: f64 = 100.0;
 const WAVELENGTHS: &str = "greater than 0 and at most 1000000 (nm)";
 
-const KEYS: Keys = Keys::new(&["equal", "wavenumber", "intervals", "responses", "false_colour"]);
-const RANGE: Keys = Keys::new(&["from", "to", "count"]);
-
 pub fn decode(item: &Item) -> Option<Channels> {
-    let fields = item.table(KEYS)?;
-    let kind = fields.exactly_one(&CHANNEL_KINDS, "kind of channels");
+    let fields = item.table(&keys::CHANNELS)?;
+    let kind = fields.exactly_one("kind of channels");
     if let Some(kind) = kind.as_ref().filter(|kind| kind.path == "channels.responses") {
         let named = responses(kind);
         let false_colour = match fields.get("false_colour") {
@@ -107,7 +104,7 @@ fn range(fields: &Fields, example: &str, number: impl Fn(&Item) -> Option<f64>) 
 
 fn equal(item: &Item) -> Option<Vec<[f64; 2]>> {
     const EXAMPLE: &str = "all of { from = 380, to = 780, count = 400 }";
-    let (from, to, count) = range(&item.table(RANGE)?, EXAMPLE, wavelength)?;
+    let (from, to, count) = range(&item.table(&keys::EQUAL)?, EXAMPLE, wavelength)?;
     not_empty(item, Channels::equal(from, to, count).bounds)
 }
 
@@ -115,7 +112,7 @@ fn equal(item: &Item) -> Option<Vec<[f64; 2]>> {
 fn wavenumber(item: &Item) -> Option<Vec<[f64; 2]>> {
     const EXAMPLE: &str = "all of { from = 500, to = 5000, count = 1000 }";
     let per_cm = |item: &Item| item.number_where(|v| v >= 1e7 / MAX_NM, "at least 10 (cm-1, a wavelength of 1 mm)");
-    let (from, to, count) = range(&item.table(RANGE)?, EXAMPLE, per_cm)?;
+    let (from, to, count) = range(&item.table(&keys::WAVENUMBER)?, EXAMPLE, per_cm)?;
     let edges = Channels::equal(from, to, count).bounds;
     not_empty(item, edges.iter().rev().map(|[low, high]| [1e7 / high, 1e7 / low]).collect())
 }

@@ -1,13 +1,15 @@
 //! Typed access to the scene tree: every accessor either gives a checked value or records what is wrong and gives
 //! `None`, so that decoding carries on with the next item.
 
-use std::fmt::Display;
 use std::ops::RangeInclusive;
 
 use glam::DVec3;
 
 use super::context::Context;
+use super::keys::Section;
 use super::tree::{Entry, Node, Origin, Value};
+pub use super::words::{did_you_mean, list, quoted};
+use super::words::{nearest, suggestion};
 
 /// A value of the scene tree with its dotted key.
 #[derive(Clone)]
@@ -27,25 +29,9 @@ pub struct Fields<'a> {
     /// Where to point when something is missing from the table.
     pub at: &'a Origin,
     entries: &'a [Entry],
+    section: &'static Section,
     /// For every unknown key the known one that was probably meant, or "".
     misspelt: Vec<&'static str>,
-}
-
-/// The keys of a table: those understood, and those of the contract that a later version brings.
-#[derive(Clone, Copy)]
-pub struct Keys {
-    pub known: &'static [&'static str],
-    pub later: &'static [&'static str],
-}
-
-impl Keys {
-    pub const fn new(known: &'static [&'static str]) -> Self {
-        Keys { known, later: &[] }
-    }
-
-    pub const fn later(self, later: &'static [&'static str]) -> Self {
-        Keys { later, ..self }
-    }
 }
 
 impl<'a> Item<'a> {
@@ -197,12 +183,13 @@ impl<'a> Item<'a> {
     }
 
     /// The table, with unknown keys reported and keys of later versions refused by name.
-    pub fn table(&self, keys: Keys) -> Option<Fields<'a>> {
+    pub fn table(&self, section: &'static Section) -> Option<Fields<'a>> {
         let Value::Table(entries) = &self.node.value else {
             return self.wrong_kind("a table");
         };
-        let mut fields = Fields { cx: self.cx, path: self.path.clone(), at: self.at, entries, misspelt: Vec::new() };
-        fields.check(keys);
+        let (cx, path, at) = (self.cx, self.path.clone(), self.at);
+        let mut fields = Fields { cx, path, at, entries, section, misspelt: Vec::new() };
+        fields.check();
         Some(fields)
     }
 
@@ -217,25 +204,27 @@ impl<'a> Item<'a> {
 
 impl<'a> Fields<'a> {
     /// The tables of the whole file.
-    pub fn root(cx: &'a Context<'a>, entries: &'a [Entry], keys: Keys) -> Self {
-        let mut fields = Fields { cx, path: String::new(), at: &Origin::Whole, entries, misspelt: Vec::new() };
-        fields.check(keys);
+    pub fn root(cx: &'a Context<'a>, entries: &'a [Entry], section: &'static Section) -> Self {
+        let (path, at) = (String::new(), &Origin::Whole);
+        let mut fields = Fields { cx, path, at, entries, section, misspelt: Vec::new() };
+        fields.check();
         fields
     }
 
-    fn check(&mut self, keys: Keys) {
+    fn check(&mut self) {
+        let section = self.section;
         for entry in self.entries {
             let key = entry.key.as_str();
-            if keys.known.contains(&key) {
+            if section.key(key).is_some() {
                 continue;
             }
             let path = join(&self.path, key);
-            if keys.later.contains(&key) {
+            if section.later.contains(&key) {
                 let help = Some("remove it, or use a later version".to_owned());
                 self.cx.error(&entry.key_origin, &path, format!("`{path}` is not supported yet"), help);
                 continue;
             }
-            let all = keys.known.iter().chain(keys.later).copied();
+            let all = section.names().chain(section.later.iter().copied());
             let meant = nearest(key, all.clone());
             let help = meant.map_or_else(|| format!("known keys: {}", list(all)), suggestion);
             self.cx.error(&entry.key_origin, &path, format!("unknown key `{key}`"), Some(help));
@@ -244,11 +233,19 @@ impl<'a> Fields<'a> {
     }
 
     pub fn get(&self, key: &str) -> Option<Item<'a>> {
+        self.assert_known(key);
         self.entries.iter().find(|e| e.key == key).map(|e| child(self.cx, &self.path, e))
     }
 
     pub fn has(&self, key: &str) -> bool {
+        self.assert_known(key);
         self.entries.iter().any(|e| e.key == key)
+    }
+
+    /// A decoder that asks for a key without a row would never see it.
+    fn assert_known(&self, key: &str) {
+        let known = self.section.key(key).is_some() || self.section.later.contains(&key);
+        assert!(known, "`{key}` has no row in scene::keys for `{}`", self.section.path);
     }
 
     /// The value of `key`, whose absence is an error; `help` shows how to write it.
@@ -260,8 +257,10 @@ impl<'a> Fields<'a> {
         item
     }
 
-    /// The one key among `names` that is present; several or none are an error. `what` names the thing chosen.
-    pub fn exactly_one(&self, names: &[&str], what: &str) -> Option<Item<'a>> {
+    /// The one key that is present of those of which there must be one; several or none are an error. `what` names the thing
+    /// chosen.
+    pub fn exactly_one(&self, what: &str) -> Option<Item<'a>> {
+        let names: Vec<&str> = self.section.one_of().collect();
         let present: Vec<&Entry> = self.entries.iter().filter(|e| names.contains(&e.key.as_str())).collect();
         match present[..] {
             [entry] => Some(child(self.cx, &self.path, entry)),
@@ -307,65 +306,9 @@ pub fn join(parent: &str, key: &str) -> String {
     if parent.is_empty() { key } else { format!("{parent}.{key}") }
 }
 
-/// `a, b, c`.
-pub fn list<T: Display>(names: impl IntoIterator<Item = T>) -> String {
-    names.into_iter().map(|n| n.to_string()).collect::<Vec<_>>().join(", ")
-}
-
-/// `"a", "b", "c"`.
-pub fn quoted<T: Display>(names: impl IntoIterator<Item = T>) -> String {
-    list(names.into_iter().map(|n| format!("\"{n}\"")))
-}
-
-/// The nearest of `names`, where one is near enough to be meant.
-fn nearest<'n>(written: &str, names: impl IntoIterator<Item = &'n str>) -> Option<&'n str> {
-    let best = names.into_iter().min_by_key(|name| edit_distance(written, name))?;
-    let allowed = 1 + written.chars().count().min(best.chars().count()) / 3;
-    (edit_distance(written, best) <= allowed).then_some(best)
-}
-
-fn suggestion(name: &str) -> String {
-    format!("did you mean `{name}`?")
-}
-
-/// A hint at the nearest of `names`, where one is near enough to be meant.
-pub fn did_you_mean<'n>(written: &str, names: impl IntoIterator<Item = &'n str>) -> Option<String> {
-    nearest(written, names).map(suggestion)
-}
-
-/// Levenshtein distance in characters, of the first 64 of each.
-fn edit_distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().take(64).collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, ca) in a.chars().take(64).enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, &cb) in b.iter().enumerate() {
-            let substituted = diagonal + usize::from(ca != cb);
-            diagonal = row[j + 1];
-            row[j + 1] = substituted.min(row[j] + 1).min(diagonal + 1);
-        }
-    }
-    row[b.len()]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn distances() {
-        for (a, b, expected) in [("", "abc", 3), ("width", "widht", 2), ("kitten", "sitting", 3), ("x", "x", 0)] {
-            assert_eq!(edit_distance(a, b), expected, "{a} {b}");
-        }
-    }
-
-    #[test]
-    fn suggestions_are_near_or_absent() {
-        let names = ["width", "height", "filter", "crop"];
-        assert_eq!(did_you_mean("widht", names).as_deref(), Some("did you mean `width`?"));
-        assert_eq!(did_you_mean("temperature", names), None);
-    }
 
     #[test]
     fn keys_are_quoted_where_toml_would() {

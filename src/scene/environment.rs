@@ -2,8 +2,8 @@
 
 use glam::{DMat3, DQuat, DVec3};
 
-use super::decode::{Fields, Item, Keys};
-use super::overrides::ENVIRONMENTS;
+use super::decode::{Fields, Item};
+use super::keys;
 use super::spectrum::{Quantity, Spectra, report_in_file};
 use super::{Environment, EnvironmentMap, Texels};
 use crate::error::Problem;
@@ -11,12 +11,10 @@ use crate::format::maps::{self, Content, Map};
 use crate::format::noise::{self, Range};
 use crate::spectral::upsample;
 
-const KEYS: Keys = Keys::new(&["radiance", "map", "up", "rotate_degrees", "scale"]);
-
 /// `None` where something is wrong, which has been said.
 pub fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Environment> {
-    let fields = item.table(KEYS)?;
-    let source = fields.exactly_one(&ENVIRONMENTS, "source of radiance");
+    let fields = item.table(&keys::ENVIRONMENT)?;
+    let source = fields.exactly_one("source of radiance");
     let to_map = to_map(&fields);
     let scale = fields.get("scale");
     let source = source?;

@@ -6,9 +6,10 @@ use super::camera;
 use super::channels;
 use super::context::{Context, position};
 use super::coverage;
-use super::decode::{Fields, Item, Keys};
+use super::decode::{Fields, Item};
 use super::digest::digest;
 use super::environment;
+use super::keys;
 use super::light;
 use super::material::Materials;
 use super::medium::Media;
@@ -19,22 +20,8 @@ use super::tree::{self, Entry, Origin};
 use super::{Evaluator, Integrator, Sampler, Scene, Wavelengths};
 use crate::error::{Error, Problem, Result};
 
-const TOP: Keys = Keys::new(&[
-    "camera",
-    "film",
-    "channels",
-    "integrator",
-    "spectra",
-    "materials",
-    "objects",
-    "lights",
-    "environment",
-    "media",
-]);
-const INTEGRATOR: Keys =
-    Keys::new(&["max_bounces", "russian_roulette_start", "sampler", "wavelengths", "evaluator", "epoch"]);
-/// Evaluations walk all records of a path, two a bounce and one more, in one loop of at most 32,768 iterations (DESIGN
-/// section 7).
+/// Evaluations walk all records of a path, two a bounce and one more, in one loop of at most 32,768 iterations,
+/// the most that every driver runs.
 const MAX_BOUNCES: u32 = 16_383;
 const MAX_EPOCH: u32 = 1024;
 
@@ -96,7 +83,7 @@ pub fn parse(text: &str, file: &Path, overrides: &[(String, String)]) -> Result<
 
 /// Decodes every section, whatever is wrong with the others; `None` if anything was.
 fn decode<'a>(cx: &'a Context<'a>, root: &'a [Entry]) -> Option<Scene> {
-    let top = Fields::root(cx, root, TOP);
+    let top = Fields::root(cx, root, &keys::SCENE);
     let section = |key: &str, example: &str| {
         let item = top.get(key);
         if item.is_none() {
@@ -168,7 +155,7 @@ impl Default for Integrator {
 }
 
 fn decode_integrator(item: &Item) -> Option<Integrator> {
-    let fields = item.table(INTEGRATOR)?;
+    let fields = item.table(&keys::INTEGRATOR)?;
     let default = Integrator::default();
     let bounces = |key: &str, default: u32| match fields.get(key) {
         Some(item) => item.whole(0..=MAX_BOUNCES),

@@ -1,8 +1,8 @@
 //! `[[lights]]`: light that comes from no surface.
 
 use super::Light;
-use super::decode::{Fields, Item, Keys};
-use super::overrides::LIGHT_KINDS;
+use super::decode::{Fields, Item};
+use super::keys;
 use super::spectrum::{Handle, Quantity, Spectra};
 
 /// Degrees. Smaller disks are too narrow for a device to tell which directions are inside; larger ones are no disks.
@@ -15,22 +15,22 @@ pub fn decode_lights<'a>(item: Option<Item<'a>>, spectra: &mut Spectra<'a>) -> V
 }
 
 fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Light> {
-    let kind = item.table(Keys::new(&LIGHT_KINDS))?.exactly_one(&LIGHT_KINDS, "kind of light")?;
+    let kind = item.table(&keys::LIGHT)?.exactly_one("kind of light")?;
     match kind.path.rsplit('.').next() {
         Some("point") => {
-            let fields = kind.table(Keys::new(&["position", "intensity"]))?;
+            let fields = kind.table(&keys::POINT)?;
             let position = fields.require("position", "position = [0, 0, 0]").and_then(|item| item.vector());
             let intensity = spectrum(&fields, "intensity", Quantity::Intensity, spectra);
             Some(Light::Point { position: position?, intensity: spectra.take(intensity?) })
         }
         Some("directional") => {
-            let fields = kind.table(Keys::new(&["direction", "irradiance"]))?;
+            let fields = kind.table(&keys::DIRECTIONAL)?;
             let direction = direction(&fields);
             let irradiance = spectrum(&fields, "irradiance", Quantity::Irradiance, spectra);
             Some(Light::Directional { direction: direction?, irradiance: spectra.take(irradiance?) })
         }
         _ => {
-            let fields = kind.table(Keys::new(&["direction", "angular_radius", "irradiance"]))?;
+            let fields = kind.table(&keys::SUN)?;
             let direction = direction(&fields);
             let radius = fields.require("angular_radius", "angular_radius = 0.2665, in degrees").and_then(|item| {
                 let degrees = item.positive()?;

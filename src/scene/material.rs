@@ -1,20 +1,13 @@
 //! `[materials]`.
 
 use super::blend::{Parts, check_blends};
-use super::decode::{Fields, Item, Keys, did_you_mean, list};
-use super::overrides::MATERIAL_KINDS;
+use super::decode::{Fields, Item, did_you_mean, list};
+use super::keys;
 use super::spectrum::{Handle, Quantity, Spectra};
 use super::texture::{self, Number, Textures, is_texture};
 use super::tree::Value;
 use super::{Bsdf, Material, MaterialId, Reflectance, SMOOTH, Temperature, Texture, Weight};
 
-const KINDS: Keys = Keys::new(&MATERIAL_KINDS);
-const DIFFUSE: Keys = Keys::new(&["reflectance", "two_sided", "temperature"]);
-const CONDUCTOR: Keys = Keys::new(&["nk", "eta", "k", "roughness", "energy_compensation", "two_sided", "temperature"]);
-const DIELECTRIC: Keys = Keys::new(&["eta", "dispersion", "roughness", "temperature"]);
-const PLASTIC: Keys = Keys::new(&["reflectance", "eta", "roughness", "two_sided", "temperature"]);
-const BLEND: Keys = Keys::new(&["a", "b", "weight", "temperature"]);
-const BLACK: Keys = Keys::new(&["two_sided", "temperature"]);
 /// K. The peak of Planck's radiance there is 4e33 W m⁻² sr⁻¹ nm⁻¹, near the end of f32.
 const HOTTEST: f64 = 1e9;
 
@@ -242,21 +235,21 @@ impl<'a> Materials<'a> {
 }
 
 fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>, textures: &mut Textures) -> Option<Declared<'a>> {
-    let fields = item.table(KINDS)?;
-    let kind = fields.exactly_one(&MATERIAL_KINDS, "kind of material")?;
+    let fields = item.table(&keys::MATERIAL)?;
+    let kind = fields.exactly_one("kind of material")?;
     let (fields, kind) = match kind.path.rsplit('.').next() {
         Some("diffuse") => {
-            let fields = kind.table(DIFFUSE)?;
+            let fields = kind.table(&keys::DIFFUSE)?;
             let reflectance = reflects(&fields, spectra, textures);
             (fields, reflectance.map(|reflectance| Kind::Diffuse { reflectance }))
         }
         Some("conductor") => {
-            let fields = kind.table(CONDUCTOR)?;
+            let fields = kind.table(&keys::CONDUCTOR)?;
             let kind = conductor(&fields, spectra);
             (fields, kind)
         }
         Some("dielectric") => {
-            let fields = kind.table(DIELECTRIC)?;
+            let fields = kind.table(&keys::DIELECTRIC)?;
             let eta = spectrum(&fields, "eta", ETA, Quantity::Index, spectra);
             let (dispersion, roughness) = (boolean(&fields, "dispersion", true), roughness(&fields));
             if let Some(item) = fields.get("temperature") {
@@ -274,7 +267,7 @@ fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>, textures: &mut Texture
             });
         }
         Some("plastic") => {
-            let fields = kind.table(PLASTIC)?;
+            let fields = kind.table(&keys::PLASTIC)?;
             let reflectance = reflects(&fields, spectra, textures);
             let eta = spectrum(&fields, "eta", ETA, Quantity::CoatIndex, spectra);
             let kind = match (reflectance, eta, roughness(&fields)) {
@@ -284,11 +277,11 @@ fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>, textures: &mut Texture
             (fields, kind)
         }
         Some("blend") => {
-            let fields = kind.table(BLEND)?;
+            let fields = kind.table(&keys::BLEND)?;
             let (kind, temperature) = (blend(&fields, textures), temperature(&fields, textures));
             return Some(Declared { kind: kind?, two_sided: true, temperature: temperature?, taken: None });
         }
-        _ => (kind.table(BLACK)?, Some(Kind::Black)),
+        _ => (kind.table(&keys::BLACK)?, Some(Kind::Black)),
     };
     let (two_sided, temperature) = (boolean(&fields, "two_sided", true), temperature(&fields, textures));
     Some(Declared { kind: kind?, two_sided: two_sided?, temperature: temperature?, taken: None })

@@ -4,7 +4,8 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::decode::{Fields, Item, Keys, did_you_mean, list};
+use super::decode::{Fields, Item, did_you_mean, list};
+use super::keys;
 use super::material::kelvin;
 use super::spectrum::{Handle, Quantity, Spectra, report_in_file};
 use super::tree::Value;
@@ -12,10 +13,6 @@ use super::{Absorber, Field, Grid, Medium, MediumId};
 use crate::format::noise::{self, Range};
 use crate::format::unit::Measure;
 use crate::format::volume::{self, Volume};
-
-const KEYS: Keys =
-    Keys::new(&["absorption", "species", "pressure", "temperature", "density"]).later(&["scattering", "phase_g"]);
-const SPECIES: Keys = Keys::new(&["table", "fraction"]);
 
 /// Strength, and columns of a temperature and a spectrum each.
 type Term = (f64, Vec<(f64, Handle)>);
@@ -89,10 +86,10 @@ impl<'a> Media<'a> {
 }
 
 fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>, grids: &mut Grids) -> Option<Declared> {
-    let fields = item.table(KEYS)?;
+    let fields = item.table(&keys::MEDIUM)?;
     let later = |key: &&str| fields.has(key);
-    let refused = KEYS.later.iter().any(later);
-    let given = fields.exactly_one(&["absorption", "species"], "absorption");
+    let refused = keys::MEDIUM.later.iter().any(later);
+    let given = fields.exactly_one("absorption");
     let temperature = field(&fields, "temperature", grids, kelvin, Describes::Temperature);
     let density = field(&fields, "density", grids, Item::not_negative, Describes::Density);
     let pressure = match fields.get("pressure") {
@@ -177,7 +174,7 @@ fn species<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Vec<Term>> 
     let mut all = Vec::new();
     let mut total = 0.0;
     for item in &items {
-        let one = item.table(SPECIES).and_then(|fields| {
+        let one = item.table(&keys::SPECIES).and_then(|fields| {
             let table = fields.require("table", "table = \"co2.csv\"").and_then(|item| spectra.species(&item));
             let fraction = fields.require("fraction", "fraction = 0.05, the share of volume").and_then(|item| {
                 item.number_where(|share| (0.0..=1.0).contains(&share), "a share of volume in [0, 1]")
@@ -217,7 +214,7 @@ fn field<'a>(
     if !matches!(item.node.value, Value::Table(_)) {
         return number(&item).map(|value| Some(Field::Constant(value)));
     }
-    let grid = item.table(Keys::new(&["grid"]))?.require("grid", "grid = \"t.zarr\"")?;
+    let grid = item.table(&keys::GRID)?.require("grid", "grid = \"t.zarr\"")?;
     Some(Some(Field::Grid(grids.read(&grid, describes)?)))
 }
 

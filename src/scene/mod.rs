@@ -11,6 +11,7 @@ mod decode;
 mod digest;
 mod environment;
 mod file;
+pub mod keys;
 mod light;
 mod material;
 mod medium;
@@ -21,6 +22,7 @@ mod spectrum;
 mod texture;
 mod transform;
 mod tree;
+mod words;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -29,6 +31,7 @@ use glam::{DAffine3, DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 pub use file::{load, parse};
+pub use spectrum::Quantity;
 
 use crate::spectral::{Channels, Curve};
 
@@ -148,35 +151,21 @@ pub struct Integrator {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Evaluator {
-    /// What is fastest on the device, by a fixed rule of its kind and the number of channels ([`Evaluator::on`]).
+    /// What is fastest on the device, by a fixed rule of its kind and the number of channels (`device::evaluator`).
     Auto,
     /// Deferred: a thread takes some channels of a pixel along all its saved paths.
     DpeptPixel,
-    /// Deferred: a thread takes all channels of a saved path, batch by batch (the method, section 5.1).
+    /// Deferred: a thread takes all channels of a saved path, batch by batch (Hoarau et al. 2018, section 5.1).
     DpeptPath,
-    /// Deferred: the threads of a workgroup take different channels of the same saved path (the method, section 5.2).
+    /// Deferred: the threads of a workgroup take different channels of the same saved path (Hoarau et al. 2018, section 5.2).
     DpeptSpectral,
-    /// The conventional path tracer: all channels of all paths in memory, updated at every bounce (the method, section 4).
+    /// The conventional path tracer: all channels of all paths in memory, updated at every bounce (Hoarau et al. 2018, section 4).
     Pt,
 }
 
 impl Evaluator {
     pub const ALL: [Evaluator; 5] =
         [Evaluator::Auto, Evaluator::DpeptPixel, Evaluator::DpeptPath, Evaluator::DpeptSpectral, Evaluator::Pt];
-
-    /// Channels up to which `auto` is the conventional path tracer on GPUs. Measured with `spectile bench` on an H200 (docs/reports):
-    /// its paths per second over those of `dpept-pixel`, geometric mean of four scenes, were 1.43 at 8 channels, 0.86 at 32 and 0.36 at
-    /// 128. On software devices `dpept-pixel` was the fastest in all of them, or one percent from it.
-    pub const MOST_PT_CHANNELS: usize = 16;
-
-    /// What to use on a software device or a GPU: this evaluator, or what `auto` stands for.
-    pub fn on(self, software: bool, channels: usize) -> Evaluator {
-        match self {
-            Evaluator::Auto if !software && channels <= Evaluator::MOST_PT_CHANNELS => Evaluator::Pt,
-            Evaluator::Auto => Evaluator::DpeptPixel,
-            chosen => chosen,
-        }
-    }
 
     /// Whether a dispatch takes one sample of every pixel, instead of all that are there.
     pub fn takes_one_sample(self) -> bool {
@@ -210,7 +199,7 @@ pub enum Sampler {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Wavelengths {
-    /// Eq. 4 of the method.
+    /// Evenly over each channel: Eq. 4 of Hoarau et al. 2018.
     Uniform,
     /// From the emitters' own spectral density in each channel, see [`crate::spectral::warp`].
     Emission,

@@ -7,10 +7,10 @@ use std::rc::Rc;
 use glam::{DAffine3, DVec3};
 
 use super::closed;
-use super::decode::{Fields, Item, Keys, list};
+use super::decode::{Fields, Item, list};
+use super::keys;
 use super::material::{Materials, Needs};
 use super::medium::Media;
-use super::overrides::SHAPES;
 use super::shape::{self, Replaced};
 use super::spectrum::{Handle, Quantity, Spectra, report_in_file};
 use super::transform;
@@ -18,21 +18,6 @@ use super::tree::Value;
 use super::{Attributes, Emission, Interior, MaterialId, MediumId, Object, Shape, Sides};
 use crate::error::Problem;
 use crate::format::obj::{self, Obj, Part};
-
-const KEYS: Keys = Keys::new(&[
-    "mesh",
-    "sphere",
-    "quad",
-    "disk",
-    "cube",
-    "cylinder",
-    "group",
-    "material",
-    "emission",
-    "emission_sides",
-    "transform",
-    "interior",
-]);
 
 /// Decodes objects one after the other; a mesh file is read once.
 pub struct Objects<'s, 'a> {
@@ -77,8 +62,8 @@ impl<'s, 'a> Objects<'s, 'a> {
 
     /// Decodes one entry of `[[objects]]`.
     pub fn add(&mut self, item: &Item<'a>) {
-        let Some(fields) = item.table(KEYS) else { return };
-        let shape = fields.exactly_one(&SHAPES, "shape");
+        let Some(fields) = item.table(&keys::OBJECT) else { return };
+        let shape = fields.exactly_one("shape");
         let group = fields.get("group");
         if let (Some(group), false) = (&group, fields.has("mesh")) {
             group.error_help("goes with `mesh` only", "remove it");

@@ -1,17 +1,8 @@
 //! `--set key=value`: replaces values of the scene tree by dotted path before anything is decoded.
 
 use super::context::Context;
+use super::keys::{self, Section};
 use super::tree::{self, Entry, Node, Origin, Value};
-
-/// The keys of which a spectrum has exactly one.
-pub const SPECTRUM_SOURCES: [&str; 6] = ["file", "constant", "blackbody", "samples", "regular", "rgb"];
-/// The keys of which a camera, channels, material, object, light and environment have exactly one.
-pub const CAMERAS: [&str; 3] = ["perspective", "thin_lens", "orthographic"];
-pub const CHANNEL_KINDS: [&str; 4] = ["equal", "wavenumber", "intervals", "responses"];
-pub const MATERIAL_KINDS: [&str; 6] = ["diffuse", "conductor", "dielectric", "plastic", "blend", "black"];
-pub const SHAPES: [&str; 6] = ["mesh", "sphere", "quad", "disk", "cube", "cylinder"];
-pub const LIGHT_KINDS: [&str; 3] = ["point", "directional", "sun"];
-pub const ENVIRONMENTS: [&str; 2] = ["radiance", "map"];
 
 /// Applies every override to `root`, in order; mistakes are recorded in `cx`.
 pub fn apply(cx: &Context<'_>, root: &mut Vec<Entry>, overrides: &[(String, String)]) {
@@ -141,23 +132,24 @@ fn set_below(target: &mut Node, here: &[&str], path: &[String], node: Node, orig
 
 /// The keys beside `key`, in the table at `parents`, that setting `key` replaces.
 fn rivals(parents: &[&str], key: &str) -> Vec<&'static str> {
-    let others = |group: &[&'static str]| -> Vec<&'static str> {
-        if group.contains(&key) { group.iter().copied().filter(|k| *k != key).collect() } else { Vec::new() }
+    let is_one_of = |section: &Section| section.one_of().any(|k| k == key);
+    let others = |section: &Section| -> Vec<&'static str> {
+        if is_one_of(section) { section.one_of().filter(|k| *k != key).collect() } else { Vec::new() }
     };
     match parents {
-        ["camera"] => others(&CAMERAS),
-        ["channels"] => others(&CHANNEL_KINDS),
-        ["materials", _] => others(&MATERIAL_KINDS),
+        ["camera"] => others(&keys::CAMERA),
+        ["channels"] => others(&keys::CHANNELS),
+        ["materials", _] => others(&keys::MATERIAL),
         ["materials", _, "conductor"] => match key {
             "nk" => vec!["eta", "k"],
             "eta" | "k" => vec!["nk"],
             _ => Vec::new(),
         },
-        ["lights", _] => others(&LIGHT_KINDS),
-        ["environment"] => others(&ENVIRONMENTS),
+        ["lights", _] => others(&keys::LIGHT),
+        ["environment"] => others(&keys::ENVIRONMENT),
         ["objects", _] => {
-            let mut rivals = others(&SHAPES);
-            if SHAPES.contains(&key) && key != "mesh" {
+            let mut rivals = others(&keys::OBJECT);
+            if is_one_of(&keys::OBJECT) && key != "mesh" {
                 rivals.push("group");
             }
             rivals
@@ -169,17 +161,17 @@ fn rivals(parents: &[&str], key: &str) -> Vec<&'static str> {
         },
         // Everywhere else a table with these keys is a spectrum.
         _ => {
-            let mut rivals = others(&SPECTRUM_SOURCES);
+            let mut rivals = others(&keys::SPECTRUM);
             match key {
                 // A texture stands in the place of a spectrum, with keys of its own.
                 "texture" | "endmembers" => {
-                    rivals.extend(SPECTRUM_SOURCES);
+                    rivals.extend(keys::SPECTRUM.one_of());
                     rivals.extend(["column", "scale", "outside"]);
                 }
-                _ if SPECTRUM_SOURCES.contains(&key) => rivals.extend(["texture", "endmembers"]),
+                _ if is_one_of(&keys::SPECTRUM) => rivals.extend(["texture", "endmembers"]),
                 _ => {}
             }
-            if SPECTRUM_SOURCES.contains(&key) && key != "file" {
+            if is_one_of(&keys::SPECTRUM) && key != "file" {
                 rivals.push("column");
             }
             if matches!(key, "constant" | "blackbody") {

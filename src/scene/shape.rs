@@ -2,7 +2,8 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
-use super::decode::{Fields, Item, Keys};
+use super::decode::{Fields, Item};
+use super::keys;
 use super::material::Needs;
 use super::{Attributes, Mesh, Shape};
 use crate::format::obj::Part;
@@ -27,20 +28,20 @@ fn radius(fields: &Fields) -> Option<f64> {
 }
 
 fn sphere(item: &Item) -> Option<Shape> {
-    let fields = item.table(Keys::new(&["center", "radius"]))?;
+    let fields = item.table(&keys::SPHERE)?;
     let (center, radius) = (vector(&fields, "center"), radius(&fields));
     Some(Shape::Sphere { center: center?, radius: radius? })
 }
 
 fn disk(item: &Item) -> Option<Shape> {
-    let fields = item.table(Keys::new(&["center", "normal", "radius"]))?;
+    let fields = item.table(&keys::DISK)?;
     let normal = fields.require("normal", "normal = [x, y, z]").and_then(|item| item.direction());
     let (center, radius) = (vector(&fields, "center"), radius(&fields));
     Some(Shape::Disk { center: center?, normal: normal?, radius: radius? })
 }
 
 fn cylinder(item: &Item) -> Option<Shape> {
-    let fields = item.table(Keys::new(&["from", "to", "radius"]))?;
+    let fields = item.table(&keys::CYLINDER)?;
     let (from, to, radius) = (vector(&fields, "from"), vector(&fields, "to"), radius(&fields));
     let (from, to) = (from?, to?);
     if from == to {
@@ -52,7 +53,7 @@ fn cylinder(item: &Item) -> Option<Shape> {
 
 /// Two triangles whose normal is edge_u x edge_v, and whose first edges run along edge_u.
 fn quad(item: &Item) -> Option<Shape> {
-    let fields = item.table(Keys::new(&["corner", "edge_u", "edge_v"]))?;
+    let fields = item.table(&keys::QUAD)?;
     let (corner, u, v) = (vector(&fields, "corner"), vector(&fields, "edge_u"), vector(&fields, "edge_v"));
     let (corner, u, v) = (corner?, u?, v?);
     if is_degenerate(DVec3::ZERO, u, v) {
@@ -65,7 +66,7 @@ fn quad(item: &Item) -> Option<Shape> {
 
 /// Twelve triangles facing outward. The first edges of a face's two triangles are along its u.
 fn cube(item: &Item) -> Option<Shape> {
-    let fields = item.table(Keys::new(&["min", "max"]))?;
+    let fields = item.table(&keys::CUBE)?;
     let (min, max) = (vector(&fields, "min"), vector(&fields, "max"));
     let (min, max) = (min?, max?);
     if !min.cmplt(max).all() {

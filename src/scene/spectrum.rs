@@ -4,8 +4,8 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 
 use super::context::Context;
-use super::decode::{Item, Keys, did_you_mean, list};
-use super::overrides::SPECTRUM_SOURCES;
+use super::decode::{Item, did_you_mean, list};
+use super::keys;
 use super::texture::is_texture;
 use super::tree::{Origin, Value};
 use super::{Spectrum, SpectrumId};
@@ -48,9 +48,25 @@ pub enum Quantity {
 }
 
 impl Quantity {
+    pub const ALL: [Quantity; 8] = [
+        Quantity::Reflectance,
+        Quantity::Radiance,
+        Quantity::Intensity,
+        Quantity::Irradiance,
+        Quantity::Index,
+        Quantity::CoatIndex,
+        Quantity::Extinction,
+        Quantity::Absorption,
+    ];
+
     /// Whether it is light itself rather than what becomes of light.
     fn is_light(self) -> bool {
         matches!(self, Quantity::Radiance | Quantity::Intensity | Quantity::Irradiance)
+    }
+
+    /// Whether it is an index of refraction or an absorption, which no temperature and no colour makes.
+    pub fn is_index(self) -> bool {
+        self != Quantity::Reflectance && !self.is_light()
     }
 
     /// Whether it is n or k.
@@ -62,7 +78,27 @@ impl Quantity {
         if self.is_light() || self == Quantity::Absorption { Outside::Zero } else { Outside::Hold }
     }
 
-    fn noun(self) -> &'static str {
+    /// Empty where it has none.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Quantity::Radiance => "W m⁻² sr⁻¹ nm⁻¹",
+            Quantity::Intensity => "W sr⁻¹ nm⁻¹",
+            Quantity::Irradiance => "W m⁻² nm⁻¹",
+            Quantity::Absorption => "m⁻¹",
+            Quantity::Reflectance | Quantity::Index | Quantity::CoatIndex | Quantity::Extinction => "",
+        }
+    }
+
+    /// What holds beyond the ends of a table, in words.
+    pub fn beyond_words(self) -> &'static str {
+        match (self.default_outside(), self.is_light()) {
+            (Outside::Hold, _) => "its first and last value are held, with a warning",
+            (Outside::Zero, true) => "zero",
+            (Outside::Zero, false) => "zero, with a warning",
+        }
+    }
+
+    pub fn noun(self) -> &'static str {
         match self {
             Quantity::Reflectance => "a reflectance",
             Quantity::Radiance => "a radiance",
@@ -106,27 +142,20 @@ impl Quantity {
         }
     }
 
-    /// The unit that Spectile takes it in.
-    fn unit(self) -> &'static str {
+    /// The values that are allowed.
+    pub fn interval(self) -> &'static str {
         match self {
-            Quantity::Radiance => "W m-2 sr-1 nm-1",
-            Quantity::Intensity => "W sr-1 nm-1",
-            Quantity::Irradiance => "W m-2 nm-1",
-            Quantity::Absorption => "m-1",
-            _ => "1",
-        }
-    }
-
-    pub fn range(self) -> String {
-        let range = match self {
             Quantity::Reflectance => "[0, 1]",
             Quantity::Radiance | Quantity::Intensity | Quantity::Irradiance => "[0, 1e35]",
             Quantity::Index => "(0, 1000]",
             Quantity::CoatIndex => "[1, 1000]",
             Quantity::Extinction => "[0, 1000]",
             Quantity::Absorption => "[0, 1e15]",
-        };
-        format!("{} must lie in {range}", self.noun())
+        }
+    }
+
+    pub fn range(self) -> String {
+        format!("{} must lie in {}", self.noun(), self.interval())
     }
 }
 
@@ -187,9 +216,6 @@ pub struct Spectra<'a> {
     scene: Vec<Spectrum>,
     channels: Option<Channels>,
 }
-
-const KEYS: Keys =
-    Keys::new(&["file", "constant", "blackbody", "samples", "regular", "rgb", "column", "unit", "scale", "outside"]);
 
 impl<'a> Spectra<'a> {
     /// Decodes `[spectra]`. `channels` decide what a table leaves uncovered.
@@ -349,7 +375,7 @@ impl<'a> Spectra<'a> {
             self.cx.error(source.at, &source.path, message, None);
         };
         let mut warnings = Vec::new();
-        let is_index = quantity != Quantity::Reflectance && !quantity.is_light();
+        let is_index = quantity.is_index();
         if is_index && !quantity.allows(0.0) && source.outside == Some(Outside::Zero) {
             let help = "remove `outside`, or write outside = \"hold\"";
             let message = format!("an index of refraction cannot be 0 outside its table{used_by}");
@@ -553,8 +579,8 @@ fn source<'a>(item: &Item<'a>, needed: Option<[f64; 2]>) -> Option<Source<'a>> {
         );
         return None;
     }
-    let fields = item.table(KEYS)?;
-    let kind = fields.exactly_one(&SPECTRUM_SOURCES, "spectrum source");
+    let fields = item.table(&keys::SPECTRUM)?;
+    let kind = fields.exactly_one("spectrum source");
     let scale = match fields.get("scale") {
         Some(item) => item.not_negative(),
         None => Some(1.0),
@@ -698,7 +724,7 @@ fn samples(item: &Item) -> Option<Data> {
 }
 
 fn regular(item: &Item) -> Option<Data> {
-    let fields = item.table(Keys::new(&["from", "to", "values"]))?;
+    let fields = item.table(&keys::REGULAR)?;
     const EXAMPLE: &str = "all of { from = 400, to = 700, values = [0.1, 0.8] }";
     let bound = |key: &str| fields.require(key, EXAMPLE).and_then(|item| item.positive());
     let (from, to, values) = (bound("from"), bound("to"), fields.require("values", EXAMPLE));

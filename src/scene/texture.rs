@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use std::rc::Rc;
 use std::sync::Arc;
 
-use super::decode::{Item, Keys, list};
+use super::decode::{Item, list};
+use super::keys;
 use super::spectrum::{self, Quantity, Spectra, report_in_file};
 use super::tree::Value;
 use super::{Texture, TextureId, TextureKind};
@@ -69,7 +70,7 @@ pub fn is_texture(item: &Item) -> bool {
 impl Textures {
     /// The reflectance that `item` spells: `{ texture, endmembers }`, a mixture of spectra, or `{ texture }`, colours.
     pub fn reflectance<'a>(&mut self, item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Handle> {
-        let fields = item.table(Keys::new(&["texture", "endmembers"]))?;
+        let fields = item.table(&keys::TEXTURE)?;
         let file = fields.require("texture", "texture = \"abundance.exr\"");
         let endmembers = match fields.get("endmembers") {
             None => None,
@@ -87,7 +88,7 @@ impl Textures {
 
     /// The numbers over a surface that `item`, `{ texture }`, spells.
     pub fn number(&mut self, item: &Item, number: Number) -> Option<Handle> {
-        let fields = item.table(Keys::new(&["texture"]))?;
+        let fields = item.table(&keys::TEXTURE_OF_NUMBERS)?;
         let file = fields.require("texture", "texture = \"mask.png\"")?;
         self.add(&file, Use::Number(number), |image, path| numbers(&file, number, image, path))
     }

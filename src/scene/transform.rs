@@ -2,11 +2,11 @@
 
 use glam::{DAffine3, DMat3, DVec3};
 
-use super::decode::{Item, Keys};
+use super::decode::Item;
+use super::keys;
 use super::tree::Value;
 use super::{Attributes, Mesh, Shape};
 
-const KEYS: Keys = Keys::new(&["translate", "rotate", "scale", "matrix"]);
 /// Coordinates beyond this have squares near the end of f32.
 const FARTHEST: f64 = 1e15;
 /// How far, relatively, the columns of a similarity may be from equal length and right angles: matrices are often
@@ -15,7 +15,7 @@ const SIMILAR: f64 = 1e-5;
 
 /// The transform that `item` spells: first scale, then rotate, then translate; or a matrix.
 pub fn decode(item: &Item) -> Option<DAffine3> {
-    let fields = item.table(KEYS)?;
+    let fields = item.table(&keys::TRANSFORM)?;
     let parts: Vec<Item> = ["translate", "rotate", "scale"].iter().filter_map(|key| fields.get(key)).collect();
     let affine = match fields.get("matrix") {
         Some(_) if !parts.is_empty() => {

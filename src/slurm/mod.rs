@@ -1,7 +1,7 @@
 //! Array jobs on a Slurm cluster: what is submitted, and what its tasks and its finaliser are told.
 //!
-//! A task is a range of tiles of one cube, rendered by an ordinary process under the locks and journals of every other
-//! (DESIGN section 4), so a task may be killed, requeued, or run twice. The finaliser comes when no task of the array is left,
+//! A task is a range of tiles of one cube, rendered by an ordinary process under the locks and journals of every other,
+//! so a task may be killed, requeued, or run twice. The finaliser comes when no task of the array is left,
 //! verifies every tile and submits again what is missing. All of them read [`Job`], a file in the cube.
 
 pub mod client;
@@ -15,6 +15,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::cube::node_name;
+use crate::files::output::Product;
 use crate::{Error, Result, files};
 
 /// Arrays that finalisers may submit for one `spectile submit`, after the first.
@@ -46,6 +47,9 @@ pub struct Job {
     #[serde(default)]
     pub uncertainty: bool,
     pub memory: Option<u64>,
+    /// Whether tasks may use software devices where no GPU is found.
+    #[serde(default)]
+    pub allow_software: bool,
     /// Samples per pixel at which every tile is done, the end of an epoch.
     pub samples: u32,
     /// Tiles of the cube, and tasks that share them.
@@ -95,6 +99,28 @@ pub fn script_path(cube: &Path) -> PathBuf {
 
 pub fn summary_path(cube: &Path) -> PathBuf {
     beside(cube, "summary.txt")
+}
+
+/// Both files, as [`crate::files::output`] has it.
+pub const SCRIPT: Product = Product {
+    name: "a batch script that `submit` wrote",
+    extensions: &["sbatch"],
+    is_stream: false,
+    is_folder: false,
+    check: |path| begins(path, "#!/bin/bash\n# ", script::WRITTEN_BY),
+};
+pub const SUMMARY: Product = Product {
+    name: "the summary of an array job",
+    extensions: &["txt"],
+    is_stream: false,
+    is_folder: false,
+    check: |path| begins(path, "cube         ", "\nresult       "),
+};
+
+/// Whether the text at `path` begins so, and goes on to say that.
+fn begins(path: &Path, begin: &str, more: &str) -> std::result::Result<(), String> {
+    let text = fs::read_to_string(path).map_err(|error| format!("cannot be read as text ({error})"))?;
+    if text.starts_with(begin) && text.contains(more) { Ok(()) } else { Err("holds something else".into()) }
 }
 
 fn beside(cube: &Path, extension: &str) -> PathBuf {
@@ -241,6 +267,7 @@ pub(crate) mod tests {
             seed: 7,
             uncertainty: false,
             memory: None,
+            allow_software: false,
             samples: 256,
             tiles,
             tasks,

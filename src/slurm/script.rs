@@ -9,6 +9,9 @@ use crate::{Error, Result};
 const END_S: u64 = 60;
 const END_SHARE: u64 = 4;
 
+/// Tells the script from others.
+pub const WRITTEN_BY: &str = "# Written by `spectile submit`";
+
 /// The script of the array, for people to read and for sbatch to run. `tasks` are in sbatch's words.
 pub fn text(job: &Job, cube: &Path, tasks: &str) -> Result<String> {
     let request = &job.request;
@@ -25,7 +28,7 @@ pub fn text(job: &Job, cube: &Path, tasks: &str) -> Result<String> {
     let mut text = format!(
         "#!/bin/bash\n\
          # {} tasks of {per_task} each make {} from {}.\n\
-         # Written by `spectile submit`, {}. On one machine the same bytes come from\n\
+         {WRITTEN_BY}, {}. On one machine the same bytes come from\n\
          #   {}\n\
          #\n",
         job.tasks,
@@ -53,8 +56,6 @@ pub fn text(job: &Job, cube: &Path, tasks: &str) -> Result<String> {
         "\n\
          # Software devices get as many threads as the task has CPUs; GPUs are those that Slurm gives the task.\n\
          export LP_NUM_THREADS=\"${{SLURM_CPUS_ON_NODE:-1}}\"\n\
-         # Vulkan loaders want a folder for it.\n\
-         [ -d \"${{XDG_RUNTIME_DIR:-}}\" ] || export XDG_RUNTIME_DIR=\"${{TMPDIR:-/tmp}}\"\n\
          # On SIGTERM, before the time limit or at preemption, it commits what is merged and requeues its task.\n\
          exec {} array-task {}\n",
         quote(&job.program.display().to_string()),
@@ -74,8 +75,9 @@ fn common_options(job: &Job) -> Vec<String> {
 /// Options of the probe that srun runs before anything is submitted.
 pub fn probe_options(job: &Job) -> Vec<String> {
     let request = &job.request;
+    let gpus = (request.gpus_per_task > 0).then(|| format!("--gpus-per-task={}", request.gpus_per_task));
     let partition = request.partition.iter().map(|partition| format!("--partition={partition}"));
-    partition.chain(request.more.iter().cloned()).collect()
+    gpus.into_iter().chain(partition).chain(request.more.iter().cloned()).collect()
 }
 
 fn end_s(job: &Job) -> u64 {

@@ -70,8 +70,10 @@ impl Response {
         Ok(Response { curve, support: [from, to], integral, centroid })
     }
 
+    /// What decides it; all else that it holds follows from that.
     pub fn curve(&self) -> &Curve {
-        &self.curve
+        let Response { curve, support: _, integral: _, centroid: _ } = self;
+        curve
     }
 
     /// Between these, nm, lies all of it.
@@ -157,7 +159,7 @@ impl Channels {
         self.responses.get(k).map_or_else(|| self.width(k), Response::fwhm)
     }
 
-    /// Wavelength sample of channel `k` (Eq. 4 of the method): Λ_k(μ) = (1-μ) λmin + μ λmax, in nm.
+    /// Wavelength sample of channel `k` (Eq. 4 of Hoarau et al. 2018): Λ_k(μ) = (1-μ) λmin + μ λmax, in nm.
     pub fn wavelength(&self, k: usize, mu: f64) -> f64 {
         let [min, max] = self.bounds[k];
         min + mu * (max - min)

@@ -383,7 +383,7 @@ mod tests {
         assert_eq!(Projection::new(&asked).rgb(&spectrum), [0.3, 0.1, 0.1]);
     }
 
-    /// VALIDATION section 1.8: D65 has x, y = 0.31271, 0.32902; it is the white of sRGB.
+    /// D65 has x, y = 0.31271, 0.32902; it is the white of sRGB.
     #[test]
     fn daylight_is_white() {
         let (nm, value) = columns::<2>(super::super::data::D65).map(|[nm, value]| (nm, value)).unzip();

@@ -204,7 +204,7 @@ mod tests {
         assert_eq!(zero.mean(100.0, 400.0), 0.0);
     }
 
-    /// VALIDATION section 1.6: 8-12 um at 300 K is 38.50042 W m-2 sr-1.
+    /// Planck's law integrated over 8-12 um at 300 K is 38.50042 W m-2 sr-1.
     #[test]
     fn blackbody_band() {
         let b = Curve::Blackbody { kelvin: 300.0, scale: 1.0 };

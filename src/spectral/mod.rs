@@ -1,11 +1,12 @@
 //! Spectra, channels, Planck's law and colour, in f64 nanometres.
 
-pub mod bent;
 pub mod channels;
 pub mod colour;
 pub mod curve;
 mod data;
 mod derived;
+pub mod hemisphere;
+pub mod kinks;
 pub mod planck;
 pub mod skylight;
 pub mod table;

@@ -23,7 +23,7 @@ pub fn radiance(nm: f64, kelvin: f64) -> f64 {
 mod tests {
     use super::radiance;
 
-    /// VALIDATION section 1.6.
+    /// Planck's law with the constants of the SI of 2019, to seven digits.
     #[test]
     fn planck_matches_published_values() {
         for (nm, kelvin, expected) in [

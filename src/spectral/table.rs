@@ -1,11 +1,11 @@
 //! Spectra as the device wants them: for every channel a few strata of the wavelength coordinate μ, in each of them a
 //! value and a slope; and exact knots for what no affordable number of strata resolves.
 
-use super::bent::BentLine;
+use super::kinks::BentLine;
 use super::warp::Warp;
 use super::{Channels, Curve};
 
-/// Pointwise bound relative to the channel's peak (DESIGN section 7).
+/// Pointwise bound relative to the channel's peak: what tables may be off, well below a render's noise.
 pub const POINTWISE_BOUND: f64 = 1e-4;
 /// What makes a curve a line, relative to the channel's peak: some roundings of f32.
 const LINE_BOUND: f64 = 1e-6;
@@ -156,7 +156,7 @@ impl SpectralTables {
 
     /// The curves in one stratum, bent where they have nodes: `None` where one of them would need more than `most` kinks in a channel,
     /// or strata.
-    pub fn bent(curves: &[&Curve], channels: &Channels, most: usize) -> Option<SpectralTables> {
+    pub fn with_kinks(curves: &[&Curve], channels: &Channels, most: usize) -> Option<SpectralTables> {
         let lines: Vec<Vec<(BentLine, f64)>> = curves
             .iter()
             .map(|curve| channels.bounds.iter().map(|&[a, b]| BentLine::of(curve, a, b, most)).collect())
@@ -429,7 +429,9 @@ mod tests {
 
     /// A jagged table of `n` nodes.
     fn jagged(n: usize, seed: u32) -> Curve {
-        let value = |i: usize| f64::from(crate::render::rng::hash(seed ^ i as u32)) / 4.3e9;
+        // Steele, Lea and Flood 2014, in 32 bits: any numbers without a pattern will do.
+        let mixed = |x: u32| (x ^ x >> 16).wrapping_mul(0x7feb_352d);
+        let value = |i: usize| f64::from(mixed(mixed(seed ^ (i as u32).wrapping_mul(0x9e37_79b9)))) / 4.3e9;
         let points: Vec<_> = (0..n).map(|i| (380.0 + 400.0 * i as f64 / (n - 1) as f64, value(i))).collect();
         table(&points, Outside::Zero)
     }

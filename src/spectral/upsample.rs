@@ -5,11 +5,10 @@
 //! The paper tabulates the coefficients; here they are solved for, one by one or a picture at a time.
 
 use std::collections::HashMap;
-use std::num::NonZeroUsize;
 use std::sync::LazyLock;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::{DMat3, DVec3};
+use rayon::prelude::*;
 
 use super::curve::{Curve, Outside};
 use super::data::{CIE1931, D65, columns};
@@ -80,7 +79,7 @@ impl Smooth {
         let t = (nm.clamp(first, last) - first) / (last - first);
         let [a, b, c] = self.0;
         let x = (a * t + b) * t + c;
-        // Without the cancellation of Eq. 4 where x is far below 0.
+        // `sigmoid` without its cancellation where x is far below 0.
         let root = (1.0 + x * x).sqrt();
         let tail = 0.5 / (root * (root + x.abs()));
         if x < 0.0 { tail } else { 1.0 - tail }
@@ -97,28 +96,16 @@ pub fn smooth_of(colours: &[[f32; 3]]) -> Vec<Smooth> {
     distinct.dedup_by_key(|rgb| rgb.map(f32::to_bits));
 
     const BLOCK: usize = 256;
-    let blocks: Vec<&[[f32; 3]]> = distinct.chunks(BLOCK).collect();
-    let next = AtomicUsize::new(0);
-    let work = || {
-        let mut done = Vec::new();
-        while let Some(block) = blocks.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let mut before = None;
-            for rgb in *block {
-                let smooth = near(rgb.map(f64::from), before);
-                before = Some(smooth).filter(|_| grey(rgb.map(f64::from)).is_none());
-                done.push((rgb.map(f32::to_bits), smooth));
-            }
-        }
-        done
+    let solve = |block: &[[f32; 3]]| {
+        let mut before = None;
+        let solved = block.iter().map(|rgb| {
+            let smooth = near(rgb.map(f64::from), before);
+            before = Some(smooth).filter(|_| grey(rgb.map(f64::from)).is_none());
+            (rgb.map(f32::to_bits), smooth)
+        });
+        solved.collect::<Vec<_>>()
     };
-    let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get).min(blocks.len());
-    let solved: HashMap<[u32; 3], Smooth> = std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..cores).map(|_| scope.spawn(work)).collect();
-        let join = |worker: std::thread::ScopedJoinHandle<_>| {
-            worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-        };
-        workers.into_iter().flat_map(join).collect()
-    });
+    let solved: HashMap<[u32; 3], Smooth> = distinct.par_chunks(BLOCK).with_max_len(1).flat_map_iter(solve).collect();
     colours.iter().map(|rgb| solved[&rgb.map(f32::to_bits)]).collect()
 }
 
@@ -184,7 +171,7 @@ fn basis(i: usize) -> DVec3 {
     DVec3::new(t * t, t, 1.0)
 }
 
-/// Eq. 4 of the paper.
+/// The smooth spectrum's value (Jakob and Hanika 2019), x the polynomial's.
 fn sigmoid(x: f64) -> f64 {
     0.5 + x / (2.0 * (1.0 + x * x).sqrt())
 }
@@ -354,7 +341,7 @@ mod tests {
         assert!(smooth_of(&[]).is_empty());
     }
 
-    /// DESIGN section 3: rgb emission [1, 1, 1] is D65 with Y = 1.
+    /// What a scene means by rgb emission [1, 1, 1]: D65 with Y = 1.
     #[test]
     fn white_emission_is_d65_of_unit_luminance() {
         let bars = || columns::<4>(CIE1931);

@@ -1,7 +1,7 @@
 //! Where in their channels paths have their wavelengths: Λ_k(μ), the wavelength of channel k at the path's coordinate μ.
 //!
-//! Eq. 4 of the method spreads wavelengths evenly over a channel. Where what emits is spiky within channels, most paths then
-//! miss the lines, and the few that meet one carry all of the channel's radiance. DESIGN section 6 draws them from the emitters' own
+//! Eq. 4 of Hoarau et al. 2018 spreads wavelengths evenly over a channel. Where what emits is spiky within channels, most paths then
+//! miss the lines, and the few that meet one carry all of the channel's radiance. Here they are drawn from the emitters' own
 //! spectral density instead: Λ_k is piecewise linear over M equal strata of μ with its knots at quantiles of that density,
 //! and what a path brings is weighted by dΛ_k/dμ over the channel's width. This is unbiased for any knots. So some are moved to the
 //! nodes of the scene's spectra, where they fit: every spectrum is then a line in each stratum, and small tables hold it exactly.
@@ -106,7 +106,7 @@ impl Part {
 }
 
 impl Warp {
-    /// Eq. 4: one stratum.
+    /// Evenly over each channel: one stratum.
     pub fn uniform(channels: &Channels) -> Warp {
         Warp { bits: 0, knots: channels.bounds.iter().flatten().copied().collect() }
     }
@@ -148,7 +148,7 @@ impl Warp {
         Warp { bits, knots: parts.iter().flat_map(|part| part.knots(1 << bits)).collect() }
     }
 
-    /// How many times as many paths wavelengths of Eq. 4 need to the same noise, at least: means over channels of what a path's
+    /// How many times as many paths even wavelengths need to the same noise, at least: means over channels of what a path's
     /// radiance squared is to the square of its mean, by the emission alone.
     pub fn gain(&self, channels: &Channels, emitters: &[(&Curve, f64)], responses: Option<&[Curve]>) -> f64 {
         let (mut even, mut own) = (0.0, 0.0);

@@ -4,11 +4,11 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DMat3, DVec3};
 
-use super::asked::{Aimed, Aiming, SAMPLES, bin, random};
 use super::chi_square::{check, p_value};
+use super::probe::{Aimed, Aiming, SAMPLES, bin, random};
 use super::{Bench, Case};
 use crate::Result;
-use crate::render::prepare::Prepared;
+use crate::device::prepared::Prepared;
 use crate::scene::{Environment, EnvironmentMap, Texels};
 
 pub const CASES: &[Case] = &[Case {

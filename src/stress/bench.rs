@@ -7,7 +7,7 @@ use std::time::Duration;
 use super::{Check, Outcome};
 use crate::Result;
 use crate::gpu::adapter::{Gpu, Selection};
-use crate::render::worker::Interrupt;
+use crate::render::interrupt::Interrupt;
 use crate::report::convergence::{Image, Limit, render};
 use crate::scene::{self, Scene};
 
@@ -15,7 +15,7 @@ use crate::scene::{self, Scene};
 const SIGMAS: f64 = 5.0;
 /// Roundings of f32: of a table, a weight and a mean.
 pub const F32: f64 = 1e-6;
-/// What tables of spectra are held to, pointwise (DESIGN section 7).
+/// What tables of spectra are held to, pointwise: `spectral::table::POINTWISE_BOUND`.
 pub const TABLES: f64 = 1e-4;
 
 /// A quad that fills the view of the camera that cases have by default.
@@ -131,7 +131,7 @@ impl Machine {
     pub fn several(&self, count: usize) -> Selection {
         match &self.devices {
             Selection::List(positions) => Selection::List(vec![positions[0]; count]),
-            Selection::All | Selection::Count(_) => Selection::Count(count),
+            Selection::All | Selection::Software | Selection::Count(_) => Selection::Count(count),
         }
     }
 }

@@ -132,7 +132,7 @@ fn pile(bench: &mut Bench) -> Result<()> {
         bench.check_within(format!("{what}: radiance"), 1.0, (mean, 0.0), 0.0);
         bench.check_within(format!("{what}: rays that did not end"), 0.0, (unended as f64, 0.0), 0.0);
     }
-    // Beyond what one invocation may loop (DESIGN section 7): no answer, and every one of 64 rays says that there is none.
+    // Beyond what one invocation may loop (32,768 times): no answer, and every one of 64 rays says that there is none.
     let (_, unended) = piled(bench, wall, 40_000, 1)?;
     bench.check_within("40,000 in one place: rays that say so", 64.0, (unended as f64, 0.0), 0.0);
     Ok(())
@@ -160,7 +160,7 @@ fn lights(bench: &mut Bench) -> Result<()> {
             -half, -half
         );
         let seen = bench.render(&text, 4096)?;
-        // Four corners of a rectangle a x a above a patch (VALIDATION 1.7).
+        // Four corners of a rectangle a x a above a patch (docs/METHOD.md, Closed forms).
         let root = (1.0 + half * half).sqrt();
         let corner = (2.0 * half / root * (half / root).atan()) / (2.0 * PI);
         bench.check(format!("{:e} m²", side * side), 0.5 * radiance * 4.0 * corner, seen.of(0), TABLES);

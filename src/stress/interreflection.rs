@@ -49,7 +49,7 @@ fn mirrors(bench: &mut Bench) -> Result<()> {
              [[objects]]\nquad = {{ corner = [-1, -1, 2], edge_u = [0, 2, 0], edge_v = [2, 0, 0] }}\nmaterial = \"metal\"\n"
         );
         let seen = bench.render(&text, 64)?;
-        // VALIDATION 1.4.
+        // ((n - 1)² + k²) / ((n + 1)² + k²), a metal at normal incidence.
         let reflected: f64 = (0.64 + 11.56) / (1.44 + 11.56);
         let expected = (1.0 - reflected.powi(bounces + 1)) * planck::radiance(4000.05, 1000.0);
         bench.check(format!("{bounces} bounces"), expected, seen.of(0), TABLES);

@@ -2,14 +2,13 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 
 use super::bench::{F32, TABLES};
 use super::{Bench, Case};
 use crate::cube::{Cube, Existing};
+use crate::render::interrupt::Interrupt;
 use crate::render::job::{Job, StopRule};
 use crate::render::schedule::{self, Event};
-use crate::render::worker::Interrupt;
 use crate::{Error, Result};
 
 const GROUP: &str = "invariance";
@@ -59,7 +58,7 @@ fn machinery(bench: &mut Bench) -> Result<()> {
     let job = |name: &str| Job {
         scene: scene.clone(),
         output: folder.path().join(name),
-        existing: Existing::Join,
+        existing: Existing::Resume,
         tiles: None,
         seed: 7,
         tile: Some(8),
@@ -109,7 +108,7 @@ fn machinery(bench: &mut Bench) -> Result<()> {
     let interrupt = Arc::new(Interrupt::default());
     let mut stop = |event: Event| {
         if matches!(event, Event::Epoch(status) if status.samples >= SAMPLES / 4) {
-            interrupt.end.store(2, Ordering::SeqCst);
+            interrupt.stop(2);
         }
         Ok(())
     };

@@ -1,14 +1,14 @@
-//! The stress suite (VALIDATION section 3): stiff and extreme cases, each with an answer from elsewhere, an error and a bound.
+//! The stress suite: stiff and extreme cases, each with an answer from elsewhere, an error and a bound.
 //!
 //! Cases are scenes as users write them, rendered by the renderer that they use; answers are closed forms, worked out beside each.
 
 mod aiming;
-pub mod asked;
 mod bench;
 mod chi_square;
 mod geometry;
 mod interreflection;
 mod invariance;
+pub mod probe;
 mod range;
 mod sampling;
 mod scattering;
@@ -20,8 +20,8 @@ use serde_json::{Value, json};
 pub use bench::{Bench, Machine};
 
 use crate::Result;
-use crate::report::Circumstances;
 use crate::report::page::Page;
+use crate::report::{Circumstances, STRESS_CSV_HEADER};
 
 /// One row of the suite.
 #[derive(Clone, Copy)]
@@ -101,7 +101,7 @@ fn verdict(passes: bool) -> &'static str {
     if passes { "pass" } else { "fail" }
 }
 
-/// All cases, in the order of VALIDATION section 3.
+/// All cases, group by group, in the order in which they run and are listed.
 pub fn cases() -> Vec<Case> {
     let groups = [spectra::CASES, range::CASES, interreflection::CASES, surfaces::CASES, geometry::CASES];
     [&groups[..], &[scattering::CASES, aiming::CASES, sampling::CASES, invariance::CASES]].concat().concat()
@@ -137,7 +137,7 @@ pub fn facts(case: &Case, outcome: &Outcome) -> Value {
 
 /// The report as CSV: one row a check.
 pub fn csv(outcomes: &[(Case, Outcome)]) -> String {
-    let mut text = String::from("group,case,check,expected,got,error,bound,standard_error,verdict\n");
+    let mut text = format!("{STRESS_CSV_HEADER}\n");
     for (case, outcome) in outcomes {
         for c in &outcome.checks {
             text += &format!(

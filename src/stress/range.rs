@@ -4,7 +4,7 @@ use super::bench::{F32, TABLES, WALL, lamp};
 use super::{Bench, Case};
 use crate::Result;
 use crate::cube::{epoch_samples, merge_means};
-use crate::render::rng::hash;
+use crate::device::rng::hash;
 use crate::spectral::planck;
 
 pub const CASES: &[Case] = &[
@@ -160,7 +160,7 @@ fn plume_and_mirror(bench: &mut Bench) -> Result<()> {
          [[objects]]\ncube = {{ min = [-0.5, -0.5, 0.1], max = [0.5, 0.5, 0.2] }}\ninterior = \"gas\"\n"
     );
     let seen = bench.render(&text, 256)?;
-    // VALIDATION 1.4.
+    // ((n - 1)² + k²) / ((n + 1)² + k²), a metal at normal incidence.
     let (reflected, through) = ((0.64 + 11.56) / (1.44 + 11.56), (-1e-6f64).exp());
     let expected = (1.0 - through) * (1.0 + reflected * through) * planck::radiance(4000.05, 1000.0);
     bench.check("at normal incidence", expected, seen.of(0), TABLES);

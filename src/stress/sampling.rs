@@ -65,7 +65,8 @@ fn reciprocity(bench: &mut Bench) -> Result<()> {
     Ok(())
 }
 
-/// 64 x 64 pixels that all see the same point of a patch below a square lamp, and its radiance (VALIDATION 1.7).
+/// 64 x 64 pixels that all see the same point of a patch below a square lamp, and its radiance
+/// (docs/METHOD.md, Closed forms).
 fn patch(sampler: &str) -> (String, f64) {
     let text = format!(
         "[camera.orthographic]\nposition = [0, 0.5, 0.5]\nlook_at = [0, 0, 0]\nup = [0, 0, -1]\nwidth = 1e-6\n\

@@ -4,11 +4,11 @@ use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;
 
-use super::asked::{Chosen, SAMPLES, Scattering, bin, random};
 use super::chi_square::{check, p_value};
+use super::probe::{Chosen, SAMPLES, Scattering, bin, random};
 use super::{Bench, Case};
 use crate::Result;
-use crate::render::prepare::Prepared;
+use crate::device::prepared::Prepared;
 use crate::scene::{Bsdf, Scene, Texture, TextureKind, Weight};
 
 pub const CASES: &[Case] = &[Case {

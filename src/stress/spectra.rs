@@ -3,7 +3,7 @@
 use super::bench::{F32, TABLES, WALL, lamp};
 use super::{Bench, Case};
 use crate::Result;
-use crate::render::rng::hash;
+use crate::device::rng::hash;
 use crate::spectral::planck;
 
 const GROUP: &str = "spectra";

@@ -1,12 +1,12 @@
 //! The device's traversal and triangle test against a loop over all triangles in f64.
 
 use glam::DVec3;
-use spectile::gpu::layout::Primitive;
-use spectile::render::prepare::Prepared;
+use spectile::device::prepared::Prepared;
+use spectile::device::words::Primitive;
 use spectile::scene::Mesh;
 
+use super::{Random, black_mesh, f32s};
 use crate::tracer::{Ray, trace};
-use crate::{Random, black_mesh, f32s};
 
 /// Distance along the ray to a triangle in f64, with barycentric weights allowed to miss by `slack`.
 fn distance_f64(p: &Primitive, ray: &Ray, slack: impl Fn(f64, f64) -> f64) -> Option<f64> {

@@ -3,13 +3,13 @@
 use std::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3, Vec3};
-use spectile::render::prepare::Prepared;
+use spectile::device::prepared::Prepared;
 use spectile::scene::{Filter, Mesh, Projection, Shape, Sides};
 
+use super::{Random, black_mesh, f32s, mesh_of};
 use crate::device::{self, Epochs, Settings};
 use crate::scene_builder::*;
 use crate::tracer::{Ray, trace};
-use crate::{Random, black_mesh, f32s, mesh_of};
 
 /// Meridians close together, so that triangles are slivers and hundreds of them meet in each pole.
 fn uv_sphere(meridians: u32, parallels: u32) -> Mesh {

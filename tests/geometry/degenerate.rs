@@ -3,9 +3,9 @@
 use glam::{DVec2, DVec3};
 use spectile::scene::{Filter, Mesh, Projection, Scene, Shape, Sides};
 
+use super::{Random, mesh_of};
 use crate::device::{self, Settings};
 use crate::scene_builder::*;
-use crate::{Random, mesh_of};
 
 /// A white floor under a sky with `extra` above it, in the plane z = 0.5, of black triangles; seen from above.
 fn with_triangles(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Scene {

@@ -3,7 +3,7 @@
 use glam::{DQuat, DVec2, DVec3};
 use spectile::scene::{Filter, Projection, Scene, Shape, Sides};
 
-use crate::Random;
+use super::Random;
 use crate::device::{self, Settings};
 use crate::scene_builder::*;
 

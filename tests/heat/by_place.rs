@@ -2,16 +2,16 @@
 //! metals. Closed forms through the reference and through devices, and one against the other.
 
 use glam::{DMat3, DVec2, DVec3};
-use spectile::reference;
-use spectile::render::prepare::Prepared;
+use spectile::device::prepared::Prepared;
 use spectile::scene::{Attributes, Camera, Filter, Projection, Scene, Shape, Sides, TextureKind};
 use spectile::spectral::{Channels, Curve, Outside, planck as law};
 
+use super::reference::{BOUNCES, shown};
 use crate::device::{Settings, assert_as_reference, measure, render};
-use crate::reference::{BOUNCES, shown};
 use crate::scene_builder::heat::*;
 use crate::scene_builder::*;
 use crate::statistics::*;
+use crate::truth;
 
 /// Corners of the two triangles of a quad.
 fn quad_uv() -> Attributes {
@@ -60,7 +60,7 @@ fn a_texture_of_one_temperature_is_plancks_law() {
             let scene = scene.attributes(upright()).build();
             let rendered = render(&scene, 1, 64, Settings::default());
             rendered.assert_clean();
-            let exact = reference::render_image(&scene, 4, 1).mean;
+            let exact = truth::render_image(&scene, 4, 1).mean;
             for (i, value) in rendered.means[0].iter().enumerate() {
                 let [from, to] = bounds[i % 4];
                 let want = law::radiance(0.5 * (from + to), f64::from(kelvin));
@@ -99,7 +99,7 @@ fn a_checker_of_two_temperatures() {
     let ours = render(&scene, 8, 256, Settings { seed: 3, ..Settings::default() });
     ours.assert_clean();
     assert_estimates("seen", &ours.image_means(), &expected, Bound { resolution: 4e-3, allowance: 1e-5 });
-    let theirs = reference::render_image(&scene, 20_000, 3);
+    let theirs = truth::render_image(&scene, 20_000, 3);
     for (k, want) in expected.iter().enumerate() {
         let all = |values: &[f64]| values.iter().skip(k).step_by(4).copied().collect::<Vec<f64>>();
         let (means, errors) = (all(&theirs.mean), all(&theirs.standard_error));
@@ -247,6 +247,5 @@ fn textured_heat_agrees_with_the_reference() {
 fn other_heat_pays_nothing() {
     let scene = Builder::new().plastic(unit_square(), 0.5, 1.5, 0.1).at_kelvin(300.0).build();
     let prepared = Prepared::new(&scene, 0).unwrap_or_else(|e| panic!("{e}"));
-    let general = prepared.features.general.expect("plastic is general");
-    assert!(prepared.radiators.is_none() && general.radiators.is_none() && general.wavelength.is_none());
+    assert!(prepared.is_general() && prepared.radiators.is_none() && prepared.wavelength.is_none());
 }

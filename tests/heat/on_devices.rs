@@ -1,13 +1,13 @@
-//! Heat on devices: closed forms, and against the f64 path tracer (VALIDATION 1.1, 1.2, 1.6).
+//! Heat on devices: closed forms, and against the f64 path tracer (docs/METHOD.md, Closed forms).
 
 use glam::{DVec2, DVec3};
-use spectile::gpu::layout::{Emitter, Material};
-use spectile::render::prepare::Prepared;
+use spectile::device::prepared::Prepared;
+use spectile::device::words::{Emitter, Material};
 use spectile::scene::{Attributes, Filter, Projection, Scene, Sides, Temperature};
 use spectile::spectral::{Channels, Curve, Outside, planck as law};
 
+use super::reference::BOUNCES;
 use crate::device::{Settings, assert_as_reference, measure, render};
-use crate::reference::BOUNCES;
 use crate::scene_builder::closed_forms::{self, Case};
 use crate::scene_builder::heat::*;
 use crate::scene_builder::*;

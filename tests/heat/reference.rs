@@ -1,7 +1,6 @@
-//! The f64 path tracer on hot surfaces and in gases (VALIDATION 1.1-1.3).
+//! The f64 path tracer on hot surfaces and in gases (docs/METHOD.md, Closed forms).
 
 use glam::{DVec2, DVec3};
-use spectile::reference::{render, render_image};
 use spectile::scene::{Field, Filter, Light, Projection, Scene, Shape, Sides};
 use spectile::spectral::{Channels, Curve, planck as law};
 
@@ -10,6 +9,7 @@ use crate::scene_builder::heat::*;
 use crate::scene_builder::surfaces::{glass_curve, white_metal};
 use crate::scene_builder::*;
 use crate::statistics::{Bound, Estimate, assert_estimates};
+use crate::truth::{render, render_image};
 
 fn estimates(e: &spectile::reference::Estimate) -> Vec<Estimate> {
     let freedom = f64::from(e.samples - 1);

@@ -18,7 +18,7 @@ export async function open(url, { width = 1400, height = 860, dark = false } = {
       "--disable-component-update", "--disable-sync"],
   });
   const page = context.pages()[0] ?? (await context.newPage());
-  page.setDefaultTimeout(60_000);
+  page.setDefaultTimeout(120_000);
   // Errors of scripts and warnings of the browser, and whatever is asked of anybody else.
   const complaints = [], elsewhere = [];
   const own = new URL(url).host;

@@ -9,16 +9,21 @@ const browser = await open(url);
 const { page } = browser;
 const seen = { complaints: browser.complaints, elsewhere: browser.elsewhere };
 
+// Tenths of a second after which nothing comes any more, on however busy a machine.
+const PATIENCE = 1200;
+
 const shot = async (name) => shots && (await page.screenshot({ path: `${shots}/${name}.png` }));
 const stage = () => page.locator("#stage").getAttribute("data-stage");
 const becomes = (wanted) => page.waitForFunction((wanted) => document.getElementById("stage").dataset.stage === wanted, wanted);
 const change = async (act) => {
   const before = await browser.look();
   await act();
-  await page.waitForTimeout(100);
-  await browser.settled();
-  await page.waitForTimeout(100);
-  const after = await browser.look();
+  let after = before;
+  for (let i = 0; i < PATIENCE && after.hash === before.hash; i++) {
+    await page.waitForTimeout(100);
+    await browser.settled();
+    after = await browser.look();
+  }
   return { changed: before.hash !== after.hash, before: before.mean, after: after.mean };
 };
 const download = async (act) => {
@@ -44,7 +49,7 @@ seen.first_picture_ms = Date.now() - browser.began;
 await browser.settled();
 seen.start = await browser.look();
 // On a busy machine a render's first tile may come after the empty picture has been drawn.
-for (let i = 0; i < 200 && seen.start.colours <= 20; i++) {
+for (let i = 0; i < PATIENCE && seen.start.colours <= 20; i++) {
   await page.waitForTimeout(100);
   seen.start = await browser.look();
 }
@@ -54,7 +59,7 @@ if (what === "view") seen.against_png = await against_png();
 if (what === "render") {
   // It fills in by itself.
   const first = seen.start.hash;
-  for (let i = 0; i < 100 && !seen.updates; i++) {
+  for (let i = 0; i < PATIENCE && !seen.updates; i++) {
     await page.waitForTimeout(100);
     seen.updates = (await browser.look()).hash !== first;
   }
@@ -64,20 +69,25 @@ if (what === "render") {
   await page.locator("#pause").click();
   await becomes("paused");
   // What is under way when the pause begins still comes.
-  await page.waitForTimeout(1500);
   const paths = () => page.evaluate(() => window.spectile.page.state.paths);
-  const rests = await paths();
-  await page.waitForTimeout(1000);
-  seen.rests = rests === (await paths());
+  const atRest = async () => {
+    let before = -1, now = await paths();
+    for (let i = 0; i < PATIENCE / 10 && before !== now; i++) {
+      await page.waitForTimeout(1000);
+      [before, now] = [now, await paths()];
+    }
+    seen.rests = before === now;
+    return now;
+  };
+  const rests = await atRest();
   await page.locator("#picture").focus();
   await page.keyboard.press(" ");
   await becomes("rendering");
   await page.waitForFunction((rests) => window.spectile.page.state.paths > rests, rests);
   await page.keyboard.press(" ");
   await becomes("paused");
-  await page.waitForTimeout(1500);
+  await atRest();
   await page.locator("#save").click();
-  await page.waitForTimeout(1000);
 }
 
 if (what === "heat") {

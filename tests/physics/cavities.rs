@@ -1,16 +1,16 @@
-//! Furnaces, cavities, grey plates (VALIDATION 1.1, 1.2).
+//! Furnaces, cavities, grey plates (docs/METHOD.md, Closed forms).
 
 use glam::{DVec2, DVec3};
 use spectile::scene::{Filter, Projection, Shape, Sides};
 use spectile::spectral::Channels;
 
+use super::{assert_exact, measure, table};
 use crate::device::{Settings, render};
 use crate::scene_builder::closed_forms::{self, Case};
 use crate::scene_builder::*;
 use crate::statistics::*;
-use crate::{assert_exact, measure, table};
 
-/// Radiance after `vertices` surface vertices in a closed cavity (VALIDATION 1.1).
+/// Radiance after `vertices` surface vertices in a closed cavity.
 fn cavity(emission: f64, reflectance: f64, vertices: i32) -> f64 {
     emission * (1.0 - reflectance.powi(vertices)) / (1.0 - reflectance)
 }

@@ -1,12 +1,12 @@
-//! Irradiance and form factors (VALIDATION 1.7): a white Lambert surface shows E/π.
+//! Irradiance and form factors (docs/METHOD.md, Closed forms): a white Lambert surface shows E/π.
 
 use std::f64::consts::PI;
 
 use glam::DVec3;
 use spectile::scene::{Film, Filter, Scene, Sides};
 
+use super::measure;
 use crate::device::{Settings, render};
-use crate::measure;
 use crate::scene_builder::closed_forms::{self, Case, form_factors, patch, patch_under_squares};
 use crate::scene_builder::*;
 use crate::statistics::*;

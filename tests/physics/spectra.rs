@@ -1,12 +1,12 @@
-//! Black bodies and products of spectra over channels (VALIDATION 1.6, Eq. 4 of the method).
+//! Black bodies and products of spectra over channels, at the wavelengths of Eq. 4 of Hoarau et al. 2018.
 
 use glam::DVec3;
 use spectile::scene::{Sampler, Sides};
 use spectile::spectral::{Channels, Curve};
 
+use super::{measure, table};
 use crate::scene_builder::*;
 use crate::statistics::*;
-use crate::{measure, table};
 
 /// Mean radiance of a black body over overlapping bands, width x mean = the published band radiances.
 #[test]

@@ -2,18 +2,16 @@
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{SocketAddr, TcpStream};
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::path::Path;
+use std::process::{Child, Stdio};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
 
 use serde_json::Value;
 use spectile::cube::Cube;
 use spectile::preview::web::{About, Server};
 use spectile::preview::{Feed, follow};
 
-/// Long enough for anything here on a busy machine.
-pub const PATIENCE: Duration = Duration::from_secs(120);
+use crate::binary::{PATIENCE, command, wait_for};
 
 /// An answer: status, headers in lower case, body.
 #[derive(Debug)]
@@ -165,15 +163,7 @@ impl Running {
 
     /// Waits until the status is `such`.
     pub fn until(&self, such: impl Fn(&Value) -> bool) -> Value {
-        let began = Instant::now();
-        loop {
-            let status = self.status();
-            if such(&status) {
-                return status;
-            }
-            assert!(began.elapsed() < PATIENCE, "{status}");
-            std::thread::sleep(Duration::from_millis(20));
-        }
+        wait_for("another status", || Some(self.status()).filter(&such))
     }
 
     pub fn control(&self, what: &str) -> u16 {
@@ -193,15 +183,4 @@ impl Drop for Running {
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
-}
-
-pub fn command(folder: &Path, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_spectile"));
-    // The Vulkan loader wants one, and would say so on stderr.
-    command.env("XDG_RUNTIME_DIR", folder).current_dir(folder).args(arguments);
-    command
-}
-
-pub fn cornell() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell/cornell.toml")
 }

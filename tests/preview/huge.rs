@@ -4,13 +4,13 @@ use std::fs::{self, File};
 use std::io::Write;
 use std::path::Path;
 use std::process::Stdio;
-use std::time::{Duration, Instant};
 
 use spectile::cube::{Cube, Existing, Writer};
 use tempfile::tempdir;
 
-use crate::client::{Running, command, get};
-use crate::common::{create, header};
+use super::client::{Running, get};
+use crate::binary::command;
+use crate::cubes::{create, header};
 
 const CHANNELS: usize = 2000;
 const TILE: u64 = 64;
@@ -53,7 +53,6 @@ fn a_hundred_gibibytes_open_and_a_spectrum_is_one_read() {
         File::create(samples).and_then(|mut file| file.write_all(&64u32.to_le_bytes())).expect("written");
     }
     let running = Running::start(folder.path(), &["view", "huge.zarr", "--listen", "127.0.0.1:0", "--json"]);
-    let began = Instant::now();
     let status = running.until(|status| status["samples"] == 64);
     assert_eq!(status["tiles_started"], 53 * 64);
     let process = running.child.id();
@@ -69,7 +68,6 @@ fn a_hundred_gibibytes_open_and_a_spectrum_is_one_read() {
     let (answer, read, mapped) = cost("/api/image?show=channel&k=1000&scale=16&format=f32");
     assert_eq!(answer.floats().len(), (53 * 4) * (64 * 4));
     assert!(read <= 53 * 64 * 256 + slack && mapped <= pages, "{read} {mapped}");
-    assert!(began.elapsed() < Duration::from_secs(60), "{:?}", began.elapsed());
     // Zoomed out, nothing but `overview` is needed for any picture, nor read: of it the channels that are shown, which for
     // true colour are those of up to 830 nm.
     let seen = (0..CHANNELS).filter(|&k| cube.channels().bounds[k][0] < 830.0).count() as u64;
@@ -83,7 +81,6 @@ fn a_hundred_gibibytes_open_and_a_spectrum_is_one_read() {
         ("show=false&r=0&g=1000&b=1999&scale=16", 3, 3),
         ("show=channel&k=7&scale=16", 1, 1),
     ] {
-        let began = Instant::now();
         let (answer, read, mapped) = cost(&format!("/api/image?{target}&format=f32"));
         let values = answer.floats();
         let scale: usize = target.rsplit('=').next().expect("a scale").parse().expect("a number");
@@ -91,7 +88,7 @@ fn a_hundred_gibibytes_open_and_a_spectrum_is_one_read() {
         assert!(values.iter().all(|&v| v == 0.0), "{target}");
         let overview = 53 * 64 * (pixels / 64) * channels * 4;
         assert!(read <= overview + slack && mapped <= pages, "{target}: {read} {overview} {mapped}");
-        println!("{target}: {} MiB read in {:?}", read >> 20, began.elapsed());
+        println!("{target}: {} MiB read", read >> 20);
     }
     for array in ["radiance", "preview"] {
         fs::rename(away(array), cube.path().join(array)).expect("moved");
@@ -105,9 +102,8 @@ fn a_hundred_gibibytes_open_and_a_spectrum_is_one_read() {
     assert_eq!(answer.floats().len(), 100 * 50 * 3);
     assert!(read <= 3 * 2 * pixels * 12 + slack && mapped <= pages, "{read} {mapped}");
     // More radiance than a look may take is refused with a way out, not begun.
-    let all = crate::client::ask(running.address, "GET", "/api/image?show=channel&k=0&scale=4&x1=2048&y1=2048", &[]);
+    let all = super::client::ask(running.address, "GET", "/api/image?show=channel&k=0&scale=4&x1=2048&y1=2048", &[]);
     assert!(all.status == 400 && all.text().contains("scale"), "{all:?}");
-    println!("opened and looked at in {:?}", began.elapsed());
 }
 
 /// What `view` refuses, in one sentence and with the right exit code.
@@ -127,7 +123,7 @@ fn what_cannot_be_viewed_is_refused() {
     let taken = std::net::TcpListener::bind("127.0.0.1:0").expect("binds");
     let address = taken.local_addr().expect("an address").to_string();
     refused(&["view", "cube.zarr", "--listen", &address], 2, "another process listens there already");
-    let scene = crate::client::cornell();
+    let scene = crate::binary::cornell();
     let render = |more: &[&str], words: &str| {
         let scene = scene.to_str().expect("UTF-8");
         refused(&[&["render", scene, "-o", "new.zarr"], more].concat(), 2, words);

@@ -6,8 +6,9 @@ use spectile::cube::{Cube, Header};
 use spectile::spectral::{Channels, planck};
 use tempfile::tempdir;
 
-use crate::client::{Events, ask, command, get, serve};
-use crate::common::{create, header, pattern, patterned, unit};
+use super::client::{Events, ask, get, serve};
+use crate::binary::command;
+use crate::cubes::{create, header, pattern, patterned, unit};
 
 const SIZE: [u32; 2] = [100, 70];
 

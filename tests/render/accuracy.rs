@@ -4,7 +4,7 @@ use spectile::cube::Cube;
 
 use super::{Place, samples, spectrum};
 
-/// sqrt(Σ (x - ref)² / Σ ref²) per channel over all pixels, DESIGN section 8.
+/// sqrt(Σ (x - ref)² / Σ ref²) per channel over all pixels: what the error estimate estimates.
 fn true_errors(cube: &Cube, truth: &Cube) -> Vec<f64> {
     let [width, height] = cube.header().size;
     let mut sums = vec![(0.0, 0.0); cube.channels().len()];

@@ -1,7 +1,5 @@
 //! What a render leaves on disk, and that nothing but scene, settings and seed decides it.
 
-use std::time::Instant;
-
 use serde_json::{Value, json};
 
 use super::{Place, arrays, png, samples, spectrum};
@@ -103,12 +101,7 @@ fn samples_end_with_an_epoch_which_is_said() {
 #[test]
 fn time_ends_a_render_with_an_epoch() {
     let place = Place::new();
-    let began = Instant::now();
-    let events = place.events(&["render", "scene.toml", "-o", "cube.zarr", "--time", "2s", "--tile", "8"]);
-    let wall = began.elapsed().as_secs_f64();
-    // An epoch takes milliseconds here: hardly any of the two seconds is left over, nor are they exceeded.
-    assert!((1.0..4.0).contains(&wall), "{wall} s");
-    let done = events.last().expect("done");
+    let done = place.until_a_full_epoch(&["--tile", "8"]);
     let n = samples(&place.cube("cube.zarr"));
     assert!(n >= 64 && n.is_multiple_of(64), "{n}");
     assert_eq!((&done["event"], &done["samples"], &done["units"]), (&json!("done"), &json!(n), &json!(9)));

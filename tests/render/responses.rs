@@ -1,10 +1,9 @@
 //! Sensors while rendering (`channels.responses`) against sensors after the fact, and colours against colour-science.
 
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::Command;
 
 use super::{Place, SCENE, spectrum};
+use crate::outside::{python, shared};
 
 /// A band with a tail, one that overlaps it, and one far away.
 const RESPONSES: &str = "wavelength_nm,red,green,infrared\n480,0,0,\n500,0,0.6,\n540,0.1,1,\n580,0.5,0.8,\n620,1,0.1,\n\
@@ -110,15 +109,6 @@ fn sensors_of_the_data_pack_are_cheap() {
     }
 }
 
-/// The data that comes with the project, if it is there.
-fn shared(name: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data").join(name);
-    if !path.exists() {
-        eprintln!("skipped: there is no {}", path.display());
-    }
-    path.exists().then_some(path)
-}
-
 /// The 24 patches of a ColorChecker under daylight from everywhere, in one row of pixels, against X, Y, Z that
 /// colour-science integrates from the same tables: delta E 2000 below 0.1.
 #[test]
@@ -151,15 +141,8 @@ fn a_colour_checker_has_the_colours_of_colour_science() {
     for observer in ["1931", "1964"] {
         let file = format!("xyz{observer}.csv");
         place.success(&["export", "cube.zarr", "-o", &file, "--xyz", observer]);
-        let Some(python) = std::env::var_os("SPECTILE_PYTHON").filter(|python| !python.is_empty()) else {
-            assert!(std::env::var("CI").as_deref() != Ok("true"), "CI must set SPECTILE_PYTHON");
-            eprintln!("skipped: SPECTILE_PYTHON names no Python with tests/python/requirements.txt");
-            return;
-        };
-        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python/colour_checker.py");
-        let mut command = Command::new(python);
-        let output =
-            command.arg(script).args([&patches, &daylight]).arg(place.path().join(file)).arg(observer).output();
+        let Some(mut command) = python("colour_checker.py") else { return };
+        let output = command.args([&patches, &daylight]).arg(place.path().join(file)).arg(observer).output();
         let output = output.expect("Python runs");
         assert!(output.status.success(), "{}", super::text(&output.stderr));
         let worst: f64 = super::text(&output.stdout).trim().parse().expect("a number");

@@ -43,8 +43,8 @@ fn every_device_says_what_it_did() {
 #[test]
 fn a_time_limit_ends_all_devices_at_the_same_epoch() {
     let place = Place::new();
-    let cube = place.render("cube.zarr", &["--devices", "2", "--tile", "8", "--time", "1s"]);
-    assert!(samples(&cube) >= 64);
+    place.until_a_full_epoch(&["--devices", "2", "--tile", "8"]);
+    assert!(samples(&place.cube("cube.zarr")) >= 64);
 }
 
 #[test]

@@ -4,6 +4,7 @@ use std::fs;
 use std::process::Stdio;
 
 use super::{ENDLESS, Place, arrays, events, samples, text, wait_for};
+use crate::report::excuse;
 
 /// A run that must fail with `code`, say exactly one line that has all of `expected`, and leave no new file.
 #[track_caller]
@@ -137,7 +138,7 @@ fn no_device() {
         let output = command.output().expect("runs");
         let stderr = text(&output.stderr);
         if output.status.success() {
-            println!("skipped: this machine has devices that are no Vulkan drivers");
+            excuse("this machine has devices that are no Vulkan drivers");
             return;
         }
         assert_eq!(output.status.code(), Some(3), "{stderr}");
@@ -169,7 +170,7 @@ impl Disk {
         if mount.is_ok_and(|output| output.status.success()) {
             return Some(Disk(path));
         }
-        println!("skipped: mounting a small disk needs root, and the permission of the container");
+        excuse("mounting a small disk needs root, and the permission of the container");
         None
     }
 }

@@ -410,7 +410,7 @@ fn wrong_maps() {
     }
 }
 
-/// DESIGN section 3: shortest turn from +y to `up`, then counter-clockwise seen from above.
+/// How a map is turned: shortest turn from +y to `up`, then counter-clockwise seen from above.
 #[test]
 fn maps_are_turned() {
     let folder = Folder::new(&[("a.exr", exr_rgb(&[1.0; 6]))]);

@@ -4,7 +4,7 @@ use std::fs;
 use std::thread;
 use std::time::Duration;
 
-use super::slurm_cluster::signal;
+use super::cluster::signal;
 use super::{Place, wait_for};
 
 /// Samples that make the render last some ten seconds.

@@ -6,6 +6,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use super::{Place, SUBMIT, exists, folder_with_scene, text, turn};
+use crate::report::{excuse, excuse_a_part};
 
 /// A submission that must fail with `code`, say exactly one line that has all of `expected`, and leave no cube.
 #[track_caller]
@@ -54,7 +55,7 @@ fn can_mount() -> bool {
     let tried = Command::new("unshare").args(["--mount", "mount", "-t", "tmpfs", "none", "/mnt"]).output();
     let can = tried.is_ok_and(|output| output.status.success());
     if !can {
-        println!("skipped in part: mounts of one's own need root, and the permission of the container");
+        excuse_a_part("mounts of one's own need root, and the permission of the container");
     }
     can
 }
@@ -184,7 +185,7 @@ fn gpus_that_are_not_there() {
     let Some(place) = Place::with_gpus(1, 2, 2) else { return };
     let devices = Command::new(env!("CARGO_BIN_EXE_spectile")).args(["devices", "--json"]).output().expect("runs");
     if text(&devices.stdout).contains("\"is_software\":false") {
-        println!("skipped: this machine has GPUs");
+        excuse("this machine has GPUs");
         return;
     }
     place.success(&["submit", "scene.toml", "-o", "cube.zarr", "--tile", "8", "--spp", "1", "--tasks", "2"]);

@@ -1,6 +1,6 @@
 //! The model of docs/SCALE.md against runs on 1, 2 and 4 nodes of this machine. Prints the table that stands there:
 //!
-//!     cargo test --release --test slurm scale -- --ignored --nocapture
+//!     cargo test --release --test all slurm::scale -- --ignored --nocapture
 
 use std::process::Command;
 use std::time::Instant;
@@ -82,7 +82,5 @@ fn scale() {
             measured / predicted,
             1e3 * verify_s / 64.0
         );
-        // Not a benchmark but a sanity check: Slurm itself must not take as long as the work.
-        assert!(measured < 3.0 * predicted, "{measured} s, {predicted} s predicted");
     }
 }

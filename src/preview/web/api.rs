@@ -20,6 +20,7 @@ use super::guard::Peer;
 use super::{App, events, image, page};
 use crate::cube::{Look, Rect};
 use crate::format::text;
+use crate::preview::Control;
 use crate::spectral::colour::{ProjectionKind, three_of};
 use crate::spectral::temperature::is_thermal;
 use crate::{Error, Result};
@@ -292,19 +293,19 @@ impl<T: serde::Serialize + std::fmt::Debug> Spectrum<T> {
 }
 
 async fn pause(state: State<Arc<App>>) -> std::result::Result<Response, Refused> {
-    control(&state, |app| app.feed.pause(true))
+    control(&state, |app| app.feed.control(Control::Rest(true)))
 }
 
 async fn resume(state: State<Arc<App>>) -> std::result::Result<Response, Refused> {
-    control(&state, |app| app.feed.pause(false))
+    control(&state, |app| app.feed.control(Control::Rest(false)))
 }
 
 async fn stop(state: State<Arc<App>>) -> std::result::Result<Response, Refused> {
-    control(&state, |app| app.feed.stop())
+    control(&state, |app| app.feed.control(Control::Stop))
 }
 
 async fn save(state: State<Arc<App>>) -> std::result::Result<Response, Refused> {
-    control(&state, |app| app.feed.save())
+    control(&state, |app| app.feed.control(Control::Save))
 }
 
 fn control(app: &App, act: impl FnOnce(&App)) -> std::result::Result<Response, Refused> {

@@ -34,6 +34,9 @@ pub struct Guard {
     /// Whether only this machine can connect.
     loopback: bool,
     host_name: Option<String>,
+    /// Names by which a proxy is reached that passes requests on, in lower case. Whoever comes through it is not of this
+    /// machine, though his connection is.
+    public: Vec<String>,
     buckets: Mutex<HashMap<IpAddr, Bucket>>,
 }
 
@@ -44,7 +47,7 @@ struct Bucket {
 }
 
 impl Guard {
-    pub fn new(address: SocketAddr) -> Result<Guard> {
+    pub fn new(address: SocketAddr, public: &[String]) -> Result<Guard> {
         let mut secret = [0u8; 16];
         getrandom::fill(&mut secret).map_err(|error| Error::Internal(format!("no random token: {error}")))?;
         Ok(Guard {
@@ -52,6 +55,7 @@ impl Guard {
             // Cookies do not know ports.
             cookie: format!("spectile_{}", address.port()),
             loopback: address.ip().is_loopback(),
+            public: public.iter().map(|name| name.to_lowercase()).collect(),
             host_name: std::fs::read_to_string("/proc/sys/kernel/hostname").ok().map(|name| name.trim().to_lowercase()),
             buckets: Mutex::new(HashMap::new()),
         })
@@ -88,7 +92,7 @@ impl Guard {
             return Err((StatusCode::FORBIDDEN, "this server goes by no such name; use its address"));
         }
         let origin = headers.contains_key(ORIGIN).then(|| single(headers, ORIGIN).unwrap_or("null"));
-        if origin.is_some_and(|origin| !is_origin_of(origin, host)) {
+        if origin.is_some_and(|origin| !is_origin_of(origin, host) && !self.is_public_origin(origin)) {
             return Err((StatusCode::FORBIDDEN, "requests from other origins are refused"));
         }
         let site = headers.get("sec-fetch-site").map(|site| site.as_bytes());
@@ -99,7 +103,7 @@ impl Guard {
             return Err((StatusCode::FORBIDDEN, "requests from other sites are refused"));
         }
         let presented = self.presents_token(uri, headers);
-        if !self.loopback && !presented && !self.has_cookie(headers) {
+        if self.needs_token() && !presented && !self.has_cookie(headers) {
             return Err((StatusCode::UNAUTHORIZED, "the token is needed: open the address that was printed"));
         }
         // The page is of this origin, and where others can connect it has the cookie, too.
@@ -107,6 +111,23 @@ impl Guard {
             return Err((StatusCode::FORBIDDEN, "controls need the token (authorization: Bearer …), or the page"));
         }
         Ok(())
+    }
+
+    /// Whether others than those who work on this machine can connect.
+    pub fn needs_token(&self) -> bool {
+        !self.loopback || !self.public.is_empty()
+    }
+
+    /// Whether a page of `origin` came through the proxy, which may name another host to this server.
+    fn is_public_origin(&self, origin: &str) -> bool {
+        let name = origin.strip_prefix("http://").or_else(|| origin.strip_prefix("https://"));
+        name.is_some_and(|name| self.is_public(name))
+    }
+
+    /// One of the names that were allowed, with the port that was, if one was.
+    fn is_public(&self, host: &str) -> bool {
+        let host = host.to_lowercase();
+        self.public.iter().any(|allowed| *allowed == host || *allowed == without_port(&host))
     }
 
     /// Whether the request itself carries the token.
@@ -132,10 +153,10 @@ impl Guard {
     /// An address, `localhost`, or this machine's name: names that somebody else's DNS cannot have led here. The port may
     /// be that of a tunnel.
     fn is_own_name(&self, host: &str) -> bool {
-        let name = match host.rsplit_once(':') {
-            Some((name, port)) if port.parse::<u16>().is_ok() => name,
-            _ => host,
-        };
+        if self.is_public(host) {
+            return true;
+        }
+        let name = without_port(host);
         let address = name.strip_prefix('[').and_then(|name| name.strip_suffix(']')).unwrap_or(name);
         match address.parse::<IpAddr>() {
             // What listens here alone is reached by no other address.
@@ -159,6 +180,13 @@ impl Guard {
         let may = bucket.left >= 1.0;
         bucket.left -= if may { 1.0 } else { 0.0 };
         may
+    }
+}
+
+fn without_port(host: &str) -> &str {
+    match host.rsplit_once(':') {
+        Some((name, port)) if port.parse::<u16>().is_ok() => name,
+        _ => host,
     }
 }
 
@@ -186,7 +214,7 @@ mod tests {
     const OWN: &str = "127.0.0.1:8090";
 
     fn guard(address: &str) -> Guard {
-        Guard::new(address.parse().expect("an address")).expect("a guard")
+        Guard::new(address.parse().expect("an address"), &[]).expect("a guard")
     }
 
     fn check(guard: &Guard, method: Method, target: &str, headers: &[(&str, &str)]) -> u16 {
@@ -246,7 +274,7 @@ mod tests {
         {
             assert_eq!(bearer(wrong), 403, "{wrong}");
         }
-        assert_ne!(guard.token(), Guard::new(OWN.parse().expect("one")).expect("a guard").token());
+        assert_ne!(guard.token(), Guard::new(OWN.parse().expect("one"), &[]).expect("a guard").token());
     }
 
     #[test]
@@ -266,6 +294,34 @@ mod tests {
         // A cookie alone is sent along by whoever makes the browser send something.
         assert_eq!(check(&guard, Method::POST, "/api/stop", &[host, cookie]), 403);
         assert_eq!(check(&guard, Method::GET, "/", &[("host", "evil.example"), cookie]), 403);
+    }
+
+    /// A proxy on this machine connects from it: its name is let in, and what comes by any name needs the token.
+    #[test]
+    fn a_proxy_is_let_in_by_name_and_needs_the_token() {
+        let public = ["Render.example.org".to_owned(), "other.example:8443".to_owned()];
+        let guard = Guard::new(OWN.parse().expect("an address"), &public).expect("a guard");
+        let token = format!("/?token={}", guard.token());
+        for host in ["render.example.org", "render.example.org:443", "RENDER.example.org", "other.example:8443", OWN] {
+            assert_eq!(check(&guard, Method::GET, "/", &[("host", host)]), 401, "{host}");
+            assert_eq!(check(&guard, Method::GET, &token, &[("host", host)]), 200, "{host}");
+        }
+        for host in
+            ["example.org", "render.example.org.evil.example", "other.example", "other.example:80", "evil.example"]
+        {
+            assert_eq!(check(&guard, Method::GET, &token, &[("host", host)]), 403, "{host}");
+        }
+        let cookie = guard.set_cookie();
+        let cookie = ("cookie", cookie.split(';').next().expect("a pair"));
+        // Passed on as it came, or with this server's own address instead.
+        for host in ["render.example.org", OWN] {
+            let stop =
+                |origin: &str| check(&guard, Method::POST, "/api/stop", &[("host", host), cookie, ("origin", origin)]);
+            assert_eq!(stop("https://render.example.org"), 200, "{host}");
+            assert_eq!(stop("https://evil.example"), 403, "{host}");
+            let bare = ("origin", "https://render.example.org");
+            assert_eq!(check(&guard, Method::POST, "/api/stop", &[("host", host), bare]), 401, "{host}");
+        }
     }
 
     #[test]

@@ -79,13 +79,18 @@ pub struct Server {
 impl Server {
     /// Listens on `address`; whoever can reach it may look, with the token where that is not this machine alone.
     pub fn start(address: SocketAddr, feed: Arc<Feed>, about: About) -> Result<Server> {
+        Server::start_behind(&[], address, feed, about)
+    }
+
+    /// The same behind proxies that go by these names, `NAME` or `NAME:PORT`: then everybody needs the token.
+    pub fn start_behind(proxies: &[String], address: SocketAddr, feed: Arc<Feed>, about: About) -> Result<Server> {
         let listener = std::net::TcpListener::bind(address).map_err(|error| cannot_listen(address, &error))?;
         let address = listener.local_addr().map_err(|error| cannot_listen(address, &error))?;
         listener.set_nonblocking(true).map_err(|error| cannot_listen(address, &error))?;
-        let guard = Guard::new(address)?;
-        let url = match address.ip().is_loopback() {
-            true => format!("http://{address}/"),
-            false => format!("http://{address}/?token={}", guard.token()),
+        let guard = Guard::new(address, proxies)?;
+        let url = match guard.needs_token() {
+            false => format!("http://{address}/"),
+            true => format!("http://{address}/?token={}", guard.token()),
         };
         let failed = |error: std::io::Error| Error::Internal(format!("the web server cannot start: {error}"));
         let runtime = tokio::runtime::Builder::new_multi_thread()

@@ -8,8 +8,8 @@ use glam::DVec3;
 use super::ggx::Ggx;
 use super::reflection::{Boundary, Mirror, RoughMirror, reflected};
 use super::{Choice, Lobe, Vertex, cosine_density, cosine_direction, fresnel};
-use crate::scattering::{DielectricAlbedo, ReflectionProbability, index_range};
 use crate::scene::{Scene, SpectrumId};
+use crate::spectral::hemisphere::{DielectricAlbedo, ReflectionProbability, index_range};
 
 /// Indices this near to 1 make no visible boundary. The half vector of refraction is lost there: a rough boundary that
 /// is matched in all channels is smooth, and one that is in some bends there by an index this far from 1.
@@ -92,7 +92,7 @@ impl Boundary for Surface {
 }
 
 /// Ideal refraction. Where the live channels bend differently, one goes on in its direction and the others stop
-/// (degradation, section 3.4 of the method).
+/// (degradation: Hoarau et al. 2018, section 3.4, after Evans and McCool 1999).
 struct Refraction(Surface);
 
 impl Lobe for Refraction {

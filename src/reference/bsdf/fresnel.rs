@@ -1,6 +1,6 @@
 //! Fresnel's equations for unpolarised light, as textbooks have them.
 //!
-//! In f64 their cancellation is harmless; `scattering::fresnel` has the forms for f32.
+//! In f64 their cancellation is harmless; `spectral::hemisphere` has the forms for f32.
 
 /// Reflectance of a boundary of relative index `eta` (beyond over before) at cosine `c`.
 pub fn dielectric(c: f64, eta: f64) -> f64 {
@@ -48,7 +48,7 @@ fn square_root([re, im]: [f64; 2]) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scattering::fresnel as shared;
+    use crate::spectral::hemisphere::fresnel as shared;
 
     /// Two ways of writing the same equations agree; the other is held against published digits.
     #[test]

@@ -11,7 +11,7 @@
 //!
 //! # Decisions
 //! Every direction is chosen once for all channels. A lobe is chosen with q = ½ mean over channels of its share of what
-//! is scattered + ½ its normalised largest share (DESIGN section 6). Shares are those of directional albedos at the
+//! is scattered + ½ its normalised largest share (docs/METHOD.md, Decisions). Shares are those of directional albedos at the
 //! path's own wavelength samples, so that a lobe which scatters in any channel can be chosen; between reflection and
 //! refraction at a smooth boundary the table decides that devices use too. A direction that several lobes could have
 //! chosen is weighted by all of them together.

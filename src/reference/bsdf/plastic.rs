@@ -8,9 +8,9 @@ use glam::DVec3;
 use super::ggx::Ggx;
 use super::reflection::{Boundary, Mirror, RoughMirror};
 use super::{Choice, Lobe, Vertex, cosine_density, cosine_direction, fresnel};
-use crate::scattering::fresnel::mean_dielectric;
-use crate::scattering::{DielectricAlbedo, index_range};
 use crate::scene::{Reflectance, Scene, SpectrumId};
+use crate::spectral::hemisphere::fresnel::mean_dielectric;
+use crate::spectral::hemisphere::{DielectricAlbedo, index_range};
 
 /// The coat's reflection, and what comes out of the base.
 pub fn lobes(scene: &Scene, reflectance: Reflectance, eta: SpectrumId, roughness: Option<f64>) -> Vec<Box<dyn Lobe>> {

@@ -7,9 +7,9 @@ use glam::DVec3;
 
 use super::ggx::Ggx;
 use super::{Choice, Lobe, Vertex, cosine_density, cosine_direction, fresnel};
-use crate::scattering::ReflectionAlbedo;
-use crate::scattering::fresnel::mean_conductor;
 use crate::scene::SpectrumId;
+use crate::spectral::hemisphere::ReflectionAlbedo;
+use crate::spectral::hemisphere::fresnel::mean_conductor;
 
 /// What reflects: F at the cosine between direction and normal, and what the lobe as a whole reflects.
 pub trait Boundary: Send + Sync {

@@ -27,7 +27,7 @@ impl<'a> SpectralValues<'a> {
         }
     }
 
-    /// Goes over to wavelength coordinate `mu` (Eq. 4 of the method: one for all channels).
+    /// Goes over to wavelength coordinate `mu` (Eq. 4 of Hoarau et al. 2018: one for all channels).
     pub fn begin(&mut self, mu: f64) {
         for (k, wavelength) in self.wavelength.iter_mut().enumerate() {
             *wavelength = self.scene.channels.wavelength(k, mu);

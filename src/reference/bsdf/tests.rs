@@ -316,7 +316,7 @@ fn white_furnace_of_other_indices() {
     assert_white(&kinds, &alphas, 120_000);
 }
 
-/// VALIDATION section 1.1: what single scattering alone sends back where F = 1.
+/// What single scattering alone sends back where F = 1 (docs/METHOD.md, Closed forms).
 #[test]
 fn published_albedos_of_single_scattering() {
     for (alpha, z, want) in
@@ -473,7 +473,8 @@ fn sides_of_opaque_surfaces() {
     }
 }
 
-/// Lobes that matter in one channel only are chosen by half their mean and half their largest share (DESIGN section 6).
+/// Lobes that matter in one channel only are chosen by half their mean and half their largest share (docs/METHOD.md,
+/// Decisions).
 #[test]
 fn lobes_are_chosen_for_every_channel() {
     let blend = Material::new(

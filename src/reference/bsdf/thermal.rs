@@ -4,9 +4,11 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use super::{Vertex, fresnel};
-use crate::scattering::fresnel::{mean_conductor, mean_dielectric};
-use crate::scattering::{DielectricAlbedo, FACET_COSINES, FacetCosines, ReflectionAlbedo, facet_cosine, index_range};
 use crate::scene::{Bsdf as Description, Material, Reflectance, SMOOTH, Scene, SpectrumId, Temperature, TextureId};
+use crate::spectral::hemisphere::fresnel::{mean_conductor, mean_dielectric};
+use crate::spectral::hemisphere::{
+    DielectricAlbedo, FACET_COSINES, FacetCosines, ReflectionAlbedo, facet_cosine, index_range,
+};
 use crate::spectral::planck;
 
 /// One material, of a blend or by itself, at a temperature.

@@ -1,8 +1,8 @@
 //! What lies between the passes of a wave.
 
+use crate::device::words::{Counters, Wave};
 use crate::gpu::adapter::Gpu;
 use crate::gpu::buffer;
-use crate::gpu::layout::{Counters, Wave};
 use crate::render::wave::WavePlan;
 
 /// The buffers of a wave, by the names that shaders have for them.

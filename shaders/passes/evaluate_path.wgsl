@@ -1,0 +1,40 @@
+// Evaluate, path by path (Hoarau et al. 2018, section 5.1 and Algorithm 1): a thread has one path, and goes through its channels
+// in batches of VECTORS x 4, for each of which it reads the whole path again. The state of a batch stays in registers. A dispatch
+// takes one sample of every pixel, so that nobody else refines the same mean.
+
+@group(1) @binding(6) var<uniform> step: Step;
+
+@compute @workgroup_size(64)
+fn evaluate_path(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let local_slot = id.x + id.y * groups.x * 64u;
+    if (local_slot >= wave.pixel_count) {
+        return;
+    }
+    let slot = wave.pixel_begin + local_slot;
+    let path = local_slot * wave.samples + step.sample;
+    let head = heads[path];
+    let s = spectral_sample(head.x);
+    let used = head.y & 0xffffu;
+    let first_record = path * frame.max_records;
+    let index = wave.sample_begin + step.sample + 1u;
+    var bad = BadSamples(0u, 0u, 0u);
+    let first_batch = id.z * BATCHES;
+    for (var b = first_batch; b < min(first_batch + BATCHES, (QUADS + VECTORS - 1u) / VECTORS); b += 1u) {
+#repeat VECTORS v
+        let quad_$v = min(b * VECTORS + $vu, QUADS - 1u);
+        let out_$v = slot * CHANNELS + 4u * quad_$v;
+        let channels_$v = select(0u, min(4u, CHANNELS - 4u * quad_$v), b * VECTORS + $vu < QUADS);
+        var throughput_$v = first_throughput(quad_$v, s);
+        var radiance_$v = vec4<f32>(0.0);
+#end
+#include common/records.wgsl
+
+#repeat VECTORS v
+        if (channels_$v > 0u) {
+            refine_mean(out_$v, channels_$v, checked(radiance_$v, index, &bad), index);
+        }
+#end
+    }
+    prove(1u, head.y ^ (wave.sequence << 16u), local_slot == 0u && id.z == 0u);
+    report(bad, slot);
+}

@@ -1,0 +1,19 @@
+// What a surface emits where a path meets it, against aiming at it (MIS).
+
+fn emit(list: ptr<function, RecordList>, path: Path, meeting: Meeting, site: Site, v: Vertex) {
+    if (site.surface.emitter == NONE) {
+        return;
+    }
+    let emitter = emitters[site.surface.emitter];
+    if (!site.from_front && (emitter.spectrum & EMITS_BOTH_SIDES) == 0u) {
+        return;
+    }
+    var weight = path.scale;
+    if (path.density >= 0.0) {
+        weight *= power_heuristic(path.density, light_density(site.surface.emitter, path.ray.origin, path.ray.direction, meeting.distance, site.surface.normal));
+    }
+    let begin = (*list).count;
+#lines EMITTED
+    append(list, OP_ONE | MODE_SINGLE, 0u, weight, 0.0);
+    gather(list, begin, emitter.spectrum & SPECTRUM_MASK);
+}

@@ -1,0 +1,52 @@
+// Meeting the next surface, and light, through media: every way is noted as records.
+
+fn meet(path: ptr<function, Path>, list: ptr<function, RecordList>, overflow: ptr<function, bool>) -> Meeting {
+    let ray = (*path).ray;
+    var nested = (*path).nested;
+    if (step.bounce == 0u) {
+        nested = vec2<u32>(volumes[1], volumes[2]);
+#lines CAMERA_STARTS
+    }
+    var way: Way;
+    let walked = walk(ray, INFINITE, &nested, &way, overflow);
+    (*path).nested = nested;
+    append_way(list, &way, ray, walked.hit.primitive == NONE, 0u, (*path).scale);
+    return Meeting(walked.hit, walked.ray, walked.passed + walked.hit.distance);
+}
+
+struct LightWay {
+    way: Way,
+}
+
+// Whether a light is seen through media; notes them.
+fn reaches(aim: Aim, nested: vec2<u32>, site: Site, through: ptr<function, LightWay>, overflow: ptr<function, bool>) -> bool {
+    var way: Way;
+    way.count = 0u;
+    var around = nested;
+    let inner = boundaries[site.hit.primitive] & 0xffu;
+    if (aim.direction.z < 0.0 && inner != 0u && !cross_boundary(&around, inner, site.from_front)) {
+        *overflow = true;
+    }
+    let is_seen = walk(aim.shadow, aim.limit, &around, &way, overflow).hit.primitive == NONE;
+    (*through).way = way;
+    return is_seen;
+}
+
+fn light_is_dimmed(through: ptr<function, LightWay>) -> bool {
+    return (*through).way.count > 0u;
+}
+
+fn append_light_way(list: ptr<function, RecordList>, through: ptr<function, LightWay>, aim: Aim) {
+    var way = (*through).way;
+    append_way(list, &way, aim.shadow, aim.limit == INFINITE, MODE_ON_F, 1.0);
+}
+
+// Enters or leaves the body behind a surface, where the path goes on through it.
+fn pass_surface(path: ptr<function, Path>, site: Site, direction: vec3<f32>, overflow: ptr<function, bool>) {
+    let behind = boundaries[site.hit.primitive] & 0xffu;
+    var nested = (*path).nested;
+    if (direction.z < 0.0 && behind != 0u && !cross_boundary(&nested, behind, site.from_front)) {
+        *overflow = true;
+    }
+    (*path).nested = nested;
+}

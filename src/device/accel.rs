@@ -1,0 +1,342 @@
+//! From world-space objects to what rays meet: primitives in device units and a compressed wide BVH over them.
+//!
+//! Device units: the scene recentred and scaled by a power of two to about [-1, 1], in f64, before anything becomes f32,
+//! so that a scene far from the origin, or measured in micrometres, loses nothing.
+
+use glam::{DVec3, Vec3A};
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::node::Bvh2Node;
+use obvhs::cwbvh::CwBvh;
+use obvhs::cwbvh::builder::build_cwbvh;
+use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
+use obvhs::{Boundable, BvhBuildParams};
+
+use crate::device::words::{HAS_COORDINATES, HAS_NORMALS, NONE, Primitive};
+use crate::scene::{Attributes, Scene, Shape};
+
+/// Kinds of primitives in the high byte of [`Primitive::tag`]; 0 is a triangle.
+const KIND_SPHERE: u32 = 1;
+const KIND_DISK: u32 = 2;
+const KIND_CYLINDER: u32 = 3;
+
+/// The largest number of materials: ids have 24 bits beside the primitive's kind, and one stands for none.
+pub const MAX_MATERIALS: usize = (1 << 24) - 1;
+const NO_MATERIAL: u32 = 0x00ff_ffff;
+
+/// World space → device units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DeviceSpace {
+    pub center: DVec3,
+    /// Device units per metre, a power of two.
+    pub scale: f64,
+    /// Radius of a sphere around the device origin that holds the scene, in device units.
+    pub radius: f64,
+}
+
+impl DeviceSpace {
+    pub fn point(&self, world: DVec3) -> [f32; 3] {
+        ((world - self.center) * self.scale).as_vec3().to_array()
+    }
+
+    pub fn length(&self, metres: f64) -> f32 {
+        (metres * self.scale) as f32
+    }
+}
+
+/// Everything a ray can meet, ready for the device.
+pub struct Accel {
+    pub space: DeviceSpace,
+    /// CWBVH nodes, 80 bytes each; the root is the first. At least one.
+    pub nodes: Vec<[u32; 20]>,
+    /// Levels of nodes: a traversal never has more of them waiting.
+    pub depth: u32,
+    /// In the order of the BVH's leaves.
+    pub primitives: Vec<Primitive>,
+    /// Texture coordinates, normals and axes of those that carry some, found by [`Primitive::attributes`].
+    pub attributes: Vec<f32>,
+    /// The object of each primitive.
+    pub objects: Vec<u32>,
+    /// The emitting primitives: (index into `primitives`, object, area in device units).
+    pub emitters: Vec<(u32, usize, f64)>,
+    /// Whether anything but triangles occurs.
+    pub has_shapes: bool,
+    /// Triangles without area, which no ray can meet and which were left out.
+    pub degenerate: usize,
+}
+
+impl Accel {
+    /// Builds the structure; never fails, an empty scene gives one empty node.
+    pub fn build(scene: &Scene) -> Accel {
+        let space = device_space(scene);
+        let mut loose = Vec::new();
+        let (mut degenerate, mut attributes) = (0, Vec::new());
+        for (index, object) in scene.objects.iter().enumerate() {
+            let first = loose.len();
+            let triangles = collect(
+                &object.shape,
+                object.material.map_or(NO_MATERIAL, |m| m as u32),
+                index as u32,
+                &space,
+                &mut loose,
+            );
+            for (primitive, triangle) in loose[first..].iter_mut().zip(&triangles) {
+                primitive.attributes = attach(&object.attributes, *triangle, &mut attributes);
+            }
+            let all = if let Shape::Mesh(mesh) = &object.shape { mesh.triangles.len() } else { 1 };
+            degenerate += all - triangles.len();
+        }
+        let has_shapes = loose.iter().any(|p| p.tag >> 24 != 0);
+        let (nodes, order, depth) = build_nodes(&loose);
+        let mut primitives: Vec<Primitive> = order.iter().map(|&i| loose[i as usize]).collect();
+        let objects = primitives.iter().map(|primitive| primitive.emitter).collect();
+        let mut emitters = Vec::new();
+        for (index, primitive) in primitives.iter_mut().enumerate() {
+            // `collect` left the object here; from now on it is the emitter.
+            let object = primitive.emitter as usize;
+            primitive.emitter = NONE;
+            if scene.objects[object].emission.is_some() {
+                primitive.emitter = emitters.len() as u32;
+                emitters.push((index as u32, object, area(primitive)));
+            }
+        }
+        Accel { space, nodes, depth, primitives, attributes, objects, emitters, has_shapes, degenerate }
+    }
+}
+
+/// The corners of a box around `shapes`; `None` without any.
+pub fn bounds<'a>(shapes: impl Iterator<Item = &'a Shape>) -> Option<[DVec3; 2]> {
+    let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+    let [min, max] = shapes.map(Shape::bounds).fold(none, |[min, max], [low, high]| [min.min(low), max.max(high)]);
+    (min.x <= max.x).then_some([min, max])
+}
+
+fn device_space(scene: &Scene) -> DeviceSpace {
+    let Some([min, max]) = bounds(scene.objects.iter().map(|object| &object.shape)) else {
+        return DeviceSpace { center: scene.camera.position, scale: 1.0, radius: 1.0 };
+    };
+    let half = (0.5 * (max - min)).max_element();
+    let scale = if half > 0.0 { (-half.log2().ceil()).exp2() } else { 1.0 };
+    let radius = (0.5 * (max - min)).length() * scale;
+    DeviceSpace { center: 0.5 * (min + max), scale, radius: radius.max(f64::from(f32::MIN_POSITIVE)) }
+}
+
+/// Appends what a primitive carries, as `shaders/common/attributes.wgsl` reads it, and gives the word that finds it.
+fn attach(attributes: &Attributes, triangle: usize, out: &mut Vec<f32>) -> u32 {
+    let first = out.len() as u32;
+    let mut flags = 0;
+    if let Some(axes) = &attributes.axes {
+        flags |= HAS_COORDINATES;
+        out.extend(axes.to_cols_array().map(|v| v as f32));
+    }
+    if let Some(uv) = &attributes.uv {
+        flags |= HAS_COORDINATES;
+        let corners = uv[triangle];
+        // Textures repeat: small numbers have more digits.
+        let whole = corners[0].min(corners[1]).min(corners[2]).floor();
+        out.extend(corners.iter().flat_map(|uv| (*uv - whole).as_vec2().to_array()));
+    }
+    if let Some(normals) = &attributes.normals {
+        flags |= HAS_NORMALS;
+        out.extend(normals[triangle].iter().flat_map(|normal| normal.as_vec3().to_array()));
+    }
+    if flags == 0 { 0 } else { first | flags }
+}
+
+/// Appends a shape's primitives, the object's index standing in for the emitter, and gives the triangle that each is; those
+/// without area as f32 are left out.
+fn collect(shape: &Shape, material: u32, object: u32, space: &DeviceSpace, out: &mut Vec<Primitive>) -> Vec<usize> {
+    let base = Primitive { tag: material, emitter: object, ..Primitive::default() };
+    match shape {
+        Shape::Mesh(mesh) => {
+            let positions: Vec<[f32; 3]> = mesh.positions.iter().map(|&p| space.point(p)).collect();
+            let mut kept = Vec::with_capacity(mesh.triangles.len());
+            for (triangle, t) in mesh.triangles.iter().enumerate() {
+                let [a, b, c] = t.map(|i| positions[i as usize]);
+                let primitive = Primitive { a, b, c, ..base };
+                if triangle_area(&primitive) > 0.0 {
+                    out.push(primitive);
+                    kept.push(triangle);
+                }
+            }
+            return kept;
+        }
+        Shape::Sphere { center, radius } => out.push(Primitive {
+            a: space.point(*center),
+            tag: material | KIND_SPHERE << 24,
+            b: [space.length(*radius), 0.0, 0.0],
+            ..base
+        }),
+        Shape::Disk { center, normal, radius } => out.push(Primitive {
+            a: space.point(*center),
+            tag: material | KIND_DISK << 24,
+            b: normal.normalize().as_vec3().to_array(),
+            c: [space.length(*radius), 0.0, 0.0],
+            ..base
+        }),
+        Shape::Cylinder { from, to, radius } => out.push(Primitive {
+            a: space.point(*from),
+            tag: material | KIND_CYLINDER << 24,
+            b: space.point(*to),
+            c: [space.length(*radius), 0.0, 0.0],
+            ..base
+        }),
+    }
+    vec![0]
+}
+
+fn vector(p: [f32; 3]) -> DVec3 {
+    DVec3::from(p.map(f64::from))
+}
+
+fn triangle_area(p: &Primitive) -> f64 {
+    0.5 * (vector(p.b) - vector(p.a)).cross(vector(p.c) - vector(p.a)).length()
+}
+
+/// Area in device units.
+fn area(p: &Primitive) -> f64 {
+    use std::f64::consts::PI;
+    match p.tag >> 24 {
+        KIND_SPHERE => 4.0 * PI * f64::from(p.b[0]).powi(2),
+        KIND_DISK => PI * f64::from(p.c[0]).powi(2),
+        KIND_CYLINDER => 2.0 * PI * f64::from(p.c[0]) * (vector(p.b) - vector(p.a)).length(),
+        _ => triangle_area(p),
+    }
+}
+
+impl Boundable for Primitive {
+    fn aabb(&self) -> Aabb {
+        let v = |p: [f32; 3]| Vec3A::from(p);
+        let around = |points: &[Vec3A], radius: f32| {
+            let mut bounds = Aabb::from_points(points);
+            // Rounding of center and radius included.
+            let margin = Vec3A::splat(radius * (1.0 + 1e-6)) + 2e-7 * bounds.max.abs().max(bounds.min.abs());
+            bounds.min -= margin;
+            bounds.max += margin;
+            bounds
+        };
+        match self.tag >> 24 {
+            KIND_SPHERE => around(&[v(self.a)], self.b[0]),
+            KIND_DISK => around(&[v(self.a)], self.c[0]),
+            KIND_CYLINDER => around(&[v(self.a), v(self.b)], self.c[0]),
+            _ => Aabb::from_points(&[v(self.a), v(self.b), v(self.c)]),
+        }
+    }
+}
+
+/// Deeper trees are built anew: the traversal's stack grows with the depth.
+const MAX_DEPTH: usize = 30;
+
+/// Clustering takes quadratic time, and recursion as deep, over boxes that are the same: it merges one pair a round.
+const MAX_COINCIDENT: usize = 256;
+
+/// The nodes, for each place in the leaves the primitive that stands there, and the tree's depth.
+fn build_nodes(primitives: &[Primitive]) -> (Vec<[u32; 20]>, Vec<u32>, u32) {
+    if primitives.is_empty() {
+        return (vec![[0; 20]], Vec::new(), 1);
+    }
+    let clustered = (most_coincident(primitives) <= MAX_COINCIDENT)
+        .then(|| build_cwbvh(primitives, BvhBuildParams::medium_build(), &mut std::time::Duration::default()))
+        // Nested boxes become chains instead of trees.
+        .filter(|bvh| depth(bvh) <= MAX_DEPTH);
+    let bvh = clustered.unwrap_or_else(|| bvh2_to_cwbvh(&balanced(primitives), 3, true, false));
+    let nodes = bvh.nodes.iter().map(|node| bytemuck::cast(*node)).collect();
+    let depth = depth(&bvh) as u32;
+    (nodes, bvh.primitive_indices, depth)
+}
+
+/// The largest number of primitives that share one bounding box (by hashes: a collision may only overstate it).
+fn most_coincident(primitives: &[Primitive]) -> usize {
+    let mut hashes: Vec<u64> = primitives
+        .iter()
+        .map(|p| {
+            let Aabb { min, max } = p.aabb();
+            let bits = min.to_array().into_iter().chain(max.to_array()).map(|x| u64::from(x.to_bits()));
+            // Fowler, Noll and Vo's prime, a word at a time.
+            bits.fold(0xcbf2_9ce4_8422_2325, |h: u64, b| (h ^ b).wrapping_mul(0x0100_0000_01b3).rotate_left(29))
+        })
+        .collect();
+    hashes.sort_unstable();
+    hashes.chunk_by(|a, b| a == b).map(<[u64]>::len).max().unwrap_or(0)
+}
+
+/// Levels of nodes.
+fn depth(bvh: &CwBvh) -> usize {
+    let mut deepest = 0;
+    let mut open = vec![(0usize, 1usize)];
+    while let Some((node, level)) = open.pop() {
+        deepest = deepest.max(level);
+        let node = &bvh.nodes[node];
+        let children = node.imask.count_ones() as usize;
+        open.extend((0..children).map(|i| (node.child_base_idx as usize + i, level + 1)));
+    }
+    deepest
+}
+
+/// A binary tree by median splits along the widest axis: as deep as log2 of the number of primitives, whatever they are.
+fn balanced(primitives: &[Primitive]) -> Bvh2 {
+    let boxes: Vec<Aabb> = primitives.iter().map(Boundable::aabb).collect();
+    let mut order: Vec<u32> = (0..primitives.len() as u32).collect();
+    let mut nodes = vec![Bvh2Node::default()];
+    let mut open = vec![(0usize, 0..primitives.len())];
+    while let Some((at, range)) = open.pop() {
+        let bounds = order[range.clone()].iter().fold(Aabb::INVALID, |b, &i| b.union(&boxes[i as usize]));
+        if range.len() == 1 {
+            nodes[at] = Bvh2Node::new(bounds, 1, range.start as u32);
+            continue;
+        }
+        let extent = bounds.max - bounds.min;
+        let axis = (0..3).max_by(|&a, &b| extent[a].total_cmp(&extent[b])).unwrap_or(0);
+        let middle = range.len() / 2;
+        let center = |i: &u32| boxes[*i as usize].min[axis] + boxes[*i as usize].max[axis];
+        order[range.clone()].select_nth_unstable_by(middle, |a, b| center(a).total_cmp(&center(b)));
+        let first_child = nodes.len();
+        nodes.resize(first_child + 2, Bvh2Node::default());
+        nodes[at] = Bvh2Node::new(bounds, 0, first_child as u32);
+        open.push((first_child, range.start..range.start + middle));
+        open.push((first_child + 1, range.start + middle..range.end));
+    }
+    Bvh2 { nodes, primitive_indices: order, ..Bvh2::default() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn triangle(a: [f32; 3], b: [f32; 3], c: [f32; 3]) -> Primitive {
+        Primitive { a, b, c, ..Primitive::default() }
+    }
+
+    /// obvhs's own validation walks the whole tree: bounds, completeness, depth.
+    #[test]
+    fn trees_are_valid_on_odd_input() {
+        let one = vec![triangle([0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])];
+        let coincident = vec![one[0]; 100_000];
+        let nested: Vec<_> = (1..5000)
+            .map(|i| triangle([-i as f32, -i as f32, 0.0], [i as f32, -i as f32, 0.0], [0.0, i as f32, 0.0]))
+            .collect();
+        let grid: Vec<_> = (0..40_000)
+            .map(|i| {
+                let (x, y) = ((i % 200) as f32, (i / 200) as f32);
+                triangle([x, y, 0.0], [x + 1.0, y, 0.0], [x, y + 1.0, 0.1 * x])
+            })
+            .collect();
+        let flat: Vec<_> = (0..100)
+            .map(|i| triangle([i as f32, 0.0, 0.0], [i as f32 + 1e-6, 0.0, 0.0], [i as f32, 0.0, 1.0]))
+            .collect();
+        for primitives in [one, coincident, nested, grid, flat] {
+            let (nodes, order, _) = build_nodes(&primitives);
+            let mut seen = order.clone();
+            seen.sort_unstable();
+            assert!(seen.iter().enumerate().all(|(i, &p)| i as u32 == p), "each primitive stands in one leaf");
+            let bvh = CwBvh {
+                nodes: nodes.into_iter().map(bytemuck::cast).collect(),
+                primitive_indices: order,
+                ..CwBvh::default()
+            };
+            bvh.validate(&primitives, false);
+            assert!(depth(&bvh) <= MAX_DEPTH);
+        }
+        assert_eq!(build_nodes(&[]).0, vec![[0; 20]]);
+    }
+}

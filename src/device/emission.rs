@@ -1,0 +1,118 @@
+//! What emits in a scene: spectra and how much of each, by which lights are chosen and wavelengths drawn.
+
+use std::borrow::Cow;
+
+use crate::device::accel::{Accel, bounds};
+use crate::device::parts::media::terms;
+use crate::scene::{Field, Light, Medium, Scene, Sides};
+use crate::spectral::{Curve, planck};
+
+/// A spectrum of radiance or the like, and what its power is proportional to.
+pub type Share<'a> = (Cow<'a, Curve>, f64);
+
+/// The scene's emission, each part times its factor: power over π, in device units.
+pub struct Emitted<'a> {
+    /// Of the surfaces of each spectrum (by its number in the scene), in ascending order.
+    pub surfaces: Vec<(usize, f64)>,
+    /// Of the scene's lights, in the order asked for.
+    pub lamps: Vec<(usize, f64)>,
+    /// Of the environment: its radiance integrated over the sphere.
+    pub environment: Option<Share<'a>>,
+}
+
+impl<'a> Emitted<'a> {
+    /// Of the primitives and `lamps` (indices of the scene's lights).
+    pub fn of(scene: &Scene, accel: &Accel, lamps: &[usize], environment: Option<&'a Curve>) -> Emitted<'a> {
+        let mut areas = vec![0.0; scene.spectra.len()];
+        for emitter in &accel.emitters {
+            areas[radiance(scene, emitter)] += area(scene, emitter);
+        }
+        // What comes from afar lights the cross-section of a sphere around everything.
+        let cross_section = accel.space.radius.powi(2);
+        let of_lamp = |&i: &usize| {
+            let light = &scene.lights[i];
+            let per_value = match light {
+                Light::Point { .. } => 4.0 * accel.space.scale.powi(2),
+                Light::Directional { .. } | Light::Sun { .. } => cross_section,
+            };
+            (light.spectrum(), per_value)
+        };
+        Emitted {
+            surfaces: areas.into_iter().enumerate().filter(|(_, area)| *area > 0.0).collect(),
+            lamps: lamps.iter().map(of_lamp).collect(),
+            environment: environment.map(|flux| (Cow::Borrowed(flux), cross_section)),
+        }
+    }
+
+    /// All of them, and the media.
+    pub fn shares(self, scene: &'a Scene, accel: &Accel) -> Vec<Share<'a>> {
+        let of_scene = |&(spectrum, factor): &(usize, f64)| (Cow::Borrowed(&scene.spectra[spectrum].curve), factor);
+        let mut shares: Vec<Share> = self.surfaces.iter().chain(&self.lamps).map(of_scene).collect();
+        shares.extend(self.environment);
+        shares.extend(hot_gases(scene, accel));
+        shares
+    }
+}
+
+/// The spectrum that an emitting primitive has in the scene.
+pub fn radiance(scene: &Scene, &(_, object, _): &(u32, usize, f64)) -> usize {
+    scene.objects[object].emission.as_ref().expect("emitters come from emitting objects").radiance
+}
+
+/// Its emitting area in device units.
+pub fn area(scene: &Scene, &(_, object, area): &(u32, usize, f64)) -> f64 {
+    let both = scene.objects[object].emission.as_ref().is_some_and(|emission| emission.sides == Sides::Both);
+    area * if both { 2.0 } else { 1.0 }
+}
+
+/// Media as grey bodies that fill a sphere around them, of one temperature and density each: this decides where wavelengths
+/// are drawn, and nothing else.
+fn hot_gases<'a>(scene: &'a Scene, accel: &Accel) -> Vec<Share<'a>> {
+    let mut bodies: Vec<(usize, f64)> = Vec::new();
+    let mut seen = Vec::new();
+    for object in &scene.objects {
+        let Some(interior) = object.interior else { continue };
+        if seen.contains(&interior.body) {
+            continue;
+        }
+        seen.push(interior.body);
+        let surface = scene.objects.iter().filter(|o| o.interior.is_some_and(|i| i.body == interior.body));
+        if let Some([min, max]) = bounds(surface.map(|o| &o.shape)) {
+            bodies.push((interior.medium, 0.5 * (max - min).length()));
+        }
+    }
+    bodies.extend(scene.camera_medium.map(|medium| (medium, accel.space.radius / accel.space.scale)));
+    let share = |(medium, radius): (usize, f64)| {
+        let (kelvin, density) = typical(&scene.media[medium])?;
+        let (spectra, factors) = terms(&scene.media[medium], Some(kelvin), density);
+        let curves: Vec<&Curve> = spectra.iter().map(|&s| &scene.spectra[s].curve).collect();
+        // The mean way through a sphere.
+        let way = 4.0 / 3.0 * radius;
+        let emitted = |nm: f64, v: &[f64]| {
+            let depth: f64 = v.iter().zip(&factors).map(|(v, f)| v * f).sum::<f64>() * way;
+            -(-depth).exp_m1() * planck::radiance(nm, kelvin)
+        };
+        let area = 4.0 * std::f64::consts::PI * (radius * accel.space.scale).powi(2);
+        Some((Cow::Owned(Curve::derived_by_stretch(&curves, &scene.channels, emitted)), area))
+    };
+    bodies.into_iter().filter_map(share).collect()
+}
+
+/// The temperature and density of a medium that emits: means over its voxels, weighted with density x T⁴.
+fn typical(medium: &Medium) -> Option<(f64, f64)> {
+    let temperature = medium.temperature.as_ref()?;
+    let at = |field: &Field, i: usize| match field {
+        Field::Constant(value) => *value,
+        Field::Grid(grid) => f64::from(grid.values[i]),
+    };
+    let count = medium.grid_size().map_or(1, |size| size.iter().map(|&side| side as usize).product());
+    let (mut weights, mut kelvin, mut density) = (0.0, 0.0, 0.0);
+    for i in 0..count {
+        let (t, n) = (at(temperature, i), at(&medium.density, i));
+        let weight = n * t.powi(4);
+        weights += weight;
+        kelvin += weight * t;
+        density += weight * n;
+    }
+    (weights > 0.0).then(|| (kelvin / weights, density / weights))
+}

@@ -1,0 +1,131 @@
+//! How channels are evaluated on which kind of device: what `auto` stands for, and the shape of workgroups.
+
+use crate::device::prepared::Prepared;
+use crate::device::text::Defines;
+use crate::device::words::LOOP_LIMIT;
+use crate::scene::{Evaluator, Scene};
+
+/// Channels up to which `auto` is the conventional path tracer on GPUs. Measured with `spectile bench` on an H200 (docs/reports):
+/// its paths per second over those of `dpept-pixel`, geometric mean of four scenes, were 1.43 at 8 channels, 0.86 at 32 and 0.36 at
+/// 128. On software devices `dpept-pixel` was the fastest in all of them, or one percent from it.
+pub const MOST_PT_CHANNELS: usize = 16;
+
+/// What to use for `scene` on a software device or a GPU: its evaluator, or what `auto` stands for.
+pub fn resolve(scene: &Scene, software: bool) -> Evaluator {
+    match scene.integrator.evaluator {
+        Evaluator::Auto if !software && scene.channels.len() <= MOST_PT_CHANNELS => Evaluator::Pt,
+        Evaluator::Auto => Evaluator::DpeptPixel,
+        chosen => chosen,
+    }
+}
+
+/// Threads of one workgroup of what evaluates: `lanes` threads for each of `pixels` pixels, `vectors` quads of channels
+/// a thread.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct EvaluateShape {
+    pub vectors: u32,
+    pub lanes: u32,
+    pub pixels: u32,
+    /// Workgroups that share a pixel's channels.
+    pub blocks: u32,
+    /// How often a thread takes `vectors` quads, one batch after the other (`dpept-path`); else once.
+    pub batches: Option<u32>,
+}
+
+impl EvaluateShape {
+    /// For a scene on a software device or a GPU.
+    pub fn of(scene: &Prepared, software: bool) -> EvaluateShape {
+        let quads = scene.tables.channels_padded as u32 / 4;
+        let shape = match &scene.media {
+            _ if !scene.is_general() => EvaluateShape::new(quads, software),
+            // A march through voxels is long, and compiled for each quad.
+            Some(media) if media.has_grids() => EvaluateShape::among(quads, software, &[1]),
+            _ => EvaluateShape::general(quads, software),
+        };
+        match scene.evaluator {
+            Evaluator::DpeptPath => shape.path_by_path(quads, scene.path_iterations()),
+            _ => shape,
+        }
+    }
+
+    /// Constants of what evaluates.
+    pub fn define(&self, defines: &mut Defines) {
+        defines.set("WORKGROUP", self.lanes * self.pixels);
+        defines.constant("LANES", self.lanes);
+        defines.constant("VECTORS", self.vectors);
+        defines.constant("PIXELS_PER_GROUP", self.pixels);
+        if let Some(batches) = self.batches {
+            defines.constant("BATCHES", batches);
+        }
+    }
+
+    /// For `quads` quads of channels: groups of 64 to 256 threads, few of them idle.
+    ///
+    /// On software devices loads count most, and more channels a thread share them: measured on lavapipe, a thread's time
+    /// goes as 2.2 + vectors. A GPU hides loads behind other threads, and needs the registers for that.
+    pub fn new(quads: u32, software: bool) -> EvaluateShape {
+        EvaluateShape::among(quads, software, &[1, 2, 4])
+    }
+
+    /// For general scenes, whose code per quad is long: compiling it, and registers, set the limit.
+    fn general(quads: u32, software: bool) -> EvaluateShape {
+        EvaluateShape::among(quads, software, &[1, 2])
+    }
+
+    fn among(quads: u32, software: bool, candidates: &[u32]) -> EvaluateShape {
+        let width = if software { 8 } else { 32 };
+        let of = |vectors: u32| {
+            let threads = quads.div_ceil(vectors);
+            if threads < width {
+                let lanes = threads.next_power_of_two();
+                return EvaluateShape { vectors, lanes, pixels: (64 / lanes).max(1), blocks: 1, batches: None };
+            }
+            let blocks = threads.div_ceil(256);
+            let lanes = threads.div_ceil(blocks).next_multiple_of(width);
+            EvaluateShape { vectors, lanes, pixels: 1, blocks, batches: None }
+        };
+        let cost = |s: &EvaluateShape| f64::from(s.lanes * s.blocks) * (2.2 + f64::from(s.vectors));
+        let candidates = if software { candidates } else { &[1] };
+        let shapes = candidates.iter().map(|&v| of(v));
+        shapes.min_by(|a, b| cost(a).total_cmp(&cost(b))).expect("at least one candidate")
+    }
+
+    /// A thread for all of a path's channels, or as many as its loops can take.
+    fn path_by_path(self, quads: u32, path_iterations: u32) -> EvaluateShape {
+        let batches = quads.div_ceil(self.vectors);
+        let at_once = (LOOP_LIMIT / path_iterations).clamp(1, batches);
+        EvaluateShape { lanes: 1, pixels: 64, blocks: batches.div_ceil(at_once), batches: Some(at_once), ..self }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::EvaluateShape;
+
+    #[test]
+    fn evaluation_groups_cover_all_channels_with_few_idle_threads() {
+        for software in [true, false] {
+            let width = if software { 8 } else { 32 };
+            for quads in (1..300).chain([500, 512, 1250, 2500]) {
+                let s = EvaluateShape::new(quads, software);
+                let (threads, needed) = (s.lanes * s.blocks, quads.div_ceil(s.vectors));
+                // Each of a pixel's workgroups has channels: evaluation counts on that.
+                assert_eq!(quads.div_ceil(s.lanes * s.vectors), s.blocks, "{quads}: {s:?}");
+                assert!(threads >= needed && s.lanes * s.pixels <= 256, "{quads}: {s:?}");
+                assert!(threads < 2 * needed || threads < needed + width * s.blocks, "{quads}: {s:?}");
+            }
+        }
+        assert_eq!(
+            EvaluateShape::new(100, false),
+            EvaluateShape { vectors: 1, lanes: 128, pixels: 1, blocks: 1, batches: None }
+        );
+        assert_eq!(
+            EvaluateShape::new(100, true),
+            EvaluateShape { vectors: 4, lanes: 32, pixels: 1, blocks: 1, batches: None }
+        );
+        assert_eq!(
+            EvaluateShape::new(2, true),
+            EvaluateShape { vectors: 2, lanes: 1, pixels: 64, blocks: 1, batches: None }
+        );
+    }
+}

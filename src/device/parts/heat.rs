@@ -1,0 +1,528 @@
+//! Hot surfaces as devices have them: emission of objects. Where a surface sends the same radiance in all directions, as
+//! diffuse and black ones and blends of such do, it is a lamp like any other, and costs nothing else. What depends on the
+//! angle (metals, plastics, fronts that differ from backs) is a row of spectra, one for each of some cosines. What also
+//! differs from place to place (textures) or by azimuth (brushed metals) is worked out where a path meets it:
+//! `device::parts::radiators`.
+
+use std::borrow::Cow;
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::rc::Rc;
+
+use glam::DVec3;
+
+use crate::device::part::{Part, Place, Records, SceneBuffer};
+use crate::device::parts::geometry::{FEWER_MATERIALS, MATERIALS};
+use crate::device::parts::textures::{self, Share};
+use crate::device::text::module;
+use crate::device::words::HOT_COSINES;
+use crate::scene::{
+    Bsdf, Emission, MaterialId, Reflectance, SMOOTH, Scene, Sides, Spectrum, SpectrumId, Temperature, Weight,
+};
+use crate::spectral::hemisphere::fresnel::{conductor, dielectric, mean_conductor, mean_dielectric};
+use crate::spectral::hemisphere::{
+    DielectricAlbedo, FACET_COSINES, FacetCosines, ReflectionAlbedo, facet_cosine, index_range,
+};
+use crate::spectral::{Channels, Curve, planck};
+
+/// The mean over a hemisphere by projected solid angle.
+const TYPICAL_COSINE: f64 = 2.0 / 3.0;
+/// Cosines (j / (n - 1))³ at which the emission of a side is known; between them it is linear in j.
+const COSINES: usize = HOT_COSINES as usize;
+
+pub const BY_ANGLE: Part = Part {
+    name: "heat that depends on the angle",
+    used: |scene| scene.emits_by_angle && scene.features.emitters,
+    effect: |_| "256 spectra for each hot material that is not diffuse".into(),
+    is_planned: true,
+    modules: &[(Place::Stage, module!("parts/heat/angle.wgsl"))],
+    lines: &[
+        ("EMITTED", "if (emits_by_angle(list, path, site, v, emitter, weight)) { return; }"),
+        ("AIMED_AT_SURFACE", "aim_by_angle(aim, path, emitter, point);"),
+    ],
+    example: Some(|exhibit| exhibit.add_hot_metal()),
+    ..Part::NOTHING
+};
+
+pub const BY_PLACE: Part = Part {
+    name: "heat that differs by place",
+    // Where all is at 0 K nothing emits.
+    used: |scene| scene.radiators.is_some() && scene.features.emitters,
+    effect: |scene| {
+        let most = scene.radiators.as_ref().map_or(0, |radiators| radiators.features.records);
+        format!("up to {most} records where a path meets it")
+    },
+    is_planned: true,
+    modules: &[(Place::Stage, module!("parts/heat/radiator.wgsl")), (Place::Stage, module!("parts/heat/place.wgsl"))],
+    lines: &[
+        ("EMITTED", "if (emits_by_place(list, path.number, v, emitter, weight)) { return; }"),
+        ("AIMED_AT_SURFACE", "aim_by_place(aim, emitter, point);"),
+        ("LIGHT_TAKES_RECORDS", "if (aim.hot != 0u) { return true; }"),
+        (
+            "LIGHT_RECORDS",
+            "if (aim.hot != 0u) { append_heat_aimed_at(list, aim.hot, aim.hot_vertex, facet_numbers(path, SALT_AIMED)); }",
+        ),
+    ],
+    defines: |scene, _, defines| {
+        let Some(features) = scene.radiators.as_ref().map(|radiators| radiators.features) else { return };
+        defines.set("RADIATORS", true).set("HOT_LAMPS", features.lamps);
+        defines.set("HOT_FACETS", features.facets).set("HOT_MIRRORS", features.mirrors);
+        defines.set("HOT_VARNISH", features.varnish).set("HOT_COATS", features.coats);
+        defines.set("HOT_TEXTURED", features.textured).set("HOT_NUMBERS", features.numbers);
+    },
+    buffers: |scene| {
+        let radiators = scene.prepared.radiators.as_ref().map(|radiators| &radiators.all);
+        radiators.map(|all| SceneBuffer::new("radiators", all, MATERIALS, FEWER_MATERIALS)).into_iter().collect()
+    },
+    // What is met, beside the one record of every emitter; and what is aimed at: those records, put aside and back, and a diffuse
+    // vertex in two.
+    records: |scene| {
+        let most = scene.radiators.as_ref().map_or(0, |radiators| radiators.features.records);
+        Records { way: most.max(1) - 1, vertex: most + 3, path: 0 }
+    },
+    example: Some(|exhibit| exhibit.add_hot_textures()),
+    ..Part::NOTHING
+};
+
+/// What both have in common.
+pub const EITHER: Part = Part {
+    name: "hot surfaces",
+    used: |scene| (BY_ANGLE.used)(scene) || (BY_PLACE.used)(scene),
+    modules: &[(Place::Stage, module!("parts/heat/heat.wgsl"))],
+    defines: |scene, _, defines| {
+        let features = scene.radiators.as_ref().map(|radiators| radiators.features);
+        let smooth = scene.surfaces.as_ref().is_some_and(|surfaces| surfaces.smooth);
+        defines.set("HOT_RANDOM", scene.emits_by_angle || features.is_some_and(|features| features.facets));
+        defines.set("HOT_VERTICES", features.is_some() || smooth);
+    },
+    ..Part::NOTHING
+};
+
+/// A scene whose heat is emission of its objects.
+pub struct Heat<'a> {
+    pub scene: Cow<'a, Scene>,
+    /// Spectra of the scene at [`COSINES`] cosines, of fronts and backs.
+    pub by_angle: Vec<[Vec<SpectrumId>; 2]>,
+    /// Of surfaces that emit otherwise at every place; each once.
+    pub radiating: Vec<Radiating>,
+    /// For each object.
+    pub kinds: Vec<Kind>,
+}
+
+/// How an object emits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// As its emission says, in all directions.
+    Lamp,
+    /// As a place in [`Heat::by_angle`] says; its emission is a typical spectrum.
+    ByAngle(usize),
+    /// As a place in [`Heat::radiating`] says, likewise.
+    ByPlace(usize),
+}
+
+/// The spectrum of an object's lamp, and whether that is on both sides.
+type OfLamp = Option<(SpectrumId, bool)>;
+
+/// A surface of hot parts, and its lamp.
+pub struct Radiating {
+    pub parts: Vec<HotLeaf>,
+    pub lamp: OfLamp,
+}
+
+/// A hot part of a material, at the end of its blends.
+#[derive(Debug, Clone)]
+pub struct HotLeaf {
+    pub material: MaterialId,
+    pub weight: f64,
+    /// What blend textures leave of it.
+    pub shares: Vec<Share>,
+    pub temperature: Temperature,
+}
+
+/// A hot part of a surface that is the same all over.
+struct Leaf<'a> {
+    weight: f64,
+    kelvin: f64,
+    two_sided: bool,
+    absorber: Absorber,
+    /// What the absorber depends on, in its order.
+    curves: Vec<Cow<'a, Curve>>,
+    /// At the bits of the curves' values met so far: all cosines of a surface ask for the same.
+    facets: RefCell<HashMap<[u64; 2], Rc<OfFacets>>>,
+}
+
+/// 1 - F of metals or F of coats at each [`facet_cosine`], and the mean of F of metals.
+type OfFacets = (Vec<f64>, f64);
+
+/// A side of a leaf, seen at a cosine.
+struct Seen<'l> {
+    leaf: &'l Leaf<'l>,
+    back: bool,
+    cosine: f64,
+    /// Of facets.
+    weights: Vec<f64>,
+    /// What they lose, of which `again` comes back in the end, times something that depends on the metal.
+    lost: f64,
+    again: f64,
+}
+
+enum Absorber {
+    Black,
+    Diffuse,
+    Mirror,
+    RoughMetal { facets: FacetCosines, again: Option<ReflectionAlbedo> },
+    Varnish,
+    RoughPlastic { facets: FacetCosines, coat: DielectricAlbedo },
+}
+
+impl Leaf<'_> {
+    fn seen(&self, cosine: f64, back: bool) -> Seen<'_> {
+        let o = DVec3::new(((1.0 - cosine) * (1.0 + cosine)).max(0.0).sqrt(), 0.0, cosine);
+        let (weights, again) = match &self.absorber {
+            Absorber::RoughMetal { facets, again } => {
+                (facets.weights(o), again.as_ref().map_or(0.0, |albedo| albedo.loss(o)))
+            }
+            Absorber::RoughPlastic { facets, .. } => (facets.weights(o), 0.0),
+            _ => (Vec::new(), 0.0),
+        };
+        let lost = 1.0 - weights.iter().sum::<f64>();
+        Seen { leaf: self, back, cosine, weights, lost, again }
+    }
+
+    /// What `make` makes for these values of the curves, once.
+    fn facets(&self, values: [f64; 2], make: impl FnOnce() -> OfFacets) -> Rc<OfFacets> {
+        Rc::clone(self.facets.borrow_mut().entry(values.map(f64::to_bits)).or_insert_with(|| Rc::new(make())))
+    }
+}
+
+impl Seen<'_> {
+    /// ε where the curves have `values`: 1 - what is reflected (see `reference`, which has its own).
+    fn emittance(&self, values: &[f64]) -> f64 {
+        if self.back && !self.leaf.two_sided {
+            return 1.0;
+        }
+        let cosine = self.cosine;
+        let mean = |of_facets: &[f64]| self.weights.iter().zip(of_facets).map(|(w, v)| w * v).sum::<f64>();
+        // What the base under a coat of index η keeps of light that got through.
+        let kept = |rho: f64, eta: f64, mean_reflected: f64| {
+            let leaves = (1.0 - mean_reflected) / (eta * eta);
+            (1.0 - rho) / (1.0 - rho * (1.0 - leaves))
+        };
+        let emittance = match &self.leaf.absorber {
+            Absorber::Black => 1.0,
+            Absorber::Diffuse => 1.0 - values[0],
+            Absorber::Mirror => 1.0 - conductor(cosine, values[0], values[1]),
+            Absorber::RoughMetal { again, .. } => {
+                let (eta, k) = (values[0], values[1]);
+                let facets = self.leaf.facets([eta, k], || {
+                    let absorbed = (0..FACET_COSINES).map(|j| 1.0 - conductor(facet_cosine(j), eta, k));
+                    (absorbed.collect(), mean_conductor(eta, k))
+                });
+                let comes_back = again.as_ref().map_or(0.0, |albedo| {
+                    let (f, missing) = (facets.1, albedo.mean_loss());
+                    self.again * f * f * (1.0 - missing) / (1.0 - f * missing)
+                });
+                mean(&facets.0) + self.lost - comes_back
+            }
+            Absorber::Varnish => {
+                let (rho, eta) = (values[0], values[1]);
+                (1.0 - dielectric(cosine, eta)) * kept(rho, eta, mean_dielectric(eta))
+            }
+            Absorber::RoughPlastic { coat, .. } => {
+                let (rho, eta) = (values[0], values[1]);
+                let facets = self.leaf.facets([eta, 0.0], || {
+                    ((0..FACET_COSINES).map(|j| dielectric(facet_cosine(j), eta)).collect(), 0.0)
+                });
+                let reflected = mean(&facets.0);
+                let enters = 1.0 - coat.reflected(eta, false, cosine);
+                1.0 - reflected - enters * (1.0 - kept(rho, eta, coat.mean_reflected(eta, false)))
+            }
+        };
+        emittance.max(0.0)
+    }
+}
+
+impl Leaf<'_> {
+    /// Whether ε is the same in all directions.
+    fn is_even(&self) -> bool {
+        match self.absorber {
+            Absorber::Black => true,
+            Absorber::Diffuse => self.two_sided,
+            _ => false,
+        }
+    }
+}
+
+/// `scene` with the heat of its surfaces as emission of objects.
+pub fn as_emission(scene: &Scene) -> Heat<'_> {
+    let kinds = vec![Kind::Lamp; scene.objects.len()];
+    let mut heat = Heat { scene: Cow::Borrowed(scene), by_angle: Vec::new(), radiating: Vec::new(), kinds };
+    if scene.materials.iter().all(|material| material.temperature.is_none()) {
+        return heat;
+    }
+    let mut lit = scene.clone();
+    let mut made: Vec<((MaterialId, OfLamp), (SpectrumId, Kind))> = Vec::new();
+    for (index, object) in scene.objects.iter().enumerate() {
+        let Some(material) = object.material else { continue };
+        let emitted = object.emission.as_ref().map(|e| (e.radiance, e.sides == Sides::Both));
+        let known = made.iter().find(|(key, _)| *key == (material, emitted)).map(|(_, made)| *made);
+        let (radiance, kind) = match known {
+            Some(known) => known,
+            None => {
+                let mut parts = Vec::new();
+                collect(scene, material, 1.0, &[], None, &mut parts);
+                if parts.is_empty() {
+                    continue;
+                }
+                let by_place = parts.iter().any(|part| part.differs_by_place(scene));
+                let leaves: Vec<Leaf> = match by_place {
+                    true => parts.iter().flat_map(|part| part.typical(scene)).collect(),
+                    false => parts.iter().map(|part| part.leaf(scene)).collect(),
+                };
+                let name = format!("heat of \"{}\"", scene.materials[material].name);
+                let of_lamp = |back: bool| {
+                    emitted.filter(|(_, both)| *both || !back).map(|(spectrum, _)| &scene.spectra[spectrum].curve)
+                };
+                let mut push = |curve: Curve| {
+                    lit.spectra.push(Spectrum { name: name.clone(), curve });
+                    lit.spectra.len() - 1
+                };
+                let even = leaves.iter().all(Leaf::is_even) && emitted.is_none_or(|(_, both)| both);
+                let new = if by_place {
+                    let typical = radiance(of_lamp(false), &leaves, TYPICAL_COSINE, false, &scene.channels);
+                    heat.radiating.push(Radiating { parts, lamp: emitted });
+                    (push(typical), Kind::ByPlace(heat.radiating.len() - 1))
+                } else if even {
+                    (push(radiance(of_lamp(false), &leaves, 1.0, false, &scene.channels)), Kind::Lamp)
+                } else {
+                    let row = |back: bool| -> Vec<Curve> {
+                        let cosine = |j: usize| (j as f64 / (COSINES - 1) as f64).powi(3);
+                        let at = |j: usize| radiance(of_lamp(back), &leaves, cosine(j), back, &scene.channels);
+                        (0..COSINES).map(at).collect()
+                    };
+                    let front = row(false);
+                    // Lights are chosen by what they send typically.
+                    let typical = front[(TYPICAL_COSINE.cbrt() * (COSINES - 1) as f64) as usize].clone();
+                    let same = leaves.iter().all(|leaf| leaf.two_sided) && emitted.is_none_or(|(_, both)| both);
+                    let front: Vec<SpectrumId> = front.into_iter().map(&mut push).collect();
+                    let back = if same { front.clone() } else { row(true).into_iter().map(&mut push).collect() };
+                    heat.by_angle.push([front, back]);
+                    (push(typical), Kind::ByAngle(heat.by_angle.len() - 1))
+                };
+                made.push(((material, emitted), new));
+                new
+            }
+        };
+        heat.kinds[index] = kind;
+        // A white surface is hot in vain.
+        if lit.spectra[radiance].curve != Curve::Constant(0.0) {
+            lit.objects[index].emission = Some(Emission { radiance, sides: Sides::Both });
+        }
+    }
+    lit.materials.iter_mut().for_each(|material| material.temperature = None);
+    heat.scene = Cow::Owned(lit);
+    heat
+}
+
+/// The hot parts of a material; `temperature`: of the blend around, for what has none of its own.
+fn collect(
+    scene: &Scene,
+    id: MaterialId,
+    weight: f64,
+    shares: &[Share],
+    temperature: Option<Temperature>,
+    out: &mut Vec<HotLeaf>,
+) {
+    let material = &scene.materials[id];
+    let temperature = material.temperature.or(temperature);
+    match (&material.bsdf, temperature) {
+        (Bsdf::Blend { a, b, weight: Weight::Constant(of_b) }, _) => {
+            collect(scene, *a, weight * (1.0 - of_b), shares, temperature, out);
+            collect(scene, *b, weight * of_b, shares, temperature, out);
+        }
+        (Bsdf::Blend { a, b, weight: Weight::Texture(texture) }, _) => {
+            let with = |missing| [shares, &[(*texture, missing)]].concat();
+            collect(scene, *a, weight, &with(true), temperature, out);
+            collect(scene, *b, weight, &with(false), temperature, out);
+        }
+        // Absorbs nothing.
+        (Bsdf::Dielectric { .. }, _) | (_, None) => {}
+        (_, Some(temperature)) if weight > 0.0 => {
+            out.push(HotLeaf { material: id, weight, shares: shares.to_vec(), temperature });
+        }
+        _ => {}
+    }
+}
+
+impl HotLeaf {
+    /// Whether what it emits depends on more than the cosine.
+    fn differs_by_place(&self, scene: &Scene) -> bool {
+        let bsdf = &scene.materials[self.material].bsdf;
+        let textured = match bsdf {
+            Bsdf::Diffuse { reflectance } | Bsdf::Plastic { reflectance, .. } => {
+                matches!(reflectance, Reflectance::Texture(_))
+            }
+            Bsdf::Conductor { roughness: [x, y], .. } => x != y && *x >= SMOOTH,
+            Bsdf::Dielectric { .. } | Bsdf::Blend { .. } | Bsdf::Black => false,
+        };
+        textured || !self.shares.is_empty() || matches!(self.temperature, Temperature::Texture(_))
+    }
+
+    /// What it emits, of a part that is the same all over.
+    fn leaf<'a>(&self, scene: &'a Scene) -> Leaf<'a> {
+        let material = &scene.materials[self.material];
+        let curve = |spectrum: SpectrumId| Cow::Borrowed(&scene.spectra[spectrum].curve);
+        let all_over = |reflectance: Reflectance| match reflectance {
+            Reflectance::Spectrum(spectrum) => curve(spectrum),
+            Reflectance::Texture(_) => unreachable!("textures differ by place"),
+        };
+        let Temperature::Constant(kelvin) = self.temperature else { unreachable!("textures differ by place") };
+        let (absorber, curves) = match material.bsdf {
+            Bsdf::Black => (Absorber::Black, vec![]),
+            Bsdf::Diffuse { reflectance } => (Absorber::Diffuse, vec![all_over(reflectance)]),
+            Bsdf::Conductor { eta, k, roughness, energy_compensation } => {
+                let absorber = match roughness[0] < SMOOTH {
+                    true => Absorber::Mirror,
+                    false => Absorber::RoughMetal {
+                        facets: FacetCosines::new(roughness),
+                        again: energy_compensation.then(|| ReflectionAlbedo::new(roughness)),
+                    },
+                };
+                (absorber, vec![curve(eta), curve(k)])
+            }
+            Bsdf::Plastic { reflectance, eta, roughness } => {
+                let absorber = match roughness < SMOOTH {
+                    true => Absorber::Varnish,
+                    false => Absorber::RoughPlastic {
+                        facets: FacetCosines::new([roughness; 2]),
+                        coat: DielectricAlbedo::new(roughness, index_range(&curve(eta), &scene.channels)),
+                    },
+                };
+                (absorber, vec![all_over(reflectance), curve(eta)])
+            }
+            Bsdf::Dielectric { .. } | Bsdf::Blend { .. } => unreachable!("`collect` has none"),
+        };
+        Leaf {
+            weight: self.weight,
+            kelvin,
+            two_sided: material.two_sided,
+            absorber,
+            curves,
+            facets: RefCell::default(),
+        }
+    }
+
+    /// What it emits on the whole, for choosing among lights: facets lie flat, textures are their means, of temperatures a
+    /// few. Something wherever the part emits anywhere.
+    fn typical<'a>(&self, scene: &'a Scene) -> Vec<Leaf<'a>> {
+        let material = &scene.materials[self.material];
+        let curve = |spectrum: SpectrumId| Cow::Borrowed(&scene.spectra[spectrum].curve);
+        let mean = |reflectance: Reflectance| match reflectance {
+            Reflectance::Spectrum(spectrum) => curve(spectrum),
+            Reflectance::Texture(texture) => Cow::Owned(textures::mean_reflectance(scene, texture)),
+        };
+        let share = |&(texture, missing): &Share| {
+            let mean = textures::mean_number(&scene.textures[texture]);
+            if missing { 1.0 - mean } else { mean }
+        };
+        let weight = self.weight * self.shares.iter().map(share).product::<f64>();
+        let temperatures = match self.temperature {
+            Temperature::Constant(kelvin) => vec![(1.0, kelvin)],
+            Temperature::Texture(texture) => textures::typical_numbers(&scene.textures[texture]),
+        };
+        let leaf = |(share, kelvin): (f64, f64)| {
+            let (absorber, curves) = match material.bsdf {
+                Bsdf::Black => (Absorber::Black, vec![]),
+                Bsdf::Diffuse { reflectance } => (Absorber::Diffuse, vec![mean(reflectance)]),
+                Bsdf::Conductor { eta, k, .. } => (Absorber::Mirror, vec![curve(eta), curve(k)]),
+                Bsdf::Plastic { reflectance, eta, .. } => (Absorber::Varnish, vec![mean(reflectance), curve(eta)]),
+                Bsdf::Dielectric { .. } | Bsdf::Blend { .. } => unreachable!("`collect` has none"),
+            };
+            let two_sided = material.two_sided;
+            Leaf { weight: weight * share, kelvin, two_sided, absorber, curves, facets: RefCell::default() }
+        };
+        temperatures.into_iter().map(leaf).collect()
+    }
+}
+
+/// E + Σ w ε B(λ, T) at a cosine, within `channels`.
+fn radiance(emitted: Option<&Curve>, leaves: &[Leaf], cosine: f64, back: bool, channels: &Channels) -> Curve {
+    let seen: Vec<Seen> = leaves.iter().map(|leaf| leaf.seen(cosine, back)).collect();
+    if emitted.is_none() && leaves.iter().all(|leaf| leaf.kelvin == leaves[0].kelvin) {
+        // Grey: Planck's law itself.
+        let grey = |seen: &Seen| {
+            let leaf = seen.leaf;
+            let values: Option<Vec<f64>> =
+                leaf.curves.iter().map(|c| c.is_constant().then(|| c.eval(channels.centre(0)))).collect();
+            values.map(|values| leaf.weight * seen.emittance(&values))
+        };
+        let scale: Option<f64> = seen.iter().map(grey).sum();
+        match scale {
+            Some(0.0) => return Curve::Constant(0.0),
+            Some(scale) => return Curve::Blackbody { kelvin: leaves[0].kelvin, scale },
+            None => {}
+        }
+    }
+    let tables = emitted.into_iter().chain(leaves.iter().flat_map(|leaf| leaf.curves.iter().map(|curve| &**curve)));
+    let tables: Vec<&Curve> = tables.collect();
+    let at = |nm: f64, values: &[f64]| {
+        let (lamp, mut values) = values.split_at(usize::from(emitted.is_some()));
+        let mut of_leaf = |seen: &Seen| {
+            let leaf = seen.leaf;
+            let (own, rest) = values.split_at(leaf.curves.len());
+            values = rest;
+            leaf.weight * seen.emittance(own) * planck::radiance(nm, leaf.kelvin)
+        };
+        seen.iter().map(&mut of_leaf).sum::<f64>() + lamp.iter().sum::<f64>()
+    };
+    Curve::derived_by_stretch(&tables, channels, at)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spectral::Outside;
+
+    fn leaf<'a>(reflectance: Option<&'a Curve>, weight: f64, kelvin: f64) -> Leaf<'a> {
+        let absorber = if reflectance.is_some() { Absorber::Diffuse } else { Absorber::Black };
+        let curves = reflectance.into_iter().map(Cow::Borrowed).collect();
+        Leaf { weight, kelvin, two_sided: true, absorber, curves, facets: RefCell::default() }
+    }
+
+    /// Means of every channel to 2e-5, also 30 orders below the peak.
+    #[test]
+    fn sums_keep_their_means_in_every_channel() {
+        let channels = Channels::from_bounds(vec![[540.0, 560.0], [3e3, 5e3], [8e3, 14e3], [10e3, 12e3]], None);
+        let rho = Curve::Linear { nm: vec![380.0, 20e3], value: vec![0.2, 0.9], outside: Outside::Hold };
+        let step = Curve::Linear {
+            nm: vec![4e3, 9e3, 9e3, 20e3],
+            value: vec![1e-3, 1e-3, 2e-3, 2e-3],
+            outside: Outside::Zero,
+        };
+        let leaves = [leaf(Some(&rho), 0.25, 300.0), leaf(None, 0.75, 400.0)];
+        for emitted in [None, Some(&step)] {
+            let curve = radiance(emitted, &leaves, 1.0, false, &channels);
+            for &[from, to] in &channels.bounds {
+                const STEPS: u32 = 200_000;
+                let at = |i: u32| {
+                    let nm = from + (to - from) * (f64::from(i) + 0.5) / f64::from(STEPS);
+                    emitted.map_or(0.0, |e| e.eval(nm))
+                        + 0.25 * (1.0 - rho.eval(nm)) * planck::radiance(nm, 300.0)
+                        + 0.75 * planck::radiance(nm, 400.0)
+                };
+                let want = (0..STEPS).map(at).sum::<f64>() / f64::from(STEPS);
+                let got = curve.mean(from, to);
+                assert!((got / want - 1.0).abs() < 2e-5, "{from}-{to}: {got} {want}");
+            }
+        }
+    }
+
+    #[test]
+    fn grey_heat_is_plancks_law() {
+        let channels = Channels::equal(8e3, 14e3, 3);
+        let (half, white) = (Curve::Constant(0.5), Curve::Constant(1.0));
+        let mixed = radiance(None, &[leaf(Some(&half), 0.5, 300.0), leaf(None, 0.5, 300.0)], 1.0, false, &channels);
+        assert_eq!(mixed, Curve::Blackbody { kelvin: 300.0, scale: 0.75 });
+        assert_eq!(radiance(None, &[leaf(Some(&white), 1.0, 300.0)], 1.0, false, &channels), Curve::Constant(0.0));
+    }
+}

@@ -1,0 +1,485 @@
+//! Media of a scene as devices get them: volumes in their places, and what lies behind each primitive.
+
+use glam::{DAffine3, DVec3};
+
+use crate::device::accel::Accel;
+use crate::device::part::{Part, Place, Records, SceneBuffer};
+use crate::device::parts::origins::{Cut, Origins};
+use crate::device::parts::surfaces::{Needed, wavelength};
+use crate::device::text::{Module, module};
+use crate::device::words::{NONE, NULL_BOUNDARY, Primitive, VOLUME_EMITS, VOLUME_GRID, VOLUME_WORDS, VOLUMES_HEAD};
+use crate::scene::{Bsdf, Field, Interior, MaterialId, Medium, Scene, SpectrumId};
+use crate::spectral::{Curve, planck};
+use crate::{Error, Result};
+
+/// Numbers of volumes have 8 bits in a path's state, of which 0 is none.
+const MOST_VOLUMES: usize = 254;
+const HEAD: usize = VOLUMES_HEAD as usize;
+const WORDS: usize = VOLUME_WORDS as usize;
+/// Stretches through media that one straight way may have.
+const MOST_STRETCHES: u32 = 16;
+
+pub const MEDIA: Part = Part {
+    name: "media",
+    used: |scene| scene.media.is_some(),
+    effect: |_| "16 bytes a path, a record for each stretch of a way".into(),
+    is_planned: true,
+    modules: &[
+        (Place::Generate, VOLUME),
+        (Place::Generate, module!("parts/media/medium.wgsl")),
+        (Place::Stage, module!("stages/meet/media.wgsl")),
+        (Place::Evaluate, module!("parts/media/extinction.wgsl")),
+    ],
+    lines: &[
+        ("LIGHT_TAKES_RECORDS", "if (light_is_dimmed(way)) { return true; }"),
+        ("LIGHT_RECORDS", "append_light_way(list, way, aim);"),
+        ("PASSED", "pass_surface(&path, site, choice.direction, &overflow);"),
+    ],
+    defines: |scene, _, defines| {
+        let Some(media) = &scene.media else { return };
+        defines.set("MEDIA", true);
+        defines.constant("OUTER_VOLUME", media.outer).constant("MOST_STRETCHES", media.stretches);
+    },
+    buffers: |scene| {
+        let buffers = scene.prepared.media.as_ref().map(|media| {
+            [
+                SceneBuffer::new("volumes", &media.volumes, CONTENT, "smaller grids"),
+                SceneBuffer::new("boundaries", &media.boundaries, "the geometry of the scene", "fewer triangles"),
+            ]
+        });
+        buffers.into_iter().flatten().collect()
+    },
+    // The way to each vertex, and from each to a light; a vertex that aims through a medium has no record for both.
+    records: |scene| {
+        let way = scene.media.as_ref().map_or(0, Media::way_records);
+        Records { way, vertex: way + 2, path: 0 }
+    },
+    state_words: 2,
+    example: Some(|exhibit| exhibit.add_gas()),
+};
+
+const VOLUME: Module = module!("parts/media/volume.wgsl");
+const CONTENT: &str = "the media of the scene";
+
+/// In the place of media, in general scenes.
+pub const VACUUM: Part = Part {
+    name: "vacuum",
+    used: |scene| scene.is_general() && scene.media.is_none(),
+    modules: &[(Place::Stage, module!("stages/meet/vacuum.wgsl"))],
+    ..Part::NOTHING
+};
+
+pub const CAMERA_CUT: Part = Part {
+    name: "camera rays that start in different media",
+    used: |scene| scene.media.as_ref().is_some_and(|media| media.camera_is_cut),
+    effect: |_| "a way through the lens or window for each path".into(),
+    is_planned: true,
+    modules: &[(Place::Generate, module!("parts/media/camera_cut.wgsl"))],
+    lines: &[("CAMERA_STARTS", "    nested = volumes_at(ray.origin, overflow);")],
+    ..Part::NOTHING
+};
+
+pub const VOXELS: Part = Part {
+    name: "media of voxels",
+    used: |scene| scene.media.as_ref().is_some_and(Media::has_grids),
+    effect: |_| "a march through its cells for each stretch and channel".into(),
+    is_planned: true,
+    modules: &[(Place::Evaluate, VOLUME)],
+    defines: |scene, _, defines| {
+        defines.set("GRIDS", true).set("MOST_COLUMNS", scene.media.as_ref().map_or(0, |media| media.most_columns));
+    },
+    buffers: |scene| {
+        let voxels = scene.prepared.media.as_ref().map(|media| &media.voxels);
+        voxels.map(|voxels| SceneBuffer::new("voxels", voxels, CONTENT, "smaller grids")).into_iter().collect()
+    },
+    example: Some(|exhibit| exhibit.add_voxels()),
+    ..Part::NOTHING
+};
+
+/// Absorption and emission that evaluation works out.
+pub const PLANCK: Part = Part {
+    name: "emission where paths are evaluated",
+    used: |scene| scene.media.is_some() || scene.wavelength.is_some(),
+    modules: &[(Place::Evaluate, module!("common/planck.wgsl"))],
+    defines: |scene, _, defines| {
+        if let Some(wavelength) = scene.wavelength {
+            defines.set("PLANCK", true).constant("WAVELENGTH", wavelength);
+        }
+    },
+    ..Part::NOTHING
+};
+
+/// Everything about media that a device needs. Spectra are positions in `spectra` until [`Media::name_spectra`].
+pub struct Media {
+    pub volumes: Vec<u32>,
+    pub voxels: Vec<f32>,
+    /// One for each primitive.
+    pub boundaries: Vec<u32>,
+    pub spectra: Vec<Needed>,
+    /// The number of the medium outside all interiors, or [`NONE`].
+    pub outer: u32,
+    /// Whether camera rays start in different media.
+    pub camera_is_cut: bool,
+    pub most_absorbers: u32,
+    pub most_columns: u32,
+    /// Stretches of one way, and voxels that it may go through.
+    pub stretches: u32,
+    pub cells: u32,
+    /// Position of the wavelength among `spectra`, where there are grids.
+    pub wavelength: Option<u32>,
+    /// Words of `volumes` that are positions in `spectra`.
+    spectrum_words: Vec<usize>,
+}
+
+/// A medium in a place: of one body, or of all space.
+struct Volume<'a> {
+    medium: &'a Medium,
+    interior: Option<Interior>,
+    /// The index of refraction behind its surface over that before, where that is a dielectric; then the index there, of all
+    /// bodies around it: radiance in matter is n² of that in a vacuum, and so are sources.
+    index: Option<Curve>,
+}
+
+impl Media {
+    /// `None` where the scene has no media. Errors: more volumes than numbers, or around the camera than a path can hold.
+    pub fn new(scene: &Scene, accel: &Accel) -> Result<Option<Media>> {
+        if scene.media.is_empty() {
+            return Ok(None);
+        }
+        let mut volumes: Vec<Volume> = Vec::new();
+        let mut of_object = vec![0u32; scene.objects.len()];
+        for (object, number) in scene.objects.iter().zip(&mut of_object) {
+            let Some(interior) = object.interior else { continue };
+            let known = volumes.iter().position(|v| v.interior.is_some_and(|i| i.body == interior.body));
+            let index = known.unwrap_or_else(|| {
+                let index = object.material.and_then(|material| index(scene, material));
+                volumes.push(Volume { medium: &scene.media[interior.medium], interior: Some(interior), index });
+                volumes.len() - 1
+            });
+            *number = index as u32 + 1;
+        }
+        let mut outer = NONE;
+        if let Some(medium) = scene.camera_medium {
+            outer = volumes.len() as u32;
+            volumes.push(Volume { medium: &scene.media[medium], interior: None, index: None });
+        }
+        if volumes.len() > MOST_VOLUMES {
+            let message = format!("{} interiors with media, at most {MOST_VOLUMES} are supported", volumes.len());
+            return Err(Error::input(&scene.file, message));
+        }
+        let boundary = |&object: &u32| {
+            let null = scene.objects[object as usize].material.is_none();
+            of_object[object as usize] | if null { NULL_BOUNDARY } else { 0 }
+        };
+        let mut media = Media {
+            volumes: vec![0; HEAD],
+            voxels: Vec::new(),
+            boundaries: accel.objects.iter().map(boundary).collect(),
+            spectra: Vec::new(),
+            outer,
+            camera_is_cut: false,
+            most_absorbers: 0,
+            most_columns: 0,
+            stretches: (2 * volumes.len() as u32 + 1).clamp(4, MOST_STRETCHES),
+            cells: 0,
+            wavelength: None,
+            spectrum_words: Vec::new(),
+        };
+        media.volumes.resize(HEAD + WORDS * volumes.len(), 0);
+        media.volumes[0] = (1.0 / accel.space.scale as f32).to_bits();
+        let within: Vec<Option<Curve>> = (0..volumes.len())
+            .map(|i| product_of_indices(scene, &volumes, &media.bodies_around(i as u32 + 1, &accel.primitives)))
+            .collect();
+        for (index, (volume, within)) in volumes.iter_mut().zip(within).enumerate() {
+            volume.index = within;
+            media.fill(scene, accel, index, volume);
+        }
+        media.place_camera(scene, accel)?;
+        Ok(Some(media))
+    }
+
+    pub fn has_grids(&self) -> bool {
+        self.wavelength.is_some()
+    }
+
+    /// Records of one way: a stretch takes three where it has a grid.
+    pub fn way_records(&self) -> u32 {
+        self.stretches * if self.has_grids() { 3 } else { 1 }
+    }
+
+    /// Moves its spectra to the end of `all`; positions are then those there.
+    pub fn move_spectra(&mut self, all: &mut Vec<Needed>) {
+        let first = all.len();
+        all.append(&mut self.spectra);
+        self.name_spectra(|position| (first + position) as u32);
+    }
+
+    /// Replaces positions of spectra by the ids that the device's tables gave them.
+    pub fn name_spectra(&mut self, id: impl Fn(usize) -> u32) {
+        for &word in &self.spectrum_words {
+            self.volumes[word] = id(self.volumes[word] as usize);
+        }
+        self.wavelength = self.wavelength.map(|position| id(position as usize));
+    }
+
+    fn fill(&mut self, scene: &Scene, accel: &Accel, index: usize, volume: &Volume) {
+        let first = HEAD + WORDS * index;
+        let medium = volume.medium;
+        let constant = |field: &Field| match field {
+            Field::Constant(value) => Some(*value),
+            Field::Grid(_) => None,
+        };
+        let mut words = [0u32; WORDS];
+        words[2] = NONE;
+        words[0] = if medium.temperature.is_some() { VOLUME_EMITS } else { 0 };
+        let Some(size) = medium.grid_size() else {
+            let kelvin = medium.temperature.as_ref().and_then(constant);
+            let density = constant(&medium.density).unwrap_or(1.0);
+            let (curves, factors) = terms(medium, kelvin, density);
+            let tables: Vec<&Curve> = curves.iter().map(|&s| &scene.spectra[s].curve).collect();
+            let sum = |v: &[f64]| v.iter().zip(&factors).map(|(v, f)| v * f).sum::<f64>();
+            let absorption = Curve::derived(&tables, &scene.channels, sum);
+            words[1] = self.spectrum(first + 1, format!("medium \"{}\"", medium.name), absorption, true);
+            if let Some(kelvin) = kelvin.filter(|kelvin| *kelvin > 0.0) {
+                let source = source(scene, kelvin, volume.index.as_ref());
+                words[2] = self.spectrum(first + 2, format!("black body at {kelvin} K"), source, false);
+            }
+            self.volumes[first..first + WORDS].copy_from_slice(&words);
+            return;
+        };
+        words[0] |= VOLUME_GRID;
+        let mut grid = |field: Option<&Field>| match field {
+            Some(Field::Grid(grid)) => {
+                self.voxels.extend_from_slice(&grid.values);
+                ((self.voxels.len() - grid.values.len()) as u32, 0.0)
+            }
+            Some(Field::Constant(value)) => (NONE, *value),
+            None => (NONE, 0.0),
+        };
+        let (temperature, density) = (grid(medium.temperature.as_ref()), grid(Some(&medium.density)));
+        (words[3], words[5]) = (temperature.0, (temperature.1 as f32).to_bits());
+        (words[4], words[6]) = (density.0, (density.1 as f32).to_bits());
+        words[7..10].copy_from_slice(&size);
+        let interior = volume.interior.expect("grids fill interiors");
+        let from_device = DAffine3::from_translation(accel.space.center)
+            * DAffine3::from_scale(DVec3::splat(1.0 / accel.space.scale));
+        let scaled = DAffine3::from_scale(DVec3::from(size.map(f64::from))) * interior.to_grid * from_device;
+        let rows = scaled.matrix3.transpose();
+        for (i, value) in [rows.x_axis, rows.y_axis, rows.z_axis, scaled.translation].iter().enumerate() {
+            let bits = value.as_vec3().to_array().map(f32::to_bits);
+            words[10 + 3 * i..13 + 3 * i].copy_from_slice(&bits);
+        }
+        words[23] = NONE;
+        if let Some(index) = &volume.index {
+            words[23] = self.spectrum(first + 23, format!("index in \"{}\"", medium.name), index.clone(), false);
+        }
+        words[22] = self.volumes.len() as u32;
+        self.volumes[first..first + WORDS].copy_from_slice(&words);
+        self.volumes.push(medium.absorbers.len() as u32);
+        for absorber in &medium.absorbers {
+            self.volumes.extend([(absorber.strength as f32).to_bits(), absorber.columns.len() as u32]);
+            for &(kelvin, spectrum) in &absorber.columns {
+                self.volumes.push((kelvin as f32).to_bits());
+                let word = self.volumes.len();
+                let curve = scene.spectra[spectrum].curve.clone();
+                let position = self.spectrum(word, scene.spectra[spectrum].name.clone(), curve, true);
+                self.volumes.push(position);
+            }
+            self.most_columns = self.most_columns.max(absorber.columns.len() as u32);
+        }
+        self.most_absorbers = self.most_absorbers.max(medium.absorbers.len() as u32);
+        self.cells += size.iter().sum::<u32>() + 3;
+        if self.wavelength.is_none() {
+            self.wavelength = Some(self.spectra.len() as u32);
+            self.spectra.push(wavelength(scene));
+        }
+    }
+
+    /// Notes a spectrum for word `word` and gives its position. `pointwise`: wherever it is small it is as exact as elsewhere.
+    fn spectrum(&mut self, word: usize, name: String, curve: Curve, pointwise: bool) -> u32 {
+        self.spectrum_words.push(word);
+        let needed = if pointwise { Needed::Pointwise(name, curve) } else { Needed::Derived(name, curve) };
+        let known = self.spectra.iter().position(|s| *s == needed);
+        known.unwrap_or_else(|| {
+            self.spectra.push(needed);
+            self.spectra.len() - 1
+        }) as u32
+    }
+
+    /// Notes the volumes around the camera, the innermost in the low byte; where boundaries cut its lens or window, those around a
+    /// place there, from which devices find those of each ray.
+    fn place_camera(&mut self, scene: &Scene, accel: &Accel) -> Result<()> {
+        let mut place = (scene.camera.position - accel.space.center) * accel.space.scale;
+        if let Some(origins) = Origins::of(scene, &accel.space) {
+            let boundaries =
+                accel.primitives.iter().zip(&self.boundaries).filter(|(_, boundary)| **boundary & 0xff != 0);
+            let cuts: Vec<Cut> = boundaries.filter_map(|(primitive, _)| origins.cut(primitive)).collect();
+            if !cuts.is_empty() {
+                let on_device = origins.place_apart_from(&cuts).as_vec3();
+                place = on_device.as_dvec3();
+                self.camera_is_cut = true;
+                self.volumes[3] = self.volumes.len() as u32;
+                self.volumes.extend(on_device.to_array().map(f32::to_bits));
+            }
+        }
+        let Some(around) = self.around(place, &accel.primitives) else {
+            return Err(Error::input(&scene.file, "the camera is inside more than 8 nested media"));
+        };
+        self.volumes[1..3].copy_from_slice(&[around as u32, (around >> 32) as u32]);
+        Ok(())
+    }
+
+    /// Volume `number` and those around it, as they are at one place of its surface; the innermost first.
+    fn bodies_around(&self, number: u32, primitives: &[Primitive]) -> Vec<u32> {
+        let own = primitives.iter().zip(&self.boundaries).find(|(_, boundary)| **boundary & 0xff == number);
+        let around = own.map(|(primitive, _)| self.list_around(place_on(primitive), primitives)).unwrap_or_default();
+        let outer = around.into_iter().filter(|other| *other != number);
+        std::iter::once(number).chain(outer).collect()
+    }
+
+    /// The volumes around a point in device units; `None` where they are more than a path can hold.
+    fn around(&self, point: DVec3, primitives: &[Primitive]) -> Option<u64> {
+        let around = self.list_around(point, primitives);
+        (around.len() <= 8).then(|| around.iter().rev().fold(0, |word, &n| word << 8 | u64::from(n)))
+    }
+
+    /// The volumes around a point in device units, the innermost first.
+    fn list_around(&self, point: DVec3, primitives: &[Primitive]) -> Vec<u32> {
+        // No edge of a model is likely to lie in this direction.
+        let direction = DVec3::new(0.367_879_441, 0.577_215_664, 0.728_913_7).normalize();
+        let mut crossings: Vec<(f64, u32, bool)> = Vec::new();
+        for (primitive, boundary) in primitives.iter().zip(&self.boundaries) {
+            let number = boundary & 0xff;
+            if number != 0 {
+                meet(primitive, point, direction, &mut |t, leaving| crossings.push((t, number, leaving)));
+            }
+        }
+        crossings.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // What is left before it is entered is around the point; what is left first is innermost.
+        let mut around: Vec<u32> = Vec::new();
+        let mut entered: Vec<u32> = Vec::new();
+        for (_, number, leaving) in crossings {
+            if !leaving {
+                entered.push(number);
+            } else if let Some(at) = entered.iter().rposition(|n| *n == number) {
+                entered.remove(at);
+            } else {
+                around.push(number);
+            }
+        }
+        around.extend((self.outer != NONE).then_some(self.outer + 1));
+        around
+    }
+}
+
+/// What sources are multiplied with twice in a body of `material`: its index; the mean over channels where it does not disperse.
+fn index(scene: &Scene, material: MaterialId) -> Option<Curve> {
+    let Bsdf::Dielectric { eta, dispersion, .. } = scene.materials[material].bsdf else { return None };
+    let (curve, bounds) = (&scene.spectra[eta].curve, &scene.channels.bounds);
+    let mean = || bounds.iter().map(|b| curve.mean(b[0], b[1])).sum::<f64>() / bounds.len() as f64;
+    Some(if dispersion { curve.clone() } else { Curve::Constant(mean()) })
+}
+
+/// The index of a place in volumes (numbers + 1), each of which knows its own over what is around it; `None` where none has one.
+fn product_of_indices(scene: &Scene, volumes: &[Volume], around: &[u32]) -> Option<Curve> {
+    let curves = around.iter().filter_map(|number| volumes.get(*number as usize - 1)?.index.as_ref());
+    let curves: Vec<&Curve> = curves.collect();
+    match curves[..] {
+        [] => None,
+        [one] => Some(one.clone()),
+        _ => Some(Curve::derived(&curves, &scene.channels, |v| v.iter().product())),
+    }
+}
+
+/// A point on a primitive.
+fn place_on(p: &Primitive) -> DVec3 {
+    let [a, b, c] = [p.a, p.b, p.c].map(|v| DVec3::from(v.map(f64::from)));
+    match p.tag >> 24 {
+        1 => a + b.x * DVec3::Z,
+        2 => a,
+        3 => 0.5 * (a + b) + c.x * (b - a).any_orthogonal_vector().normalize(),
+        _ => (a + b + c) / 3.0,
+    }
+}
+
+/// n² B(λ, T).
+fn source(scene: &Scene, kelvin: f64, index: Option<&Curve>) -> Curve {
+    let Some(index) = index else { return Curve::Blackbody { kelvin, scale: 1.0 } };
+    if index.is_constant() {
+        return Curve::Blackbody { kelvin, scale: index.eval(scene.channels.centre(0)).powi(2) };
+    }
+    Curve::derived_by_stretch(&[index], &scene.channels, |nm, v| planck::radiance(nm, kelvin) * v[0] * v[0])
+}
+
+/// Spectra and factors whose sum is the absorption of a homogeneous medium, m⁻¹.
+pub fn terms(medium: &Medium, kelvin: Option<f64>, density: f64) -> (Vec<SpectrumId>, Vec<f64>) {
+    let mut all = Vec::new();
+    for absorber in &medium.absorbers {
+        let (columns, strength) = (&absorber.columns, absorber.strength * density);
+        let above = kelvin.map_or(0, |kelvin| columns.partition_point(|column| column.0 < kelvin));
+        let high = above.min(columns.len() - 1);
+        let low = above.max(1) - 1;
+        if low == high || columns.len() == 1 {
+            all.push((columns[high].1, strength));
+            continue;
+        }
+        let kelvin = kelvin.expect("a table over temperature has one to look up");
+        let place = (kelvin - columns[low].0) / (columns[high].0 - columns[low].0);
+        all.extend([(columns[low].1, strength * (1.0 - place)), (columns[high].1, strength * place)]);
+    }
+    all.into_iter().unzip()
+}
+
+/// Tells `crossing` where a ray meets a primitive, and whether it leaves what is behind it.
+fn meet(p: &Primitive, origin: DVec3, direction: DVec3, crossing: &mut impl FnMut(f64, bool)) {
+    let [a, b, c] = [p.a, p.b, p.c].map(|v| DVec3::from(v.map(f64::from)));
+    let mut found = |t: f64, normal: DVec3| {
+        if t > 0.0 {
+            crossing(t, normal.dot(direction) > 0.0);
+        }
+    };
+    let f = origin - a;
+    match p.tag >> 24 {
+        1 => {
+            let (half, rest) = (f.dot(direction), f.length_squared() - b.x * b.x);
+            let square = half * half - rest;
+            if square > 0.0 {
+                for t in [-half - square.sqrt(), -half + square.sqrt()] {
+                    found(t, f + t * direction);
+                }
+            }
+        }
+        2 => {
+            let t = -f.dot(b) / direction.dot(b);
+            if (f + t * direction).length() <= c.x {
+                found(t, b);
+            }
+        }
+        3 => {
+            let axis = (b - a).normalize();
+            let across = |v: DVec3| v - v.dot(axis) * axis;
+            let (g, d) = (across(f), across(direction));
+            let (half, dd) = (g.dot(d), d.length_squared());
+            let square = half * half - dd * (g.length_squared() - c.x * c.x);
+            if square > 0.0 && dd > 0.0 {
+                for t in [(-half - square.sqrt()) / dd, (-half + square.sqrt()) / dd] {
+                    if (0.0..=(b - a).length()).contains(&(f + t * direction).dot(axis)) {
+                        found(t, g + t * d);
+                    }
+                }
+            }
+        }
+        _ => {
+            // Möller and Trumbore 1997.
+            let (e1, e2) = (b - a, c - a);
+            let h = direction.cross(e2);
+            let determinant = e1.dot(h);
+            let u = f.dot(h) / determinant;
+            let q = f.cross(e1);
+            let v = direction.dot(q) / determinant;
+            if determinant != 0.0 && u >= 0.0 && v >= 0.0 && u + v <= 1.0 {
+                found(e2.dot(q) / determinant, e1.cross(e2));
+            }
+        }
+    }
+}

@@ -1,0 +1,16 @@
+//! What each part of the renderer is on a device: its rows of [`PARTS`](crate::device::part::PARTS), and how the scene is flattened for
+//! it; its WGSL stands in the folder of the same name in `shaders/parts/`.
+
+pub mod attributes;
+pub mod camera;
+pub mod geometry;
+pub mod heat;
+pub mod lights;
+pub mod media;
+pub mod origins;
+pub mod paths;
+pub mod radiators;
+pub mod sky;
+pub mod spectra;
+pub mod surfaces;
+pub mod textures;

@@ -1,0 +1,712 @@
+//! Materials of general scenes as devices get them: lists of lobes, tables, and the spectra that these need.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use crate::device::part::{Part, Place, Records, SceneBuffer};
+use crate::device::parts::geometry::{FEWER_MATERIALS, MATERIALS};
+use crate::device::parts::lights::STEPS;
+use crate::device::parts::textures::{self, Share, Textures};
+use crate::device::text::{Module, module};
+use crate::device::words::{
+    ALBEDO_ROW, COSINE_INTERVALS, LOBE_BASE, LOBE_BEYOND_AGAIN, LOBE_BOUNDARY_AGAIN, LOBE_CONDUCTOR,
+    LOBE_CONDUCTOR_AGAIN, LOBE_DISPERSES, LOBE_LAMBERT, LOBE_MIRROR, LOBE_NARROW, LOBE_OPAQUE, LOBE_REFRACTION,
+    LOBE_ROUGH_BOUNDARY, LOBE_ROUGH_COAT, LOBE_ROUGH_CONDUCTOR, LOBE_TEXTURED, LOBE_TWO_SIDED, Lobe, MATERIAL_DIFFUSE,
+    MATERIAL_TRANSMITS, SurfaceMaterial,
+};
+use crate::scene::{
+    Attributes, Bsdf, MaterialId, Reflectance, SMOOTH, Scene, SpectrumId, Texture, TextureKind, Weight,
+};
+use crate::spectral::hemisphere::fresnel::{self, mean_conductor, mean_dielectric};
+use crate::spectral::hemisphere::{DielectricAlbedo, ReflectionAlbedo, ReflectionProbability, index_range};
+use crate::spectral::{Curve, Outside};
+
+/// What a lobe does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Kind {
+    Lambert = LOBE_LAMBERT,
+    Conductor = LOBE_CONDUCTOR,
+    RoughConductor = LOBE_ROUGH_CONDUCTOR,
+    ConductorAgain = LOBE_CONDUCTOR_AGAIN,
+    Mirror = LOBE_MIRROR,
+    Refraction = LOBE_REFRACTION,
+    RoughBoundary = LOBE_ROUGH_BOUNDARY,
+    BoundaryAgain = LOBE_BOUNDARY_AGAIN,
+    BeyondAgain = LOBE_BEYOND_AGAIN,
+    RoughCoat = LOBE_ROUGH_COAT,
+    Base = LOBE_BASE,
+}
+
+/// Intervals of the device's tables over the cosine.
+const INTERVALS: usize = COSINE_INTERVALS as usize;
+/// Values in a row of a table of albedos; what the numbers of tables over index and cosine count in.
+const ROW: usize = ALBEDO_ROW as usize;
+/// Boundaries whose indices are this near to 1 bend by an index this far from it where they are rough (`reference`).
+const MATCHED: f64 = 1e-4;
+
+/// A spectrum that materials need on the device.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Needed {
+    Scene(SpectrumId),
+    Derived(String, Curve),
+    /// Within the tables' bound of every value, not of each channel's peak.
+    Pointwise(String, Curve),
+    /// As `Derived`, and not to be approximated: other quantities depend on it steeply.
+    Exact(String, Curve),
+}
+
+/// The materials of a scene, flat. Spectra of lobes are positions in `spectra` until [`Surfaces::name_spectra`].
+#[derive(Default)]
+pub struct Surfaces {
+    pub materials: Vec<SurfaceMaterial>,
+    pub lobes: Vec<Lobe>,
+    pub tables: Vec<f32>,
+    pub spectra: Vec<Needed>,
+    /// Bit `kind` for each [`Kind`] that occurs.
+    pub kinds: u32,
+    pub rough_base: bool,
+    pub anisotropic: bool,
+    /// Some boundary may leave one channel of a path.
+    pub dispersion: bool,
+    /// Some rough boundary bends each channel by itself.
+    pub spread: bool,
+    /// Where any material has some.
+    pub textures: Option<Textures>,
+    /// Some reflectance is a texture; of a coated base.
+    pub textured: bool,
+    pub textured_base: bool,
+    /// Where textures are colours: the spectrum that says where in the visible a wavelength is.
+    pub visible_place: Option<u32>,
+    /// What blend textures leave of each lobe.
+    shares: Vec<Vec<Share>>,
+    /// Some surface carries texture coordinates, normals or axes; some of them shading normals.
+    pub attributes: bool,
+    pub smooth: bool,
+    /// Most records of a scattering event.
+    pub vertex_records: u32,
+    albedos: BTreeMap<[u64; 3], Arc<DielectricAlbedo>>,
+}
+
+/// Lists of lobes, and records that are instructions of a small program.
+pub const LOBES: Part = Part {
+    name: "materials of several lobes",
+    used: |scene| scene.is_general(),
+    effect: |_| "records of 16 bytes instead of 8".into(),
+    is_planned: true,
+    modules: &[
+        (Place::Generate, module!("common/record.wgsl")),
+        (Place::Generate, module!("common/append.wgsl")),
+        (Place::Generate, TABLES),
+        (Place::Generate, module!("parts/surfaces/material.wgsl")),
+        (Place::Generate, module!("parts/surfaces/ggx.wgsl")),
+        (Place::Generate, module!("parts/surfaces/bsdf.wgsl")),
+        (Place::Generate, module!("parts/surfaces/choice.wgsl")),
+        (Place::Evaluate, module!("common/record.wgsl")),
+        (Place::Evaluate, module!("common/program.wgsl")),
+    ],
+    defines: |scene, _, defines| {
+        let Some(surfaces) = &scene.surfaces else { return };
+        defines.set("GENERAL", true).constant("STATE_WORDS", scene.state_bytes() / 16);
+        defines.set("THIRD_STATE", scene.state_bytes() > 32);
+        for (name, kinds) in LOBES_OF_CODE {
+            defines.set(name, kinds.iter().any(|kind| surfaces.has(*kind)));
+        }
+        defines.set("ROUGH_BASE", surfaces.rough_base);
+        defines.set("OP_ETA_TABLE", surfaces.has(Kind::RoughBoundary) || surfaces.rough_base);
+    },
+    buffers: |scene| {
+        let Some(surfaces) = &scene.prepared.surfaces else { return Vec::new() };
+        vec![
+            SceneBuffer::new("surface_materials", &surfaces.materials, MATERIALS, FEWER_MATERIALS),
+            SceneBuffer::new("lobes", &surfaces.lobes, MATERIALS, FEWER_MATERIALS),
+            SceneBuffer::new("tables", &surfaces.tables, MATERIALS, FEWER_MATERIALS),
+        ]
+    },
+    records: |scene| Records { vertex: scene.surfaces.as_ref().map_or(0, |s| s.vertex_records), ..Records::NONE },
+    example: Some(|exhibit| exhibit.add_surfaces()),
+    ..Part::NOTHING
+};
+
+const TABLES: Module = module!("common/tables.wgsl");
+
+/// Code that some kinds of lobes share, by its switch.
+const LOBES_OF_CODE: [(&str, &[Kind]); 13] = [
+    ("MIRRORS", &[Kind::Conductor, Kind::Mirror, Kind::Refraction]),
+    ("MICROFACETS", &[Kind::RoughConductor, Kind::RoughCoat, Kind::RoughBoundary]),
+    ("GLASS", &[Kind::Mirror, Kind::RoughBoundary]),
+    ("CONDUCTOR", &[Kind::Conductor]),
+    ("ROUGH_CONDUCTOR", &[Kind::RoughConductor]),
+    ("CONDUCTOR_AGAIN", &[Kind::ConductorAgain]),
+    ("MIRROR", &[Kind::Mirror]),
+    ("REFRACTION", &[Kind::Refraction]),
+    ("ROUGH_GLASS", &[Kind::RoughBoundary]),
+    ("ROUGH_COAT", &[Kind::RoughCoat]),
+    ("BASE", &[Kind::Base]),
+    ("OP_CONDUCTOR", &[Kind::Conductor, Kind::RoughConductor]),
+    ("OP_FRESNEL", &[Kind::Mirror, Kind::Refraction, Kind::RoughBoundary, Kind::RoughCoat, Kind::Base]),
+];
+
+pub const BRUSHED: Part = Part {
+    name: "roughness along and across",
+    used: |scene| scene.surfaces.as_ref().is_some_and(|surfaces| surfaces.anisotropic),
+    modules: &[(Place::Generate, module!("parts/surfaces/tangent.wgsl"))],
+    defines: |_, _, defines| _ = defines.set("ANISOTROPIC", true),
+    example: Some(|exhibit| exhibit.add_brushed_metal()),
+    ..Part::NOTHING
+};
+
+/// Rough boundaries whose losses evaluation looks up, for each channel's index.
+pub const TABLES_IN_EVALUATION: Part = Part {
+    name: "tables over index and cosine",
+    used: |scene| scene.surfaces.as_ref().is_some_and(|s| s.has(Kind::BoundaryAgain) || s.rough_base),
+    modules: &[(Place::Evaluate, TABLES)],
+    example: Some(|exhibit| exhibit.add_rough_glass()),
+    ..Part::NOTHING
+};
+
+pub const DISPERSION: Part = Part {
+    name: "dispersion",
+    used: |scene| scene.surfaces.as_ref().is_some_and(|surfaces| surfaces.dispersion),
+    effect: |_| "16 bytes a path".into(),
+    is_planned: true,
+    modules: &[
+        (Place::Generate, module!("parts/spectra/channel.wgsl")),
+        (Place::Stage, module!("stages/leave_one_channel.wgsl")),
+    ],
+    lines: &[("ONLY_DIRECTION", "leave_one_channel(&list, &path, choice);")],
+    defines: |scene, _, defines| {
+        let spread = scene.surfaces.as_ref().is_some_and(|surfaces| surfaces.spread);
+        defines.set("DISPERSION", true).set("OP_ONLY", true);
+        defines.set("OP_ROUGH_TRANSMIT", spread).set("RAW_RECORDS", spread);
+    },
+    state_words: 1,
+    example: Some(|exhibit| exhibit.add_glass()),
+    ..Part::NOTHING
+};
+
+/// The one channel's index may have knots.
+pub const KNOTS_OF_ONE_CHANNEL: Part = Part {
+    name: "dispersion by exact knots",
+    used: |scene| scene.features.knots && (DISPERSION.used)(scene),
+    modules: &[(Place::Generate, super::spectra::KNOT_VALUES)],
+    ..Part::NOTHING
+};
+
+/// Flux that a lobe scatters per flux arriving: (from behind, cosine, channel).
+type Albedo = Box<dyn Fn(bool, f64, usize) -> f64>;
+
+/// A lobe under construction.
+struct Leaf {
+    lobe: Lobe,
+    /// Whether it scatters what comes from before, from behind.
+    active: [bool; 2],
+    albedo: Albedo,
+    /// What blend textures leave of it.
+    shares: Vec<Share>,
+    /// Records that one evaluation takes; 0 for the only directions of mirrors and ideal refraction.
+    records: u32,
+}
+
+impl Surfaces {
+    /// Parts and tables of all materials of `scene`.
+    pub fn new(scene: &Scene) -> Surfaces {
+        let carries = |f: &dyn Fn(&Attributes) -> bool| scene.objects.iter().any(|object| f(&object.attributes));
+        let mut surfaces = Surfaces {
+            attributes: carries(&|attributes| *attributes != Attributes::default()),
+            smooth: carries(&|attributes| attributes.normals.is_some()),
+            ..Surfaces::default()
+        };
+        for material in 0..scene.materials.len() {
+            let mut leaves = Vec::new();
+            surfaces.collect(scene, material, 1.0, &[], &mut leaves);
+            surfaces.add(scene, leaves);
+        }
+        if !scene.textures.is_empty() {
+            let mut textures = Textures::new(scene, |spectrum| surfaces.spectrum(spectrum));
+            textures.add_shares(&surfaces.shares);
+            if textures.colours {
+                let place = surfaces.derived("place in the visible".to_owned(), textures::visible_place());
+                surfaces.visible_place = Some(place);
+            }
+            surfaces.textures = Some(textures);
+        }
+        surfaces
+    }
+
+    pub fn has(&self, kind: Kind) -> bool {
+        self.kinds >> kind as u32 & 1 == 1
+    }
+
+    /// Replaces positions in `spectra` by the ids that the device's tables gave them.
+    pub fn name_spectra(&mut self, id: impl Fn(usize) -> u32) {
+        let both = |word: u32| id((word & 0xffff) as usize) | id((word >> 16) as usize) << 16;
+        let low = |word: u32| id((word & 0xffff) as usize) | word & 0xffff_0000;
+        self.visible_place = self.visible_place.map(|position| id(position as usize));
+        if let Some(textures) = &mut self.textures {
+            textures.name_spectra(&id);
+        }
+        for lobe in &mut self.lobes {
+            match lobe.kind & 0xff {
+                // A texture has its own.
+                k if k == Kind::Lambert as u32 && lobe.kind & LOBE_TEXTURED != 0 => {}
+                k if k == Kind::Conductor as u32 || k == Kind::RoughConductor as u32 => lobe.ab = both(lobe.ab),
+                k if k == Kind::Base as u32 && lobe.kind & LOBE_TEXTURED != 0 => {
+                    (lobe.ab, lobe.cd) = (low(lobe.ab), both(lobe.cd));
+                }
+                k if k == Kind::Base as u32 => (lobe.ab, lobe.cd) = (low(lobe.ab), low(lobe.cd)),
+                k if k == Kind::BoundaryAgain as u32 || k == Kind::BeyondAgain as u32 => {
+                    (lobe.ab, lobe.cd) = (low(lobe.ab), both(lobe.cd));
+                }
+                _ => lobe.ab = low(lobe.ab),
+            }
+        }
+        self.albedos.clear();
+        // Where nothing scatters, shaders still bind a lobe.
+        if self.lobes.is_empty() {
+            self.lobes.push(Lobe::default());
+        }
+    }
+
+    /// Appends a material of these leaves, with the probabilities of choosing each.
+    fn add(&mut self, scene: &Scene, leaves: Vec<Leaf>) {
+        let channels = scene.channels.len();
+        let mut survival = 0.0f64;
+        let mut picks = vec![Vec::with_capacity(2 * (INTERVALS + 1)); leaves.len()];
+        for side in 0..2 {
+            for node in 0..=INTERVALS {
+                let cosine = node as f64 / INTERVALS as f64;
+                let albedo = |leaf: &Leaf, k: usize| match leaf.active[side] {
+                    true => f64::from(leaf.lobe.weight) * (leaf.albedo)(side == 1, cosine, k).max(0.0),
+                    false => 0.0,
+                };
+                let (q, largest) = probabilities(&leaves, channels, &albedo);
+                survival = survival.max(largest);
+                for (l, q) in q.iter().enumerate() {
+                    picks[l].push(if leaves[l].active[side] { *q as f32 } else { 0.0 });
+                }
+            }
+        }
+        let diffuse = leaves.len() == 1 && leaves[0].lobe.kind & 0xff == Kind::Lambert as u32 && leaves[0].active[0];
+        let diffuse = diffuse && leaves[0].lobe.weight == 1.0 && leaves[0].lobe.kind & LOBE_TEXTURED == 0;
+        let diffuse = diffuse && leaves[0].shares.is_empty();
+        let transmits = leaves.iter().any(|leaf| leaf.lobe.kind & LOBE_OPAQUE == 0);
+        self.materials.push(SurfaceMaterial {
+            first_lobe: self.lobes.len() as u32,
+            lobe_count: leaves.len() as u32,
+            flags: if transmits { MATERIAL_TRANSMITS } else { 0 } | if diffuse { MATERIAL_DIFFUSE } else { 0 },
+            survival: ((survival.min(1.0) * STEPS).ceil() / STEPS) as f32,
+        });
+        let spread: u32 = leaves.iter().map(|leaf| leaf.records).sum();
+        self.vertex_records = self.vertex_records.max(spread + spread.max(2));
+        for (leaf, picks) in leaves.into_iter().zip(picks) {
+            self.kinds |= 1 << (leaf.lobe.kind & 0xff);
+            let picks = self.table(&picks);
+            self.lobes.push(Lobe { picks, ..leaf.lobe });
+            self.shares.push(leaf.shares);
+        }
+    }
+
+    /// The leaves of `material` with their shares of `weight`.
+    fn collect(&mut self, scene: &Scene, material: MaterialId, weight: f64, shares: &[Share], out: &mut Vec<Leaf>) {
+        if weight == 0.0 {
+            return;
+        }
+        let description = &scene.materials[material];
+        let (opaque, leaves) = match description.bsdf {
+            Bsdf::Black => (true, Vec::new()),
+            Bsdf::Diffuse { reflectance } => (true, self.diffuse(scene, reflectance)),
+            Bsdf::Conductor { eta, k, roughness, energy_compensation } => {
+                let rough = (roughness[0] >= SMOOTH).then_some(roughness);
+                (true, self.conductor(scene, &description.name, [eta, k], rough, energy_compensation))
+            }
+            Bsdf::Dielectric { eta, dispersion, roughness } => {
+                let range = index_range(&scene.spectra[eta].curve, &scene.channels);
+                let matched = range.iter().all(|eta| (eta - 1.0).abs() < MATCHED);
+                let leaves = match roughness >= SMOOTH && !matched {
+                    false => self.glass(scene, eta, dispersion),
+                    true => self.rough_glass(scene, &description.name, eta, dispersion, roughness),
+                };
+                (false, leaves)
+            }
+            Bsdf::Plastic { reflectance, eta, roughness } => {
+                let rough = (roughness >= SMOOTH).then_some(roughness);
+                (true, self.plastic(scene, &description.name, reflectance, eta, rough))
+            }
+            Bsdf::Blend { a, b, weight: Weight::Constant(of_b) } => {
+                self.collect(scene, a, weight * (1.0 - of_b), shares, out);
+                return self.collect(scene, b, weight * of_b, shares, out);
+            }
+            Bsdf::Blend { a, b, weight: Weight::Texture(texture) } => {
+                let with = |missing| [shares, &[(texture, missing)]].concat();
+                self.collect(scene, a, weight, &with(true), out);
+                return self.collect(scene, b, weight, &with(false), out);
+            }
+        };
+        let two_sided = description.two_sided;
+        for mut leaf in leaves {
+            leaf.lobe.weight = weight as f32;
+            leaf.shares = shares.to_vec();
+            leaf.lobe.kind |= if opaque { LOBE_OPAQUE } else { 0 } | if two_sided { LOBE_TWO_SIDED } else { 0 };
+            leaf.active = [true, !opaque || two_sided];
+            if opaque {
+                // The back of an opaque surface is as its front.
+                let albedo = leaf.albedo;
+                leaf.albedo = Box::new(move |_, cosine, k| albedo(false, cosine, k));
+            }
+            out.push(leaf);
+        }
+    }
+
+    fn diffuse(&mut self, scene: &Scene, reflectance: Reflectance) -> Vec<Leaf> {
+        let means = match reflectance {
+            Reflectance::Spectrum(spectrum) => channel_means(scene, spectrum),
+            Reflectance::Texture(texture) => textures::bound(scene, &scene.textures[texture]),
+        };
+        // What reflects in no channel is black.
+        if means.iter().all(|m| *m <= 0.0) {
+            return Vec::new();
+        }
+        let (lobe, records) = match reflectance {
+            Reflectance::Spectrum(spectrum) => (Lobe { ab: self.spectrum(spectrum), ..lobe_of(Kind::Lambert) }, 1),
+            Reflectance::Texture(texture) => {
+                self.textured = true;
+                let lobe = Lobe { kind: Kind::Lambert as u32 | LOBE_TEXTURED, loss: texture as u32, ..Lobe::default() };
+                (lobe, texture_records(&scene.textures[texture]))
+            }
+        };
+        vec![leaf(lobe, records, move |_, _, k| means[k])]
+    }
+
+    fn conductor(
+        &mut self,
+        scene: &Scene,
+        name: &str,
+        [eta, k]: [SpectrumId; 2],
+        roughness: Option<[f64; 2]>,
+        compensation: bool,
+    ) -> Vec<Leaf> {
+        let [n, kappa] = [eta, k].map(|s| channel_means(scene, s));
+        let ab = self.spectrum(eta) | self.spectrum(k) << 16;
+        let reflectance = move |cosine: f64, k: usize| fresnel::conductor(cosine, n[k], kappa[k]);
+        let Some(alpha) = roughness else {
+            let lobe = Lobe { ab, ..lobe_of(Kind::Conductor) };
+            return vec![leaf(lobe, 0, move |_, cosine, k| reflectance(cosine, k))];
+        };
+        self.anisotropic |= alpha[0] != alpha[1];
+        let albedo = Arc::new(ReflectionAlbedo::new(alpha));
+        let once = Lobe { ab, alpha: alpha.map(|a| a as f32), ..lobe_of(Kind::RoughConductor) };
+        let single = Arc::clone(&albedo);
+        let mut leaves =
+            vec![leaf(once, 1, move |_, cosine, k| reflectance(cosine, k) * (1.0 - mean_over_turns(&single, cosine)))];
+        let lost = albedo.mean_loss();
+        if compensation && lost > 1e-7 {
+            // F_ms of Kulla and Conty 2017, as `reference::bsdf` has it.
+            let again = move |v: &[f64]| {
+                let f = mean_conductor(v[0], v[1]);
+                f * f * (1.0 - lost) / (1.0 - f * lost)
+            };
+            let curve = Curve::derived(&[&scene.spectra[eta].curve, &scene.spectra[k].curve], &scene.channels, again);
+            let means = means_of(scene, &curve);
+            let rows: Vec<f32> = albedo.rows().iter().flatten().map(|v| *v as f32).collect();
+            let lobe = Lobe {
+                ab: self.derived(format!("{name}, scattered again"), curve),
+                alpha: alpha.map(|a| a as f32),
+                loss: self.table(&rows),
+                rows: albedo.rows().len() as u32,
+                mean_loss: lost as f32,
+                ..lobe_of(Kind::ConductorAgain)
+            };
+            leaves.push(leaf(lobe, 1, move |_, cosine, k| means[k] * mean_over_turns(&albedo, cosine)));
+        }
+        leaves
+    }
+
+    fn glass(&mut self, scene: &Scene, eta: SpectrumId, dispersion: bool) -> Vec<Leaf> {
+        let index = Index::new(scene, eta, dispersion);
+        self.dispersion |= index.disperses;
+        let decision = Arc::new(ReflectionProbability::new(&scene.spectra[eta].curve, &scene.channels));
+        let ab = self.spectrum(eta);
+        let kind = if index.disperses { LOBE_DISPERSES } else { 0 };
+        let with = |k: Kind| Lobe { ab, kind: k as u32 | kind, eta: index.bending as f32, ..Lobe::default() };
+        let through = Arc::clone(&decision);
+        vec![
+            leaf(with(Kind::Mirror), 0, move |behind, cosine, _| decision.at(behind, cosine)),
+            leaf(with(Kind::Refraction), 0, move |behind, cosine, _| 1.0 - through.at(behind, cosine)),
+        ]
+    }
+
+    fn rough_glass(&mut self, scene: &Scene, name: &str, eta: SpectrumId, dispersion: bool, alpha: f64) -> Vec<Leaf> {
+        let index = Index::new(scene, eta, dispersion);
+        let curve = &scene.spectra[eta].curve;
+        let n = channel_means(scene, eta);
+        let range = index_range(curve, &scene.channels);
+        let albedo = self.dielectric_albedo(alpha, range);
+        let number = self.eta_table(&albedo);
+        let id = self.spectrum(eta);
+        let decision = ReflectionProbability::new(curve, &scene.channels);
+        let decisions: Vec<f32> = [false, true]
+            .iter()
+            .flat_map(|&behind| (0..=INTERVALS).map(move |i| (behind, i as f64 / INTERVALS as f64)))
+            .map(|(behind, cosine)| decision.at(behind, cosine) as f32)
+            .collect();
+        let apart = |eta: f64| if (eta - 1.0).abs() < MATCHED { 1.0 + MATCHED.copysign(eta - 1.0) } else { eta };
+        let narrow = index.disperses && bends_apart(range, index.bending, alpha);
+        self.dispersion |= index.disperses;
+        self.spread |= index.disperses && !narrow;
+        let boundary = Lobe {
+            kind: Kind::RoughBoundary as u32
+                | if index.disperses { LOBE_DISPERSES } else { 0 }
+                | if narrow { LOBE_NARROW } else { 0 },
+            ab: id,
+            alpha: [alpha as f32; 2],
+            decision: self.table(&decisions),
+            eta: apart(index.bending) as f32,
+            eta_least: apart(range[0]) as f32,
+            eta_greatest: apart(range[1]) as f32,
+            ..Lobe::default()
+        };
+        let (table, indices) = (Arc::clone(&albedo), n.clone());
+        let mut leaves = vec![leaf(boundary, 2, move |behind, cosine, k| 1.0 - table.loss(indices[k], behind, cosine))];
+
+        // What is scattered again, by `reference::bsdf::dielectric`'s reciprocal split between both sides: the share over
+        // the mean loss of the side it goes to.
+        let share = |albedo: &DielectricAlbedo, eta: f64, behind: bool, passes: bool| {
+            let relative = if behind { 1.0 / eta } else { eta };
+            let here = albedo.mean_loss(eta, behind);
+            let beyond = albedo.mean_loss(eta, !behind) * relative * relative;
+            let factor = if passes { relative * relative } else { 1.0 };
+            if here + beyond > 0.0 { factor / (here + beyond) } else { 0.0 }
+        };
+        for passes in [false, true] {
+            let mut of_side = |behind: bool| {
+                let bending = if behind { 1.0 / index.bending } else { index.bending };
+                let own = |eta: f64| if behind { 1.0 / eta } else { eta };
+                let radiance = |eta: f64| match (passes, index.disperses) {
+                    (false, _) => 1.0,
+                    (true, true) => own(eta).powi(-2),
+                    (true, false) => bending.powi(-2),
+                };
+                let f = |v: &[f64]| share(&albedo, v[0], behind, passes) * radiance(v[0]);
+                let side = if behind { "behind" } else { "before" };
+                let way = if passes { "transmitted" } else { "reflected" };
+                let derived = Curve::derived(&[curve], &scene.channels, f);
+                self.derived(format!("{name}, {way} again from {side}"), derived)
+            };
+            let cd = of_side(false) | of_side(true) << 16;
+            let kind = if passes { Kind::BeyondAgain } else { Kind::BoundaryAgain };
+            let lobe = Lobe { ab: id | number << 16, cd, alpha: [alpha as f32; 2], ..lobe_of(kind) };
+            let (table, indices) = (Arc::clone(&albedo), n.clone());
+            leaves.push(leaf(lobe, 3, move |behind, cosine, k| {
+                let eta = indices[k];
+                let mean = table.mean_loss(eta, behind != passes);
+                share(&table, eta, behind, passes) * mean * table.loss(eta, behind, cosine)
+            }));
+        }
+        leaves
+    }
+
+    fn plastic(
+        &mut self,
+        scene: &Scene,
+        name: &str,
+        reflectance: Reflectance,
+        eta: SpectrumId,
+        roughness: Option<f64>,
+    ) -> Vec<Leaf> {
+        let of_index = &scene.spectra[eta].curve;
+        let n = channel_means(scene, eta);
+        let id = self.spectrum(eta);
+        let rough = roughness.map(|alpha| self.dielectric_albedo(alpha, index_range(of_index, &scene.channels)));
+        let table = rough.clone();
+        let mean_reflected = move |eta: f64| match &table {
+            None => mean_dielectric(eta),
+            Some(table) => table.mean_reflected(eta, false),
+        };
+        // ρ τ / (1 - ρ (1 - τ)) over the mean transmittance, by `reference::bsdf::plastic`.
+        let inner = |v: &[f64]| {
+            let mean = 1.0 - mean_reflected(v[1]);
+            let leaves = mean / (v[1] * v[1]);
+            v[0] * leaves / (1.0 - v[0] * (1.0 - leaves)) / mean
+        };
+        let (cd, base_means, textured, records) = match reflectance {
+            Reflectance::Spectrum(spectrum) => {
+                let curve = Curve::derived(&[&scene.spectra[spectrum].curve, of_index], &scene.channels, inner);
+                let means = means_of(scene, &curve);
+                (self.derived(format!("{name}, base"), curve), means, Lobe::default(), 3)
+            }
+            Reflectance::Texture(id) => {
+                (self.textured, self.textured_base) = (true, true);
+                let bound = textures::bound(scene, &scene.textures[id]);
+                let means = bound.iter().zip(&n).map(|(rho, eta)| inner(&[*rho, *eta])).collect();
+                // What the coat sends back to the base, and τ over the mean transmittance.
+                let back = |v: &[f64]| 1.0 - (1.0 - mean_reflected(v[0])) / (v[0] * v[0]);
+                let back = Curve::derived(&[of_index], &scene.channels, back);
+                let square = Curve::derived(&[of_index], &scene.channels, |v| (v[0] * v[0]).recip());
+                let back = self.derived(format!("{name}, back to the base"), back);
+                let square = self.derived(format!("{name}, out of the base"), square);
+                let lobe = Lobe { kind: LOBE_TEXTURED, loss: id as u32, ..Lobe::default() };
+                (back | square << 16, means, lobe, texture_records(&scene.textures[id]) + 4)
+            }
+        };
+        let alpha = [roughness.unwrap_or(0.0) as f32; 2];
+        // Seen from outside nothing is totally reflected, whatever the index.
+        let coat_kind = if roughness.is_some() { Kind::RoughCoat } else { Kind::Mirror };
+        let coat = Lobe { kind: coat_kind as u32 | LOBE_DISPERSES, ab: id, alpha, eta: 1.0, ..Lobe::default() };
+        let number = rough.as_ref().map_or(0, |table| self.eta_table(table));
+        self.rough_base |= rough.is_some();
+        let kind = Kind::Base as u32 | textured.kind;
+        let base = Lobe { kind, ab: id | number << 16, cd, alpha, ..textured };
+        let mean: Vec<f64> = n.iter().map(|&eta| 1.0 - mean_reflected(eta)).collect();
+        let reflected = Arc::new(move |cosine: f64, k: usize| match &rough {
+            None => fresnel::dielectric(cosine, n[k]),
+            Some(table) => table.reflected(n[k], false, cosine),
+        });
+        let of_coat = Arc::clone(&reflected);
+        vec![
+            leaf(coat, u32::from(roughness.is_some()), move |_, cosine, k| of_coat(cosine, k)),
+            leaf(base, records, move |_, cosine, k| (1.0 - reflected(cosine, k)) * base_means[k] * mean[k]),
+        ]
+    }
+
+    /// The position of a scene's spectrum among those needed.
+    pub(super) fn spectrum(&mut self, id: SpectrumId) -> u32 {
+        let known = self.spectra.iter().position(|s| *s == Needed::Scene(id));
+        known.unwrap_or_else(|| {
+            self.spectra.push(Needed::Scene(id));
+            self.spectra.len() - 1
+        }) as u32
+    }
+
+    pub(super) fn derived(&mut self, name: String, curve: Curve) -> u32 {
+        self.need(Needed::Derived(name, curve))
+    }
+
+    pub fn need(&mut self, spectrum: Needed) -> u32 {
+        self.spectra.push(spectrum);
+        self.spectra.len() as u32 - 1
+    }
+
+    /// Appends what blend textures leave of something, and gives where that stands.
+    pub(super) fn append_shares(&mut self, shares: &[Share]) -> u32 {
+        self.textures.as_mut().expect("shares are of textures").append_shares(shares)
+    }
+
+    fn table(&mut self, values: &[f32]) -> u32 {
+        self.tables.extend_from_slice(values);
+        (self.tables.len() - values.len()) as u32
+    }
+
+    pub(super) fn dielectric_albedo(&mut self, alpha: f64, range: [f64; 2]) -> Arc<DielectricAlbedo> {
+        let key = [alpha, range[0], range[1]].map(f64::to_bits);
+        Arc::clone(self.albedos.entry(key).or_insert_with(|| Arc::new(DielectricAlbedo::new(alpha, range))))
+    }
+
+    /// Appends a table over index and cosine, as `eta_table` in `program.wgsl` reads it, and gives its number.
+    pub(super) fn eta_table(&mut self, albedo: &DielectricAlbedo) -> u32 {
+        let aligned = self.tables.len().next_multiple_of(ROW);
+        self.tables.resize(aligned, 0.0);
+        let (first, step, columns) = albedo.columns();
+        let mut head = [0.0; ROW];
+        head[..3].copy_from_slice(&[first, if step > 0.0 { 1.0 / step } else { 0.0 }, columns.len() as f64]);
+        let values = head.iter().chain(columns.iter().flatten().copied().flatten());
+        self.tables.extend(values.map(|v| *v as f32));
+        (aligned / ROW) as u32
+    }
+}
+
+/// Most records that a textured reflectance takes.
+pub(super) fn texture_records(texture: &Texture) -> u32 {
+    match &texture.kind {
+        TextureKind::Colour => 4,
+        TextureKind::Mixture(endmembers) => endmembers.len() as u32,
+        TextureKind::Number => unreachable!("numbers are no reflectance"),
+    }
+}
+
+/// The wavelength in µm, linear in every channel.
+pub(super) fn wavelength(scene: &Scene) -> Needed {
+    let bounds = scene.channels.bounds.iter().flatten();
+    let [low, high] = bounds.fold([f64::INFINITY, 0.0f64], |[low, high], &nm| [low.min(nm), high.max(nm)]);
+    let curve = Curve::Linear { nm: vec![low, high], value: vec![low * 1e-3, high * 1e-3], outside: Outside::Hold };
+    Needed::Exact("wavelength".into(), curve)
+}
+
+/// The index of a boundary.
+struct Index {
+    /// Behind over before; what all channels bend by, or the mean of those they bend by.
+    bending: f64,
+    /// Whether channels bend by their own.
+    disperses: bool,
+}
+
+impl Index {
+    fn new(scene: &Scene, eta: SpectrumId, dispersion: bool) -> Index {
+        let means = channel_means(scene, eta);
+        let [least, greatest] = index_range(&scene.spectra[eta].curve, &scene.channels);
+        Index { bending: means.iter().sum::<f64>() / means.len() as f64, disperses: dispersion && least != greatest }
+    }
+}
+
+/// Whether the directions in which the extreme indices bend differ by more than the lobe of roughness `alpha` is wide: at 45
+/// degrees, where a facet that tilts by δ turns what it refracts by about (1 - 1/η) δ.
+fn bends_apart(range: [f64; 2], eta: f64, alpha: f64) -> bool {
+    let refracted = |eta: f64| (0.5f64.sqrt() / eta.max(1.0 / eta)).asin();
+    (refracted(range[0]) - refracted(range[1])).abs() > alpha * (1.0 - 1.0 / eta).abs()
+}
+
+fn lobe_of(kind: Kind) -> Lobe {
+    Lobe { kind: kind as u32, ..Lobe::default() }
+}
+
+fn leaf(lobe: Lobe, records: u32, albedo: impl Fn(bool, f64, usize) -> f64 + 'static) -> Leaf {
+    Leaf { lobe, active: [true; 2], albedo: Box::new(albedo), shares: Vec::new(), records }
+}
+
+/// The mean of `curve` over each channel.
+fn means_of(scene: &Scene, curve: &Curve) -> Vec<f64> {
+    scene.channels.bounds.iter().map(|b| curve.mean(b[0], b[1])).collect()
+}
+
+fn channel_means(scene: &Scene, spectrum: SpectrumId) -> Vec<f64> {
+    means_of(scene, &scene.spectra[spectrum].curve)
+}
+
+/// What single scattering loses, the mean over a few azimuths: for decisions.
+fn mean_over_turns(albedo: &ReflectionAlbedo, cosine: f64) -> f64 {
+    let turns = if albedo.rows().len() == 1 { 1 } else { 4 };
+    let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
+    let direction = |i: usize| {
+        let (sin, cos) = ((i as f64 + 0.5) / turns as f64 * std::f64::consts::FRAC_PI_2).sin_cos();
+        DVec3::new(sine * cos, sine * sin, cosine)
+    };
+    (0..turns).map(|i| albedo.loss(direction(i))).sum::<f64>() / turns as f64
+}
+
+/// q by shares (docs/METHOD.md, Decisions) for the leaves at one cosine, and the largest albedo of all together.
+fn probabilities(leaves: &[Leaf], channels: usize, albedo: &dyn Fn(&Leaf, usize) -> f64) -> (Vec<f64>, f64) {
+    let (mut mean, mut largest) = (vec![0.0; leaves.len()], vec![0.0f64; leaves.len()]);
+    let (mut lit, mut most) = (0.0, 0.0f64);
+    let mut albedos = vec![0.0; leaves.len()];
+    for k in 0..channels {
+        for (value, leaf) in albedos.iter_mut().zip(leaves) {
+            *value = albedo(leaf, k);
+        }
+        let total: f64 = albedos.iter().sum();
+        if total > 0.0 {
+            lit += 1.0;
+            most = most.max(total);
+            for (l, value) in albedos.iter().enumerate() {
+                mean[l] += value / total;
+                largest[l] = largest[l].max(value / total);
+            }
+        }
+    }
+    if lit == 0.0 {
+        return (vec![1.0 / leaves.len() as f64; leaves.len()], 0.0);
+    }
+    let of_all: f64 = largest.iter().sum();
+    (mean.iter().zip(&largest).map(|(m, l)| 0.5 * m / lit + 0.5 * l / of_all).collect(), most)
+}

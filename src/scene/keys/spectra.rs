@@ -1,0 +1,129 @@
+//! Spectra: numbers over wavelength.
+
+use super::Kind::{Choice, File, List, Number, Table, Text};
+use super::{Key, Section};
+
+pub static SPECTRUM: Section = Section {
+    path: "spectra.NAME",
+    heading: "`[spectra.NAME]`, or `{ … }` in the place of a spectrum",
+    summary: "a spectrum, from a file, numbers, a temperature or a colour",
+    about: "Wherever this page says *spectrum* stands one of three: a number, the same at all wavelengths; the name \
+            of one of `[spectra]`; or a table with the keys below. `[spectra]` has such tables, or numbers, under \
+            names.",
+    keys: &[
+        Key::one_of(
+            "file",
+            File,
+            "A table in a file: CSV, `.spd`, and what instruments and libraries write; see [Files of \
+             spectra](#files-of-spectra).",
+        ),
+        Key::one_of("constant", Number, "The same at all wavelengths.").range("as the quantity allows"),
+        Key::one_of(
+            "blackbody",
+            Number,
+            "Planck's spectral radiance at this temperature, in W m⁻² sr⁻¹ nm⁻¹, whatever the quantity's unit. Not \
+             for indices and absorption.",
+        )
+        .unit("K")
+        .range("(0, ∞)"),
+        Key::one_of(
+            "samples",
+            List("list of `[nm, value]`"),
+            "Two or more, linear between. Two equal wavelengths make a step.",
+        )
+        .unit("nm and the quantity's")
+        .range("nm above 0, ascending"),
+        Key::one_of("regular", Table, "Values at wavelengths of equal distance, linear between.").tables(&[&REGULAR]),
+        Key::one_of(
+            "rgb",
+            List("`[r, g, b]`"),
+            "A colour in linear sRGB. A reflectance is the smoothest spectrum of that colour; light is a smooth \
+             spectrum times the daylight D65, `[1, 1, 1]` with luminance Y = 1. Not for indices and absorption.",
+        )
+        .range("as the quantity allows"),
+        Key::optional(
+            "column",
+            Text,
+            "the only one",
+            "Which column of the file, by the name that its header gives it; which spectrum of a library; `\"n\"` or \
+             `\"k\"` of a refractiveindex.info file, of which `\"n\"` is the default. With `file` only.",
+        ),
+        Key::optional(
+            "unit",
+            Choice(&["nm", "um", "cm-1"]),
+            "as the header says, else nm",
+            "The unit of a CSV's first column. With `file` only, and not with files that say it by themselves.",
+        ),
+        Key::default("scale", Number, "1.0", "Multiplies all values. With any source.").range("[0, ∞)"),
+        Key::optional(
+            "outside",
+            Choice(&["zero", "hold"]),
+            "by what it describes",
+            "What holds beyond the ends of the table: nothing, or its first and last value. Without effect on \
+             constants and black bodies, which is said.",
+        ),
+    ],
+    later: &[],
+    at: "spectra.lamp",
+    examples: &[
+        r#"
+[spectra.lamp]
+file = "spectra/lamp.csv"
+column = "warm"
+unit = "um"
+scale = 0.001
+outside = "zero"
+"#,
+        "
+[spectra.lamp]
+constant = 0.5
+",
+        "
+[spectra.lamp]
+blackbody = 5778
+scale = 6.8e-5                         # the sun's irradiance above the air: its disk has 6.8e-5 sr
+",
+        r#"
+[spectra.lamp]
+samples = [[400, 0.1], [550, 0.9], [700, 0.8]]
+outside = "hold"
+"#,
+        "
+[spectra.lamp]
+regular = { from = 400, to = 700, values = [0.1, 0.4, 0.9, 0.8] }
+",
+        "
+[spectra.lamp]
+rgb = [0.8, 0.1, 0.1]
+",
+        r#"
+[materials.red.diffuse]
+reflectance = { file = "paints.csv", column = "red" }      # the same keys where it is used
+
+[spectra]
+half = 0.5                             # a number is a spectrum too
+"#,
+    ],
+    notes: "",
+};
+
+pub static REGULAR: Section = Section {
+    path: "spectra.NAME.regular",
+    heading: "`regular = { … }`",
+    summary: "values at equal distances of wavelength",
+    about: "",
+    keys: &[
+        Key::required("from", Number, "The wavelength of the first value.").unit("nm").range("(0, ∞), less than `to`"),
+        Key::required("to", Number, "That of the last one.").unit("nm").range("(0, ∞), more than `from`"),
+        Key::required("values", List("list of numbers"), "Two or more.").unit("the quantity's"),
+    ],
+    later: &[],
+    at: "spectra.paint.regular",
+    examples: &["
+[spectra.paint.regular]
+from = 400
+to = 700
+values = [0.1, 0.4, 0.9, 0.8]
+"],
+    notes: "",
+};

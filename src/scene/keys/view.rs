@@ -1,0 +1,443 @@
+//! The file as a whole; what is seen, in which channels, and how it is computed.
+
+use super::Kind::{
+    Boolean, Choice, Direction, File, List, ListOfTables, Name, NamedTables, Number, Table, Vector, Whole,
+};
+use super::{ENVIRONMENT, Key, LIGHT, MATERIAL, MEDIUM, OBJECT, SPECTRUM, Section};
+
+pub static SCENE: Section = Section {
+    path: "scene",
+    heading: "The file as a whole",
+    summary: "the sections that a file has",
+    about: "",
+    keys: &[
+        Key::required("camera", Table, "From where the scene is seen.").tables(&[&CAMERA]),
+        Key::required("film", Table, "The picture's size in pixels.").tables(&[&FILM]),
+        Key::required("channels", Table, "The intervals of wavelength that are rendered.").tables(&[&CHANNELS]),
+        Key::optional("integrator", Table, "all its defaults", "How paths are made.").tables(&[&INTEGRATOR]),
+        Key::optional("spectra", NamedTables, "none", "Spectra that others name.").tables(&[&SPECTRUM]),
+        Key::optional("materials", NamedTables, "none", "What surfaces do with light.").tables(&[&MATERIAL]),
+        Key::optional("objects", ListOfTables, "none", "Shapes: what reflects, shines or holds gas.")
+            .tables(&[&OBJECT]),
+        Key::optional("lights", ListOfTables, "none", "Light that comes from no surface.").tables(&[&LIGHT]),
+        Key::optional("environment", Table, "black", "Light from all around.").tables(&[&ENVIRONMENT]),
+        Key::optional("media", NamedTables, "none", "Gases that absorb and emit.").tables(&[&MEDIUM]),
+    ],
+    later: &[],
+    at: "",
+    examples: &[EVERY_SECTION],
+    notes: "Tables of the same kind stand in any order. What no object uses (a material, a spectrum, a medium) is \
+            checked, and then left out.",
+};
+
+const EVERY_SECTION: &str = r#"
+[camera.perspective]
+position = [0, -4, 1.5]
+look_at = [0, 0, 0.5]
+up = [0, 0, 1]
+fov = 40
+medium = "air"
+
+[film]
+width = 64
+height = 64
+
+[channels]
+intervals = [[400, 500], [500, 600], [600, 700]]
+
+[integrator]
+max_bounces = 3
+
+[spectra]
+white = 0.8                            # a constant; others are tables
+lamp = { blackbody = 3000 }
+
+[materials]
+wall = { diffuse = { reflectance = "white" } }
+
+[[objects]]
+sphere = { center = [0, 0, 0.5], radius = 0.5 }
+material = "wall"
+
+[[lights]]
+point = { position = [2, -2, 4], intensity = "lamp" }
+
+[environment]
+radiance = 0.01
+
+[media.air]
+absorption = 1e-4
+"#;
+
+pub static CAMERA: Section = Section {
+    path: "camera",
+    heading: "`[camera]`",
+    summary: "from where the scene is seen",
+    about: "One of three kinds of camera.",
+    keys: &[
+        Key::one_of("perspective", Table, "All rays start in one point.").tables(&[&PERSPECTIVE]),
+        Key::one_of("thin_lens", Table, "As perspective, through an ideal lens: what is out of focus is blurred.")
+            .tables(&[&THIN_LENS]),
+        Key::one_of("orthographic", Table, "Parallel rays through a window.").tables(&[&ORTHOGRAPHIC]),
+    ],
+    later: &[],
+    at: "camera",
+    examples: &[A_PERSPECTIVE, A_THIN_LENS, AN_ORTHOGRAPHIC],
+    notes: "All three look from `position` to `look_at`. Row 0 of the picture is its top, column 0 its left: columns \
+            run along the cross product of the view and `up`, rows from `up` downward.",
+};
+
+const A_PERSPECTIVE: &str = r#"
+[camera.perspective]
+position = [278.0, 273.0, -800.0]
+look_at = [278.0, 273.0, 0.0]
+up = [0.0, 1.0, 0.0]
+fov = 39.3077
+fov_axis = "x"
+flip_x = false
+medium = "air"
+
+[media.air]
+absorption = 0.0
+"#;
+const A_THIN_LENS: &str = r#"
+[camera.thin_lens]
+position = [0, -4, 1.5]
+look_at = [0, 0, 0.5]
+up = [0, 0, 1]
+fov = 30
+fov_axis = "smaller"
+aperture_radius = 0.05
+focus_distance = 3.6
+flip_x = false
+medium = "air"
+
+[media.air]
+absorption = 0.0
+"#;
+const AN_ORTHOGRAPHIC: &str = r#"
+[camera.orthographic]
+position = [3, -4, 2]
+look_at = [0, 0, 0.5]
+up = [0, 0, 1]
+width = 3.0
+flip_x = false
+medium = "air"
+
+[media.air]
+absorption = 0.0
+"#;
+
+const POSITION: Key = Key::required(
+    "position",
+    Vector,
+    "Where the camera is: the point, or the middle of the lens or window that rays start from.",
+)
+.unit("m");
+const LOOK_AT: Key =
+    Key::required("look_at", Vector, "What is in the middle of the full film; not where `position` is.").unit("m");
+const UP: Key = Key::default(
+    "up",
+    Direction,
+    "[0, 1, 0]",
+    "What points up in the picture. It need not be perpendicular to the view, but must not be parallel to it.",
+);
+const FLIP_X: Key = Key::default(
+    "flip_x",
+    Boolean,
+    "false",
+    "Mirrors the picture: columns run the other way. For scenes out of programs with left-handed coordinates (pbrt).",
+);
+const CAMERA_MEDIUM: Key = Key::optional(
+    "medium",
+    Name("medium"),
+    "empty space",
+    "What fills space outside every `interior`. It may have no grids. Light of the environment, of suns and of \
+     directional lights arrives through it undimmed.",
+);
+const FOV: Key =
+    Key::required("fov", Number, "The full angle of view along `fov_axis`.").unit("degrees").range("(0, 180)");
+const FOV_AXIS: Key = Key::default(
+    "fov_axis",
+    Choice(&["x", "y", "smaller", "larger"]),
+    "\"x\"",
+    "Whether `fov` is the angle between the left and right edges of the full film, between top and bottom, or along \
+     its smaller or larger side.",
+);
+
+pub static PERSPECTIVE: Section = Section {
+    path: "camera.perspective",
+    heading: "`[camera.perspective]`",
+    summary: "a pinhole camera",
+    about: "",
+    keys: &[POSITION, LOOK_AT, UP, FLIP_X, CAMERA_MEDIUM, FOV, FOV_AXIS],
+    later: &[],
+    at: "camera.perspective",
+    examples: &[A_PERSPECTIVE],
+    notes: "",
+};
+
+pub static THIN_LENS: Section = Section {
+    path: "camera.thin_lens",
+    heading: "`[camera.thin_lens]`",
+    summary: "a camera with a lens",
+    about: "",
+    keys: &[
+        POSITION,
+        LOOK_AT,
+        UP,
+        FLIP_X,
+        CAMERA_MEDIUM,
+        FOV,
+        FOV_AXIS,
+        Key::required("aperture_radius", Number, "Radius of the lens; 0 is a pinhole.").unit("m").range("[0, ∞)"),
+        Key::required(
+            "focus_distance",
+            Number,
+            "Distance of the plane that is sharp, measured along the axis of view (not along each ray).",
+        )
+        .unit("m")
+        .range("(0, ∞)"),
+    ],
+    later: &[],
+    at: "camera.thin_lens",
+    examples: &[A_THIN_LENS],
+    notes: "",
+};
+
+pub static ORTHOGRAPHIC: Section = Section {
+    path: "camera.orthographic",
+    heading: "`[camera.orthographic]`",
+    summary: "a camera with parallel rays",
+    about: "",
+    keys: &[
+        POSITION,
+        LOOK_AT,
+        UP,
+        FLIP_X,
+        CAMERA_MEDIUM,
+        Key::required(
+            "width",
+            Number,
+            "What is seen from the left edge of the full film to the right one; the height follows from the film's.",
+        )
+        .unit("m")
+        .range("(0, ∞)"),
+    ],
+    later: &[],
+    at: "camera.orthographic",
+    examples: &[AN_ORTHOGRAPHIC],
+    notes: "",
+};
+
+pub static FILM: Section = Section {
+    path: "film",
+    heading: "`[film]`",
+    summary: "the picture's size, filter and crop",
+    about: "",
+    keys: &[
+        Key::required("width", Whole, "Columns of the full film.").unit("pixels").range("[1, 131072]"),
+        Key::required("height", Whole, "Rows of the full film.").unit("pixels").range("[1, 131072]"),
+        Key::default(
+            "filter",
+            Choice(&["box", "gaussian"]),
+            "\"box\"",
+            "What a pixel is the mean over: its own square, or a Gaussian about its centre with a standard deviation \
+             of 0.5 pixels, cut at 2 along each axis. Every sample belongs to one pixel.",
+        ),
+        Key::optional(
+            "crop",
+            List("`[x0, y0, x1, y1]`"),
+            "the full film",
+            "Renders columns x0 up to x1 and rows y0 up to y1 alone, x1 and y1 not included. The cube has the crop's \
+             size; its pixels have the values that they have in the full film.",
+        )
+        .unit("pixels")
+        .range("within the film, x0 < x1, y0 < y1"),
+    ],
+    later: &[],
+    at: "film",
+    examples: &[
+        r#"
+[film]
+width = 640
+height = 400
+filter = "gaussian"
+"#,
+        "
+[film]
+width = 640
+height = 400
+crop = [200, 100, 328, 228]            # 128 x 128 pixels of it
+",
+    ],
+    notes: "",
+};
+
+pub static CHANNELS: Section = Section {
+    path: "channels",
+    heading: "`[channels]`",
+    summary: "the intervals of wavelength that are rendered",
+    about: "What is stored for a channel is the *mean* spectral radiance over its interval, in W m⁻² sr⁻¹ nm⁻¹, \
+            whatever the unit of the interval: wider channels are not brighter. With responses R it is ∫L R dλ / ∫R \
+            dλ. Wavelengths are those in a vacuum.",
+    keys: &[
+        Key::one_of("equal", Table, "Intervals of equal width.").tables(&[&EQUAL]),
+        Key::one_of(
+            "wavenumber",
+            Table,
+            "Intervals of equal width in wavenumber; stored in the order of ascending wavelengths.",
+        )
+        .tables(&[&WAVENUMBER]),
+        Key::one_of(
+            "intervals",
+            List("list of `[from, to]`"),
+            "Any intervals, kept in this order. They may overlap, and leave gaps. 1 to 65,536 of them.",
+        )
+        .unit("nm")
+        .range("from < to, both in (0, 1e6]"),
+        Key::one_of("responses", File, "The responses of a sensor, one channel each; see [Responses](#responses)."),
+        Key::optional(
+            "false_colour",
+            List("`[r, g, b]`"),
+            "as seen",
+            "Numbers of the channels, from 0, that pictures show as red, green and blue. Absent, they show what an \
+             eye would see where the channels cover the visible and are no responses, else the channels of the \
+             shortest, the middle and the longest wavelengths.",
+        )
+        .range("below the number of channels"),
+    ],
+    later: &[],
+    at: "channels",
+    examples: &[
+        r#"
+[channels]
+equal = { from = 380, to = 780, count = 400 }
+false_colour = [300, 180, 60]
+"#,
+        r#"
+[channels]
+wavenumber = { from = 500, to = 5000, count = 1000 }
+"#,
+        r#"
+[channels]
+intervals = [[380, 390], [450, 470], [8000, 12000]]
+"#,
+        r#"
+[channels]
+responses = "sensor.csv"
+"#,
+    ],
+    notes: "",
+};
+
+pub static EQUAL: Section = Section {
+    path: "channels.equal",
+    heading: "`equal = { … }`",
+    summary: "channels of equal width",
+    about: "",
+    keys: &[
+        Key::required("from", Number, "Where the first channel begins.").unit("nm").range("(0, 1e6], less than `to`"),
+        Key::required("to", Number, "Where the last one ends.").unit("nm").range("(0, 1e6], more than `from`"),
+        Key::required("count", Whole, "How many channels.").range("[1, 65536]"),
+    ],
+    later: &[],
+    at: "channels.equal",
+    examples: &["
+[channels.equal]
+from = 380.0
+to = 780.0
+count = 400
+"],
+    notes: "",
+};
+
+pub static WAVENUMBER: Section = Section {
+    path: "channels.wavenumber",
+    heading: "`wavenumber = { … }`",
+    summary: "channels of equal width in wavenumber",
+    about: "",
+    keys: &[
+        Key::required("from", Number, "Lowest wavenumber, where the longest waves are.")
+            .unit("cm⁻¹")
+            .range("[10, ∞), less than `to`"),
+        Key::required("to", Number, "Highest wavenumber.").unit("cm⁻¹").range("[10, ∞), more than `from`"),
+        Key::required("count", Whole, "How many channels.").range("[1, 65536]"),
+    ],
+    later: &[],
+    at: "channels.wavenumber",
+    examples: &["
+[channels.wavenumber]
+from = 500                             # 20 um
+to = 5000                              # 2 um
+count = 1000
+"],
+    notes: "",
+};
+
+pub static INTEGRATOR: Section = Section {
+    path: "integrator",
+    heading: "`[integrator]`",
+    summary: "how paths are made and evaluated",
+    about: "",
+    keys: &[
+        Key::default(
+            "max_bounces",
+            Whole,
+            "5",
+            "Scattering events of a path at most; light is aimed at from the last one too. With 0 only what shines by \
+             itself is seen.",
+        )
+        .range("[0, 16383]"),
+        Key::default(
+            "russian_roulette_start",
+            Whole,
+            "0",
+            "The first scattering event, counted from 1, at which a dark path may be ended at random; 0 is never. It \
+             changes noise and time, not the mean.",
+        )
+        .range("[0, 16383]"),
+        Key::default(
+            "sampler",
+            Choice(&["sobol", "independent"]),
+            "\"sobol\"",
+            "Owen-scrambled Sobol' points, or independent random numbers.",
+        ),
+        Key::default(
+            "wavelengths",
+            Choice(&["emission", "uniform"]),
+            "\"emission\"",
+            "Whether wavelengths are drawn within each channel by what the scene emits there, or evenly. The means \
+             are the same; spiky lamps make less noise with `emission` \
+             ([METHOD.md](METHOD.md#wavelengths-by-emission)).",
+        ),
+        Key::default(
+            "evaluator",
+            Choice(&["auto", "dpept-pixel", "dpept-path", "dpept-spectral", "pt"]),
+            "\"auto\"",
+            "How channels are evaluated: `pt` is the conventional path tracer, the others are ways to evaluate saved \
+             paths. They trace the same paths, and differ by rounding and by what tables may be off (1e-4 of a \
+             channel's peak). `auto` takes `dpept-pixel`, and `pt` on GPUs where channels are few; a cube remembers \
+             which.",
+        ),
+        Key::default(
+            "epoch",
+            Whole,
+            "64",
+            "Samples per pixel of a full epoch, after which a render may end ([METHOD.md](METHOD.md#epochs)).",
+        )
+        .range("[1, 1024], a power of two"),
+    ],
+    later: &[],
+    at: "integrator",
+    examples: &[r#"
+[integrator]
+max_bounces = 16
+russian_roulette_start = 4
+sampler = "independent"
+wavelengths = "uniform"
+evaluator = "dpept-spectral"
+epoch = 16
+"#],
+    notes: "",
+};

@@ -1,0 +1,9 @@
+//! Cubes, and files of other programs: read, written and read back.
+
+mod cube;
+mod export;
+mod imports;
+mod outputs;
+mod python;
+mod sensor;
+mod store;

@@ -1,0 +1,11 @@
+//! What devices render, against the f64 reference, closed forms and themselves.
+
+mod against_reference;
+mod convergence;
+mod evaluators;
+mod invariance;
+mod lights;
+mod materials;
+mod media;
+mod textures;
+mod wavelengths;

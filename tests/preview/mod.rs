@@ -1,0 +1,9 @@
+//! Whoever watches: the web server and its page, tev, pauses and stops.
+
+mod client;
+mod hostile;
+mod huge;
+mod page;
+mod rendering;
+mod served;
+mod tev;

@@ -1,0 +1,10 @@
+//! Commands of the real binary, and what is in the repository beside it.
+
+mod architecture;
+mod bench;
+mod cli;
+mod converge;
+mod documents;
+mod peer;
+mod scenes;
+mod stress;
