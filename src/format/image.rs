@@ -62,28 +62,39 @@ pub enum Rgb<'i> {
     Grey(&'i Plane),
 }
 
+/// What the channels of a layer are in a picture.
+struct Layer<'i> {
+    name: &'i str,
+    rgb: [Option<&'i Plane>; 3],
+    grey: Option<&'i Plane>,
+}
+
 impl<'i> Rgb<'i> {
     /// Among `planes`, by their names, whatever their case and the layer before them. `Ok(None)`: there are none; `Err` says what
     /// is in the way.
     pub fn of(planes: &[&'i Plane]) -> Result<Option<Rgb<'i>>, String> {
         const GREY: [&str; 8] = ["y", "l", "v", "i", "gray", "grey", "luminance", "intensity"];
-        let mut layers: Vec<(&str, [Option<&'i Plane>; 3], Option<&'i Plane>)> = Vec::new();
+        let mut layers: Vec<Layer> = Vec::new();
         for plane in planes {
-            let (layer, name) = plane.parts();
-            let index = layers.iter().position(|known| known.0 == layer).unwrap_or_else(|| {
-                layers.push((layer, [None; 3], None));
+            let (name, channel) = plane.parts();
+            let index = layers.iter().position(|layer| layer.name == name).unwrap_or_else(|| {
+                layers.push(Layer { name, rgb: [None; 3], grey: None });
                 layers.len() - 1
             });
-            match name.to_lowercase().as_str() {
-                "r" | "red" => layers[index].1[0] = Some(plane),
-                "g" | "green" => layers[index].1[1] = Some(plane),
-                "b" | "blue" => layers[index].1[2] = Some(plane),
-                name if GREY.contains(&name) => layers[index].2 = Some(plane),
+            let layer = &mut layers[index];
+            match channel.to_lowercase().as_str() {
+                "r" | "red" => layer.rgb[0] = Some(plane),
+                "g" | "green" => layer.rgb[1] = Some(plane),
+                "b" | "blue" => layer.rgb[2] = Some(plane),
+                channel if GREY.contains(&channel) => layer.grey = Some(plane),
                 _ => {}
             }
         }
-        let coloured: Vec<(&str, [&'i Plane; 3])> =
-            layers.iter().filter_map(|(layer, [r, g, b], _)| Some((*layer, [(*r)?, (*g)?, (*b)?]))).collect();
+        let colour = |layer: &Layer<'i>| {
+            let [r, g, b] = layer.rgb;
+            Some((layer.name, [r?, g?, b?]))
+        };
+        let coloured: Vec<(&str, [&'i Plane; 3])> = layers.iter().filter_map(colour).collect();
         match coloured[..] {
             [(_, rgb)] => return Ok(Some(Rgb::Colour(rgb))),
             [] => {}
@@ -101,7 +112,7 @@ impl<'i> Rgb<'i> {
             return Err("holds CIE X, Y and Z, which are not read: convert it to linear sRGB".to_owned());
         }
         let [only] = planes else { return Ok(None) };
-        Ok(layers.iter().find_map(|(_, _, grey)| *grey).map(|_| Rgb::Grey(only)))
+        Ok(layers.iter().find_map(|layer| layer.grey).map(|_| Rgb::Grey(only)))
     }
 
     /// The plane of each of red, green and blue.
