@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use super::unit::{self, Measure, Unit};
+use super::unit::{Stated, Unit};
 use crate::error::Problem;
 
 /// How the values of an image follow each other.
@@ -213,9 +213,8 @@ impl Header {
     }
 
     /// `data units`, where it is understood.
-    pub fn measure(&self) -> Option<(Measure, String)> {
-        let text = self.get("data units")?.trim();
-        unit::parse(text).map(|measure| (measure, text.to_owned()))
+    pub fn unit(&self) -> Option<Stated> {
+        Stated::of(self.get("data units")?)
     }
 
     /// A number, where the key is there.

@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::table::{self, shown};
 use super::text::{Column, SpectrumTable, ascending, named};
-use super::unit::{self, Measure, Unit};
+use super::unit::{self, Stated, Unit};
 use crate::error::Problem;
 
 type Read<T> = Result<T, Box<Problem>>;
@@ -251,7 +251,7 @@ fn spdx(bytes: &[u8], path: &Path, column: Column) -> Read<SpectrumTable> {
         "flux" => Some("W nm-1"),
         _ => None,
     };
-    found.measure = of.and_then(|text| unit::parse(text).map(|measure| (measure, format!("{quantity}, {text}"))));
+    found.unit = of.and_then(Stated::of);
     ascending(found, path, "")
 }
 
@@ -288,8 +288,7 @@ fn rawtoaces(bytes: &[u8], path: &Path, column: Column) -> Read<SpectrumTable> {
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (nm, value) = pairs.into_iter().unzip();
     let unit = data["units"].as_str().unwrap_or("");
-    let measure = unit::parse(unit).map(|measure| (measure, unit.to_owned()));
-    ascending(SpectrumTable { nm, value, measure, ..SpectrumTable::default() }, path, "")
+    ascending(SpectrumTable { nm, value, unit: Stated::of(unit), ..SpectrumTable::default() }, path, "")
 }
 
 /// A spectrum of RADIS: arrays by name, the axis in `waveunit`: cm⁻¹, nm (in air) or nm_vac.
@@ -343,12 +342,12 @@ fn radis(bytes: &[u8], path: &Path, column: Column) -> Read<SpectrumTable> {
     }
     let to_nm = |x: &f64| if in_air { unit::vacuum_nm(unit.to_nm(*x)) } else { unit.to_nm(*x) };
     let text = document["units"][name].as_str().unwrap_or("");
-    let measure: Option<(Measure, String)> =
-        if text.is_empty() { None } else { unit::parse(text).map(|measure| (measure, text.to_owned())) };
-    if measure.is_none() && !text.is_empty() {
+    let stated = Stated::of(text);
+    if stated.is_none() && !text.is_empty() {
         return wrong(path, None, format!("gives {name} in `{}`, a unit that is not understood", shown(text)), "");
     }
-    let mut found = SpectrumTable { nm: x.iter().map(to_nm).collect(), value, measure, ..SpectrumTable::default() };
+    let mut found =
+        SpectrumTable { nm: x.iter().map(to_nm).collect(), value, unit: stated, ..SpectrumTable::default() };
     if in_air {
         found.notes.push("gives wavelengths in air, as RADIS has them in nm: they are converted to vacuum".to_owned());
     }
@@ -393,7 +392,7 @@ fn svc(bytes: &[u8], path: &Path, column: Column) -> Read<SpectrumTable> {
             return wrong(path, None, message, "export radiance, or take the reflectance");
         }
         found.value.iter_mut().for_each(|value| *value *= 1e-6);
-        found.measure = unit::parse("W m-2 sr-1 nm-1").map(|measure| (measure, units.clone()));
+        found.unit = Stated::of("W m-2 sr-1 nm-1");
     }
     if let Some(i) = (1..found.nm.len()).find(|&i| found.nm[i] <= found.nm[i - 1]) {
         let line = found.line[i];
@@ -437,11 +436,11 @@ fn spectral_evolution(bytes: &[u8], path: &Path, column: Column) -> Read<Spectru
     let default = lower.iter().position(is_share).or((names.len() == 1).then_some(0));
     let index = pick(names, column, default, 2, path)?;
     let (name, lower) = (&names[index], &lower[index]);
-    let measure = if lower.contains('%') {
-        unit::parse("%").map(|measure| (measure, name.clone()))
+    let unit = if lower.contains('%') {
+        Stated::of("%")
     } else if lower.contains("rad") {
-        match unit::parse(&units) {
-            Some(measure) => Some((measure, units.clone())),
+        match Stated::of(&units) {
+            Some(stated) => Some(stated),
             None => {
                 return wrong(
                     path,
@@ -461,7 +460,7 @@ fn spectral_evolution(bytes: &[u8], path: &Path, column: Column) -> Read<Spectru
     } else {
         None
     };
-    let mut found = SpectrumTable { measure, ..SpectrumTable::default() };
+    let mut found = SpectrumTable { unit, ..SpectrumTable::default() };
     for row in &table.rows {
         table.check_row(row)?;
         if let (Some(nm), Some(value)) = (table.number(row, 0)?, table.number(row, index + 1)?) {
@@ -527,30 +526,25 @@ mod tests {
     #[test]
     fn each_is_read_with_its_units() {
         let lamp = read("lamp.spdx", SPDX, None).unwrap();
+        let density = |table: &SpectrumTable, kind| table.unit.as_ref().and_then(|stated| stated.measure.to(kind));
+        assert_eq!(density(&lamp, unit::Kind::Irradiance), Some(unit::Density::Plain(1.0)));
         assert_eq!((lamp.nm, lamp.value, lamp.line), (vec![400.0, 405.5], vec![0.5, 0.75], vec![7, 8]));
-        assert!(
-            lamp.measure
-                .is_some_and(|(measure, _)| measure.to(unit::Kind::Irradiance) == Some(unit::Density::Plain(1.0)))
-        );
         let green = read("camera.json", CAMERA, Some("g")).unwrap();
         assert_eq!((green.nm, green.value), (vec![380.0, 400.0, 1000.0], vec![0.1, 0.2, 2.0]));
         let gas = read("co2.spec", RADIS, Some("abscoeff")).unwrap();
+        assert_eq!(density(&gas, unit::Kind::Absorption), Some(unit::Density::Plain(100.0)));
         assert_eq!((gas.nm, gas.value), (vec![4000.0, 5000.0], vec![4.0, 3.0]));
-        assert!(
-            gas.measure
-                .is_some_and(|(measure, _)| measure.to(unit::Kind::Absorption) == Some(unit::Density::Plain(100.0)))
-        );
-        let (measure, _) = read("co2.spec", RADIS, Some("radiance_noslit")).unwrap().measure.unwrap();
+        let radiance = read("co2.spec", RADIS, Some("radiance_noslit")).unwrap();
         // 1 mW cm-2 sr-1 / cm-1 at 2000 cm-1: 10 W m-2 sr-1 / cm-1, and 1e7/5000² = 0.4 cm-1 a nm.
-        let per_nm = measure.to(unit::Kind::Radiance).unwrap().apply(1.0, 5000.0);
+        let per_nm = density(&radiance, unit::Kind::Radiance).unwrap().apply(1.0, 5000.0);
         assert!((per_nm - 4.0).abs() < 1e-12, "{per_nm}");
         let leaf = read("leaf.sig", SIG, None).unwrap();
         assert_eq!((leaf.nm, leaf.value, leaf.line), (vec![350.0, 400.0], vec![0.5, 0.2], vec![5, 6]));
         // 1000 x 1e-10 W cm-2 = 1e-3 W m-2.
         assert!((read("leaf.sig", SIG, Some("target")).unwrap().value[0] - 1e-3).abs() < 1e-18);
         let leaf = read("leaf.sed", SED, None).unwrap();
+        assert_eq!(density(&leaf, unit::Kind::Number), Some(unit::Density::Plain(0.01)));
         assert_eq!((leaf.nm, leaf.value), (vec![350.0, 351.0], vec![50.0, 20.0]));
-        assert_eq!(leaf.measure.map(|(measure, _)| measure.factor), Some(0.01));
         assert_eq!(read("leaf.sed", SED, Some("Rad. (Target)")).unwrap().value, [0.25, 0.1]);
         let text = "GOES-99 ABI channel 13\nmade up\n  wavenumber  response\n 950.0  0.5\n 1000.0 1.0\n";
         let band = read("rtcoef_goes_99_abi_srf_ch13.txt", text, None).unwrap();

@@ -91,8 +91,7 @@ pub fn parse_envi(
         }
     };
     let data = header.data(data, data_path)?;
-    let mut table =
-        SpectrumTable { measure: header.measure(), notes: header.notes.clone(), ..SpectrumTable::default() };
+    let mut table = SpectrumTable { unit: header.unit(), notes: header.notes.clone(), ..SpectrumTable::default() };
     let (mut bad, mut missing) = (0usize, 0usize);
     for (i, nm) in nm.into_iter().enumerate() {
         if !header.is_good(i) {

@@ -7,6 +7,8 @@ pub enum Range {
     Share,
     /// 0 and more. Noise reaches down to 1 % of the largest number below 0.
     NotNegative,
+    /// 0 and more, of k beside an n of 1 or more. Noise reaches down to 1 % of the largest number, of n at least.
+    Extinction,
 }
 
 const TOLERATED: f64 = 0.01;
@@ -43,6 +45,11 @@ impl Clipped {
                     "{count} negative {values}, the lowest {worst}, within 1 % of the peak: taken as noise, and as 0"
                 )
             }
+            Range::Extinction => {
+                format!(
+                    "{count} negative {values} of k, the lowest {worst}, within 1 % of k or n: taken as noise, and as 0"
+                )
+            }
         }
     }
 }
@@ -54,17 +61,14 @@ pub fn clip<T: Copy + Into<f64>>(
     range: Range,
     of: impl Fn(f64) -> T,
 ) -> Result<Option<Clipped>, usize> {
-    let least = match range {
-        Range::Share => -TOLERATED,
-        Range::NotNegative => -TOLERATED * values.iter().map(|v| (*v).into()).fold(0.0, f64::max),
+    let peak = |at_least: f64| values.iter().map(|v| (*v).into()).fold(at_least, f64::max);
+    // What is 0.01 beyond as it is written is so in f32 too.
+    let in_f32 = |v: f64| f64::from(v as f32);
+    let (least, most, end) = match range {
+        Range::Share => (in_f32(-TOLERATED).min(-TOLERATED), in_f32(1.0 + TOLERATED), 1.0),
+        Range::NotNegative => (-TOLERATED * peak(0.0), f64::INFINITY, f64::INFINITY),
+        Range::Extinction => (-TOLERATED * peak(1.0), f64::INFINITY, f64::INFINITY),
     };
-    let most = match range {
-        // What is 0.01 beyond as it is written is so in f32 too.
-        Range::Share => (1.0 + TOLERATED) as f32 as f64,
-        Range::NotNegative => f64::INFINITY,
-    };
-    let least = if range == Range::Share { f64::from(least as f32).min(least) } else { least };
-    let end = if range == Range::Share { 1.0 } else { f64::INFINITY };
     let mut found = Clipped { count: 0, worst: 0.0, above: false, below: false };
     let mut furthest = 0.0;
     for (i, value) in values.iter().enumerate() {
@@ -111,6 +115,9 @@ mod tests {
         let mut light = [200.0, -1.9, 3.0];
         let clipped = clip(&mut light, Range::NotNegative, |v| v).unwrap().unwrap();
         assert_eq!((light, clipped.worst), ([200.0, 0.0, 3.0], -1.9));
+        // A spectrometer's noise about no absorption at all.
+        let mut k = [1e-9, -8.1e-10];
+        assert!(clip(&mut k, Range::Extinction, |v| v).unwrap().is_some() && k == [1e-9, 0.0]);
         assert_eq!(clip(&mut [0.0, 1.0], Range::Share, |v| v), Ok(None));
     }
 
@@ -122,6 +129,8 @@ mod tests {
             ([f64::NAN, 0.5], Range::Share, 0),
             ([200.0, -2.1], Range::NotNegative, 1),
             ([0.0, -1e-30], Range::NotNegative, 1),
+            ([0.5, -0.0101], Range::Extinction, 1),
+            ([4.0, -0.0401], Range::Extinction, 1),
             ([f64::INFINITY, 1.0], Range::NotNegative, 0),
         ] {
             let before = values;

@@ -194,7 +194,7 @@ impl Yaml<'_> {
             nm: rows.iter().map(|row| row.1[0] * 1e3).collect(),
             value: rows.iter().map(|row| row.1[column + 1]).collect(),
             line: rows.iter().map(|row| row.0.or(line).unwrap_or(1)).collect(),
-            measure: None,
+            unit: None,
             notes: notes.clone(),
         }))
     }
@@ -246,7 +246,7 @@ impl Yaml<'_> {
             notes.push(format!("has a formula without a real value at {um} um, within the range of its page: it is read within the channels only"));
         }
         let (nm, value): (Vec<f64>, Vec<f64>) = nodes.into_iter().map(|(um, n)| (um * 1e3, n)).unzip();
-        Ok(SpectrumTable { line: vec![line.unwrap_or(1); nm.len()], nm, value, measure: None, notes })
+        Ok(SpectrumTable { line: vec![line.unwrap_or(1); nm.len()], nm, value, unit: None, notes })
     }
 
     fn numbers(&self, text: &str, line: Option<usize>) -> Result<Vec<f64>, Box<Problem>> {

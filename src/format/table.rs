@@ -400,6 +400,11 @@ impl Table<'_> {
         if names.is_empty()
             && let Some((line, found)) = self.header_in_comment(separator, width, start, comments)
         {
+            let axis = &found[0];
+            if !matches!(Unit::stated(axis), Ok(None | Some(Unit::NANOMETRE))) || unit::is_in_air(axis) {
+                let shown = shown(axis);
+                self.notes.push(format!("names its columns in the comment on line {line}, the first one `{shown}`"));
+            }
             (names, self.line) = (found, line);
         }
         if names.is_empty() && start > 0 {

@@ -5,7 +5,7 @@ use std::fmt::{Debug, Write};
 use std::path::Path;
 
 use super::table::{self, Table};
-use super::unit::{self, Measure, Unit};
+use super::unit::{self, Stated, Unit};
 use super::{instrument, library, modtran};
 use crate::error::Problem;
 use crate::spectral::Channels;
@@ -17,8 +17,8 @@ pub struct SpectrumTable {
     pub value: Vec<f64>,
     /// The 1-based line each value stands on; empty where the file has no lines.
     pub line: Vec<usize>,
-    /// The unit of the values and how it is written, where the file says one that has not been applied yet.
-    pub measure: Option<(Measure, String)>,
+    /// The unit of the values, where the file says one that has not been applied yet.
+    pub unit: Option<Stated>,
     /// What was left out or mended, in words that go on after the file's name.
     pub notes: Vec<String>,
 }
@@ -161,6 +161,8 @@ struct Axis {
     unit: Unit,
     /// Whether the header says that these are wavelengths in air.
     in_air: bool,
+    /// What is to be said of the table.
+    notes: Vec<String>,
 }
 
 impl Axis {
@@ -184,7 +186,14 @@ impl Axis {
                 table.problem(Some(table.line), message, help)
             })?,
         };
-        Ok(Axis { column, unit, in_air: unit::is_in_air(name(column)) })
+        let mut notes = table.notes.clone();
+        if column > 0 {
+            let axis = table::shown(name(column));
+            notes.push(format!(
+                "begins with a column of row numbers, which is left out: wavelengths are those of `{axis}`"
+            ));
+        }
+        Ok(Axis { column, unit, in_air: unit::is_in_air(name(column)), notes })
     }
 
     /// The number of the column that is wanted.
@@ -251,9 +260,8 @@ impl Axis {
         }
         let finish = |(column, mut found): (&usize, SpectrumTable)| {
             let name = table.names.get(*column).map_or("", String::as_str);
-            // What is no unit known here is a part of the name.
-            found.measure = unit::of_values(name).ok().flatten().map(|measure| (measure, name.to_owned()));
-            found.notes.clone_from(&table.notes);
+            found.unit = Stated::in_name(name);
+            found.notes.clone_from(&self.notes);
             if self.in_air {
                 found.notes.push(
                     "gives wavelengths in air: they are converted to vacuum (Ciddor 1996, dry air of 15 °C)".to_owned(),
@@ -330,7 +338,7 @@ impl<'t> Block<'t> {
 
     fn read(&self, path: &Path) -> Result<SpectrumTable, Box<Problem>> {
         let table = table::parse(self.text, self.line, path)?;
-        let axis = Axis { column: 0, unit: Unit::MICROMETRE, in_air: false };
+        let axis = Axis { column: 0, unit: Unit::MICROMETRE, in_air: false, notes: table.notes.clone() };
         if table.columns() != 2 {
             return Err(table.problem(
                 Some(table.line),

@@ -269,17 +269,34 @@ fn tidy(value: f64) -> f64 {
     format!("{value:.14e}").parse().unwrap_or(value)
 }
 
-/// The unit in the name of a column of values: in brackets, or after a comma. `Err` holds what stands there and is no unit
-/// known here.
-pub fn of_values(name: &str) -> Result<Option<Measure>, String> {
-    let text = plain(name);
-    let stated = bracketed(&text).or_else(|| text.rsplit_once(", ").map(|(_, after)| after));
-    let Some(stated) = stated.map(str::trim).filter(|stated| !stated.is_empty()) else {
-        return Ok((text.trim_end().ends_with('%')).then_some(Measure { factor: 0.01, ..Measure::ONE }));
-    };
-    match parse(stated) {
-        Some(measure) => Ok(Some(measure)),
-        None => Err(stated.to_owned()),
+/// The unit that a file gives to its values.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stated {
+    pub measure: Measure,
+    /// What says so.
+    pub text: String,
+    /// Whether it can be nothing but a unit.
+    pub certain: bool,
+}
+
+impl Stated {
+    /// What the text of a key for units says; `None` if that is not understood.
+    pub fn of(text: &str) -> Option<Stated> {
+        parse(text).map(|measure| Stated { measure, text: text.trim().to_owned(), certain: true })
+    }
+
+    /// The unit in the name of a column of values: in brackets, after a comma (where W may as well be the west), or a
+    /// percent sign at its end. What is no unit known here is a part of the name.
+    pub fn in_name(name: &str) -> Option<Stated> {
+        let text = plain(name);
+        let within = bracketed(&text).map(str::trim).filter(|inner| !inner.is_empty());
+        let after = || text.rsplit_once(", ").map(|(_, after)| after);
+        let measure = match within.or_else(after) {
+            Some(stated) => parse(stated)?,
+            None if text.ends_with('%') => Measure { factor: 0.01, ..Measure::ONE },
+            None => return None,
+        };
+        Some(Stated { measure, text: name.to_owned(), certain: within.is_some() })
     }
 }
 
@@ -544,8 +561,7 @@ fn product(tokens: &[Token], at: &mut usize, depth: usize) -> Option<Measure> {
         if power != 1 {
             factor = Measure::ONE.times(factor, power)?;
         }
-        // Without a new stroke, what follows one is again above it: W/m2 sr is taken so by nobody who writes units, so a
-        // stroke holds on for all that follows without a dot or another stroke.
+        // A stroke holds for all that follows it without a dot: W/m2 sr nm is W/(m2 sr nm), as its writers mean it.
         total = total.times(factor, sign)?;
         any = true;
     }
@@ -846,13 +862,13 @@ mod tests {
         assert_eq!(absorption("cm-1 atm-1"), Some(Density::Plain(100.0)));
         assert_eq!(absorption("1/km"), Some(Density::Plain(1e-3)));
         assert_eq!(absorption("cm2/molecule"), None);
-        assert_eq!(of_values("Reflectance (%)").unwrap().map(|measure| measure.factor), Some(0.01));
-        assert_eq!(
-            of_values("Radiance [uW/cm2/sr/nm]").unwrap().and_then(|m| m.to(Kind::Radiance)),
-            Some(Density::Plain(0.01))
-        );
-        assert_eq!(of_values("Sample #1"), Ok(None));
-        assert_eq!(of_values("leaf (upper side)"), Err("upper side".to_owned()));
+        let percent = Stated::in_name("Reflectance (%)").unwrap();
+        assert_eq!((percent.measure.factor, percent.certain), (0.01, true));
+        let radiance = Stated::in_name("Radiance [uW/cm2/sr/nm]").unwrap();
+        assert_eq!(radiance.measure.to(Kind::Radiance), Some(Density::Plain(0.01)));
+        assert_eq!(Stated::in_name("Sample #1"), None);
+        assert_eq!(Stated::in_name("leaf (upper side)"), None);
+        assert_eq!(Stated::in_name("wall, W").map(|stated| stated.certain), Some(false));
     }
 
     /// Lines whose wavelengths in air and in vacuum NIST's Atomic Spectra Database gives: Na D2, H alpha, Hg.

@@ -13,7 +13,7 @@ use crate::error::Problem;
 use crate::format::noise::{self, Range};
 use crate::format::refractive;
 use crate::format::text::{self, Column, SpectrumTable};
-use crate::format::unit::{Density, Kind, Measure, Unit};
+use crate::format::unit::{Density, Kind, Stated, Unit};
 use crate::spectral::{Channels, Curve, Outside, upsample};
 
 /// Wavelengths, in nm, far beyond any channel, between which a curve's peak is looked for.
@@ -126,6 +126,7 @@ impl Quantity {
     fn noise(self) -> Option<Range> {
         match self {
             Quantity::Reflectance => Some(Range::Share),
+            Quantity::Extinction => Some(Range::Extinction),
             Quantity::Index | Quantity::CoatIndex => None,
             _ => Some(Range::NotNegative),
         }
@@ -189,8 +190,18 @@ struct TableFile {
     path: PathBuf,
     /// The line of each value; empty where the file has no lines.
     lines: Vec<usize>,
-    measure: Option<(Measure, String)>,
+    unit: Option<Stated>,
     notes: Vec<String>,
+}
+
+/// A table that is checked, and what it is called.
+#[derive(Clone, Copy)]
+struct Tabulated<'s, 'a> {
+    nm: &'s [f64],
+    value: &'s [f64],
+    file: Option<&'s TableFile>,
+    source: &'s Source<'a>,
+    name: &'s str,
 }
 
 /// A checked spectrum; [`Spectra::take`] makes it part of the scene.
@@ -382,19 +393,14 @@ impl<'a> Spectra<'a> {
             self.cx.error(source.at, &source.path, message, Some(help.to_owned()));
             return None;
         }
-        let scaled = |value: f64| {
-            let text =
-                if source.scale == 1.0 { value.to_string() } else { format!("{value} x scale {}", source.scale) };
-            (value * source.scale, text)
-        };
         let curve = match &source.data {
             Data::Constant(value) => {
-                let (value, text) = scaled(*value);
-                if !quantity.allows(value) {
-                    refuse(text);
+                let scaled = value * source.scale;
+                if !quantity.allows(scaled) {
+                    refuse(scaled_words(*value, source.scale));
                     return None;
                 }
-                Curve::Constant(value)
+                Curve::Constant(scaled)
             }
             Data::Blackbody(_) if is_index => {
                 refuse("a black body".to_owned());
@@ -414,59 +420,8 @@ impl<'a> Spectra<'a> {
                 curve
             }
             Data::Table { nm, value, file } => {
-                let (mut nm, mut value, mut skipped) = (&nm[..], value.clone(), 0);
-                if let Some(file) = file {
-                    warnings.extend(file.notes.iter().map(|note| format!("{} {note}", file.path.display())));
-                    if !self.convert(file, nm, &mut value, quantity, user) {
-                        return None;
-                    }
-                    let seen = self.seen(nm);
-                    let far = |v: &[f64]| v.iter().any(|v| !quantity.allows(*v));
-                    // What lies far from all channels is nobody's concern.
-                    if quantity.is_optical_constant() && (far(&value[..seen.start]) || far(&value[seen.end..])) {
-                        warnings.push(format!(
-                            "{}: values outside of {} to {} nm, beyond all channels, are left out: some are impossible",
-                            file.path.display(),
-                            nm[seen.start],
-                            nm[seen.end - 1]
-                        ));
-                        skipped = seen.start;
-                        (nm, value) = (&nm[seen.clone()], value[seen].to_vec());
-                    }
-                    if let Some(range) = quantity.noise()
-                        && let Ok(Some(clipped)) = noise::clip(&mut value, range, |v| v)
-                    {
-                        warnings.push(format!("{} holds {}", file.path.display(), clipped.words(range)));
-                    }
-                }
-                if let Some(i) = value.iter().position(|v| !quantity.allows(scaled(*v).0)) {
-                    let text = format!("{} at {} nm", scaled(value[i]).1, nm[i]);
-                    match file.as_ref().map(|file| (file, file.lines.get(skipped + i))) {
-                        Some((file, Some(line))) => self.cx.push(Problem {
-                            file: file.path.clone(),
-                            line: Some(*line),
-                            key: Some(user.path.clone()),
-                            message: format!("{}, but is {text}", quantity.range()),
-                            ..Problem::default()
-                        }),
-                        _ => refuse(text),
-                    }
-                    return None;
-                }
-                let outside = source.outside.unwrap_or(quantity.default_outside());
-                let instead = match (outside, quantity) {
-                    (Outside::Hold, _) => Some("its end values are held there"),
-                    (Outside::Zero, Quantity::Absorption) => Some("nothing is absorbed there"),
-                    (Outside::Zero, _) => None,
-                };
-                if let (Some(instead), None) = (instead, source.outside) {
-                    warnings.extend(self.uncovered(nm[0], nm[nm.len() - 1]).map(|gap| {
-                        let noun = quantity.noun();
-                        format!("spectrum `{name}` ({noun}) does not cover {gap}: {instead}")
-                    }));
-                }
-                let value = value.iter().map(|v| v * source.scale).collect();
-                Curve::Linear { nm: nm.to_vec(), value, outside }
+                let table = Tabulated { nm, value, file: file.as_ref(), source, name };
+                self.tabulated(&table, user, quantity, &refuse, &mut warnings)?
             }
             Data::Rgb(rgb) => {
                 let colour = rgb.map(|v| v * source.scale);
@@ -486,29 +441,121 @@ impl<'a> Spectra<'a> {
         Some(self.checked.len() - 1)
     }
 
-    /// Brings values into the unit of `quantity`, by what their file says of theirs.
-    fn convert(&self, file: &TableFile, nm: &[f64], value: &mut [f64], quantity: Quantity, user: &Item<'a>) -> bool {
-        let Some((measure, text)) = &file.measure else { return true };
-        match measure.to(quantity.kind()) {
-            Some(Density::Plain(1.0)) => true,
-            Some(density) => {
-                value.iter_mut().zip(nm).for_each(|(value, nm)| *value = density.apply(*value, *nm));
-                true
-            }
-            // A share of anything is what reflectances, tabulated beside other things, are without a unit.
-            None if measure.is_number() => true,
-            None => {
-                user.error_help(
-                    format!(
-                        "{} gives its values in the unit of `{text}`, which is not that of {}",
-                        file.path.display(),
-                        quantity.noun()
-                    ),
-                    format!("convert them to {}, or correct the header", quantity.unit()),
-                );
-                false
+    /// The curve of a table: in the unit of `quantity`, scaled, without noise.
+    fn tabulated(
+        &self,
+        table: &Tabulated<'_, 'a>,
+        user: &Item<'a>,
+        quantity: Quantity,
+        refuse: &dyn Fn(String),
+        warnings: &mut Vec<String>,
+    ) -> Option<Curve> {
+        let Tabulated { nm, file, source, name, .. } = *table;
+        let mut unscaled = table.value.to_vec();
+        let mut kept = 0..nm.len();
+        if let Some(file) = file {
+            warnings.extend(file.notes.iter().map(|note| format!("{} {note}", file.path.display())));
+            self.convert(table, &mut unscaled, quantity, user, warnings)?;
+            if quantity.is_optical_constant() {
+                kept = self.sound(file, nm, &unscaled, quantity, warnings);
             }
         }
+        let nm = &nm[kept.clone()];
+        let mut value: Vec<f64> = unscaled[kept.clone()].iter().map(|v| v * source.scale).collect();
+        if let (Some(file), Some(range)) = (file, quantity.noise())
+            && let Ok(Some(clipped)) = noise::clip(&mut value, range, |v| v)
+        {
+            warnings.push(format!("{} holds {}", file.path.display(), clipped.words(range)));
+        }
+        if let Some(i) = value.iter().position(|v| !quantity.allows(*v)) {
+            let text = format!("{} at {} nm", scaled_words(unscaled[kept.start + i], source.scale), nm[i]);
+            match file.map(|file| (file, file.lines.get(kept.start + i))) {
+                Some((file, Some(line))) => self.cx.push(Problem {
+                    file: file.path.clone(),
+                    line: Some(*line),
+                    key: Some(user.path.clone()),
+                    message: format!("{}, but is {text}", quantity.range()),
+                    ..Problem::default()
+                }),
+                _ => refuse(text),
+            }
+            return None;
+        }
+        let outside = source.outside.unwrap_or(quantity.default_outside());
+        let instead = match (outside, quantity) {
+            (Outside::Hold, _) => Some("its end values are held there"),
+            (Outside::Zero, Quantity::Absorption) => Some("nothing is absorbed there"),
+            (Outside::Zero, _) => None,
+        };
+        if let (Some(instead), None) = (instead, source.outside) {
+            warnings.extend(self.uncovered(nm[0], nm[nm.len() - 1]).map(|gap| {
+                let noun = quantity.noun();
+                format!("spectrum `{name}` ({noun}) does not cover {gap}: {instead}")
+            }));
+        }
+        let mut nm = nm.to_vec();
+        // One row that is left, and held, is a step of no height: a curve has two nodes at least.
+        if let ([only_nm], [only]) = (&nm[..], &value[..]) {
+            (nm, value) = (vec![*only_nm; 2], vec![*only; 2]);
+        }
+        Some(Curve::Linear { nm, value, outside })
+    }
+
+    /// The rows of n or k that are kept: all, or those that channels see where others are impossible, as beyond the ends of what
+    /// a formula or a fit was made for.
+    fn sound(
+        &self,
+        file: &TableFile,
+        nm: &[f64],
+        value: &[f64],
+        quantity: Quantity,
+        warnings: &mut Vec<String>,
+    ) -> std::ops::Range<usize> {
+        let seen = self.seen(nm);
+        let impossible = |v: &[f64]| v.iter().any(|v| !quantity.allows(*v));
+        if !impossible(&value[..seen.start]) && !impossible(&value[seen.end..]) {
+            return 0..nm.len();
+        }
+        warnings.push(format!(
+            "{}: values outside of {} to {} nm, beyond all channels, are left out: some are impossible",
+            file.path.display(),
+            nm[seen.start],
+            nm[seen.end - 1]
+        ));
+        seen
+    }
+
+    /// Brings values into the unit of `quantity`, by what their file says of theirs.
+    fn convert(
+        &self,
+        table: &Tabulated<'_, 'a>,
+        value: &mut [f64],
+        quantity: Quantity,
+        user: &Item<'a>,
+        warnings: &mut Vec<String>,
+    ) -> Option<()> {
+        let Some(file) = table.file else { return Some(()) };
+        let Some(Stated { measure, text, certain }) = &file.unit else { return Some(()) };
+        match measure.to(quantity.kind()) {
+            Some(Density::Plain(1.0)) => {}
+            Some(density) => {
+                value.iter_mut().zip(table.nm).for_each(|(value, nm)| *value = density.apply(*value, *nm));
+            }
+            // A share of anything is what reflectances, tabulated beside other things, are without a unit.
+            None if measure.is_number() => {}
+            None => {
+                let path = file.path.display();
+                let message =
+                    format!("gives its values in the unit of `{text}`, which is not that of {}", quantity.noun());
+                if *certain {
+                    let help = format!("convert them to {}, or correct the header", quantity.unit());
+                    user.error_help(format!("{path} {message}"), help);
+                    return None;
+                }
+                warnings.push(format!("{path} {message}: they are taken in {}", quantity.unit()));
+            }
+        }
+        Some(())
     }
 
     /// An upsampled colour means something in the visible only: beyond, its ends are held with a warning, or as the
@@ -552,6 +599,11 @@ impl<'a> Spectra<'a> {
         let gaps: Vec<String> = [below, above].into_iter().flatten().collect();
         (!gaps.is_empty()).then(|| gaps.join(" and "))
     }
+}
+
+/// A value as it is written, with what it is multiplied by.
+fn scaled_words(value: f64, scale: f64) -> String {
+    if scale == 1.0 { value.to_string() } else { format!("{value} x scale {scale}") }
 }
 
 /// From the shortest to the longest wavelength of all channels, nm.
@@ -683,8 +735,8 @@ fn column_kelvin(name: &str) -> Option<f64> {
 }
 
 fn table_data(table: SpectrumTable, path: PathBuf) -> Data {
-    let SpectrumTable { nm, value, line, measure, notes } = table;
-    Data::Table { nm, value, file: Some(TableFile { path, lines: line, measure, notes }) }
+    let SpectrumTable { nm, value, line, unit, notes } = table;
+    Data::Table { nm, value, file: Some(TableFile { path, lines: line, unit, notes }) }
 }
 
 /// A mistake in a file that `item` names: at its line there, or, if the file as a whole is wrong, at the item.
