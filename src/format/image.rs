@@ -141,6 +141,15 @@ impl Plane {
     }
 }
 
+impl Image {
+    /// Whether a channel is how opaque the others of its layer are; `a` beside other names than those of colours is an `a`.
+    pub fn is_alpha(&self, plane: &Plane) -> bool {
+        let (layer, name) = plane.parts();
+        let has = |wanted: &str| self.planes.iter().any(|other| other.parts() == (layer, wanted));
+        name == "A" || (name == "a" && (["r", "g", "b"].iter().all(|colour| has(colour)) || has("y")))
+    }
+}
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
     Png,

@@ -142,9 +142,10 @@ impl Format {
 fn is_line_list(start: &str) -> bool {
     let mut lines = start.lines().take(3);
     let is_line = |line: &str| {
-        line.len() == 160
-            && line.get(..3).is_some_and(|id| id.trim().parse::<u32>().is_ok() || id[..2].trim().parse::<u32>().is_ok())
-            && line.get(3..15).is_some_and(|wavenumber| wavenumber.trim().parse::<f64>().is_ok())
+        // The isotopologue is a letter where there are more than nine.
+        let molecule = line.get(..2).is_some_and(|id| id.trim().parse::<u32>().is_ok());
+        let wavenumber = line.get(3..15).is_some_and(|text| text.trim().parse::<f64>().is_ok());
+        line.len() == 160 && molecule && wavenumber
     };
     lines.next().is_some_and(is_line) && lines.take(1).all(is_line)
 }
@@ -526,7 +527,10 @@ mod tests {
     #[test]
     fn each_is_read_with_its_units() {
         let lamp = read("lamp.spdx", SPDX, None).unwrap();
-        let density = |table: &SpectrumTable, kind| table.unit.as_ref().and_then(|stated| stated.measure.to(kind));
+        let density = |table: &SpectrumTable, kind| match table.unit.as_ref()?.meaning {
+            unit::Meaning::Unit(measure) => measure.to(kind),
+            _ => None,
+        };
         assert_eq!(density(&lamp, unit::Kind::Irradiance), Some(unit::Density::Plain(1.0)));
         assert_eq!((lamp.nm, lamp.value, lamp.line), (vec![400.0, 405.5], vec![0.5, 0.75], vec![7, 8]));
         let green = read("camera.json", CAMERA, Some("g")).unwrap();

@@ -27,8 +27,10 @@ pub struct Clipped {
 impl Clipped {
     /// In words that go on after "holds".
     pub fn words(&self, range: Range) -> String {
-        let Clipped { count, worst, .. } = self;
-        let values = if *count == 1 { "value" } else { "values" };
+        // A number of f32 has no more digits than these.
+        let worst = format!("{:.6e}", self.worst).parse().unwrap_or(self.worst);
+        let count = self.count;
+        let values = if count == 1 { "value" } else { "values" };
         match range {
             Range::Share => {
                 let to = match (self.below, self.above) {

@@ -66,6 +66,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Obj, Box<Problem>> {
     let problem = |line: Option<usize>, message: &str| {
         Box::new(Problem { file: path.to_owned(), line, message: message.to_owned(), ..Problem::default() })
     };
+    let bytes = &*with_newlines(bytes);
     let mut feeder = Feeder::new(bytes);
     // Without single_index a vertex is its position alone, so triangles share vertices across texture seams. tobj would cut
     // polygons as fans, whatever their outline.
@@ -121,6 +122,14 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Obj, Box<Problem>> {
     }
     let Polygons { bent, crossing, .. } = polygons;
     Ok(Obj { parts, without_surface: feeder.without_surface, bent, crossing })
+}
+
+/// The lines of a file whose lines end as those of old Macs do, as everybody's.
+fn with_newlines(bytes: &[u8]) -> Cow<'_, [u8]> {
+    if bytes.contains(&b'\n') || !bytes.contains(&b'\r') {
+        return Cow::Borrowed(bytes);
+    }
+    bytes.iter().map(|byte| if *byte == b'\r' { b'\n' } else { *byte }).collect()
 }
 
 /// The values at the corners of triangles, which are places in `indices`.

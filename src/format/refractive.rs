@@ -208,7 +208,12 @@ impl Yaml<'_> {
         let Some(formula) = number.parse().ok().and_then(Formula::new) else {
             return Err(self.at(line, format!("has a formula `{}`", number.escape_debug()), "formulas are 1 to 9"));
         };
-        let coefficients = list(&block.coefficients, "coefficients")?;
+        let mut coefficients = list(&block.coefficients, "coefficients")?;
+        let mut notes = Vec::new();
+        if formula.lacks_one(coefficients.len()) {
+            notes.push(format!("has a formula {number} without its last coefficient, which is taken as 0"));
+            coefficients.push(0.0);
+        }
         if !formula.takes(coefficients.len()) {
             let message = format!("formula {number} cannot have {} coefficients", coefficients.len());
             return Err(self.at(block.coefficients.as_ref().and_then(line_of).or(line), message, ""));
@@ -230,7 +235,6 @@ impl Yaml<'_> {
         };
         let is_wrong = |(_, n): &&(f64, f64)| !(n.is_finite() && *n > 0.0);
         let mut nodes = tabulated(from, to);
-        let mut notes = Vec::new();
         if let Some(&(um, _)) = nodes.iter().find(is_wrong) {
             let message = format!("the formula has no real value at {um} um");
             let [first, last] = match self.needed {
@@ -299,6 +303,11 @@ impl Formula {
             8 => (1..=4).contains(&count),
             _ => (1..=6).contains(&count),
         }
+    }
+
+    /// Whether the second number of the last pair is missing.
+    fn lacks_one(self, count: usize) -> bool {
+        matches!(self.0, 1 | 2 | 3 | 5 | 6) && count > 1 && !self.takes(count)
     }
 
     /// n at `um`; not finite where the formula has no real value.

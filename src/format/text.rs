@@ -161,6 +161,8 @@ struct Axis {
     unit: Unit,
     /// Whether the header says that these are wavelengths in air.
     in_air: bool,
+    /// Whether nothing says the unit, so that it is nm.
+    is_guessed: bool,
     /// What is to be said of the table.
     notes: Vec<String>,
 }
@@ -177,6 +179,7 @@ impl Axis {
         let second_is_axis =
             || !matches!(Unit::stated(name(1)), Ok(None)) || name(1).to_lowercase().starts_with("wave");
         let column = usize::from(is_index && table.columns() > 2 && second_is_axis());
+        let is_guessed = unit.is_none() && Unit::stated(name(column)) == Ok(None);
         let unit = match unit {
             Some(unit) => unit,
             None => Unit::from_header(name(column)).map_err(|other| {
@@ -193,7 +196,7 @@ impl Axis {
                 "begins with a column of row numbers, which is left out: wavelengths are those of `{axis}`"
             ));
         }
-        Ok(Axis { column, unit, in_air: unit::is_in_air(name(column)), notes })
+        Ok(Axis { column, unit, in_air: unit::is_in_air(name(column)), is_guessed, notes })
     }
 
     /// The number of the column that is wanted.
@@ -262,6 +265,7 @@ impl Axis {
             let name = table.names.get(*column).map_or("", String::as_str);
             found.unit = Stated::in_name(name);
             found.notes.clone_from(&self.notes);
+            found.notes.extend(self.looks_like_micrometres(&found.nm));
             if self.in_air {
                 found.notes.push(
                     "gives wavelengths in air: they are converted to vacuum (Ciddor 1996, dry air of 15 °C)".to_owned(),
@@ -270,6 +274,18 @@ impl Axis {
             Ok((*column, ascending(found, table.path, &of(*column))?))
         };
         wanted.iter().zip(found).map(finish).collect()
+    }
+
+    /// What to say of wavelengths in nm that nobody has there.
+    fn looks_like_micrometres(&self, nm: &[f64]) -> Option<String> {
+        const SHORTEST: f64 = 100.0;
+        let longest = nm.iter().copied().fold(0.0, f64::max);
+        (self.is_guessed && longest < SHORTEST).then(|| {
+            format!(
+                "does not say in what its wavelengths are: up to {longest}, they are taken as nm (if they are micrometres, \
+                 write `unit = \"um\"`)"
+            )
+        })
     }
 
     /// A wavelength in vacuum.
@@ -338,7 +354,8 @@ impl<'t> Block<'t> {
 
     fn read(&self, path: &Path) -> Result<SpectrumTable, Box<Problem>> {
         let table = table::parse(self.text, self.line, path)?;
-        let axis = Axis { column: 0, unit: Unit::MICROMETRE, in_air: false, notes: table.notes.clone() };
+        let axis =
+            Axis { column: 0, unit: Unit::MICROMETRE, in_air: false, is_guessed: false, notes: table.notes.clone() };
         if table.columns() != 2 {
             return Err(table.problem(
                 Some(table.line),

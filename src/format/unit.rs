@@ -269,35 +269,110 @@ fn tidy(value: f64) -> f64 {
     format!("{value:.14e}").parse().unwrap_or(value)
 }
 
-/// The unit that a file gives to its values.
+/// What a file says of its values' unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stated {
-    pub measure: Measure,
+    pub meaning: Meaning,
     /// What says so.
     pub text: String,
     /// Whether it can be nothing but a unit.
     pub certain: bool,
 }
 
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Meaning {
+    Unit(Measure),
+    /// That of something else than the values themselves.
+    Logarithm,
+    /// A unit or a factor that is not known here.
+    Unknown,
+}
+
 impl Stated {
     /// What the text of a key for units says; `None` if that is not understood.
     pub fn of(text: &str) -> Option<Stated> {
-        parse(text).map(|measure| Stated { measure, text: text.trim().to_owned(), certain: true })
+        let measure = parse(text)?;
+        Some(Stated { meaning: Meaning::Unit(measure), text: text.trim().to_owned(), certain: true })
     }
 
-    /// The unit in the name of a column of values: in brackets, after a comma (where W may as well be the west), or a
-    /// percent sign at its end. What is no unit known here is a part of the name.
+    /// The unit in the name of a column of values: in brackets, at the end of its words, after a comma (where W may as well
+    /// be the west), or a percent sign. What does not look like a unit is a part of the name.
     pub fn in_name(name: &str) -> Option<Stated> {
         let text = plain(name);
-        let within = bracketed(&text).map(str::trim).filter(|inner| !inner.is_empty());
-        let after = || text.rsplit_once(", ").map(|(_, after)| after);
-        let measure = match within.or_else(after) {
-            Some(stated) => parse(stated)?,
-            None if text.ends_with('%') => Measure { factor: 0.01, ..Measure::ONE },
-            None => return None,
-        };
-        Some(Stated { measure, text: name.to_owned(), certain: within.is_some() })
+        let stated = |meaning, certain| Some(Stated { meaning, text: name.to_owned(), certain });
+        if is_logarithm(&text) {
+            return stated(Meaning::Logarithm, true);
+        }
+        if let Some(inner) = bracketed(&text).map(str::trim).filter(|inner| !inner.is_empty()) {
+            return match parse(inner) {
+                Some(measure) => stated(Meaning::Unit(measure), true),
+                None if looks_like_unit(inner) || has_factor(&text) => stated(Meaning::Unknown, true),
+                None => None,
+            };
+        }
+        if let Some(measure) = spectral_power_at_end(&text) {
+            return stated(Meaning::Unit(measure), true);
+        }
+        if text.ends_with('%') {
+            return stated(Meaning::Unit(Measure { factor: 0.01, ..Measure::ONE }), true);
+        }
+        if let Some(measure) = text.rsplit_once(", ").and_then(|(_, after)| parse(after)) {
+            return stated(Meaning::Unit(measure), false);
+        }
+        if has_factor(&text) || spells_power(&text) { stated(Meaning::Unknown, true) } else { None }
     }
+}
+
+fn words(text: &str) -> impl Iterator<Item = &str> {
+    text.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty())
+}
+
+fn is_logarithm(text: &str) -> bool {
+    let lower = text.to_lowercase();
+    let mut all = words(&lower);
+    let begins = all.next() == Some("log")
+        && all
+            .next()
+            .is_some_and(|next| ["rad", "refl", "trans", "irr", "int"].iter().any(|start| next.starts_with(start)));
+    let always = ["log10", "ln", "db", "decibel", "decibels", "absorbance"];
+    begins || lower.contains("log(") || words(&lower).any(|word| always.contains(&word))
+}
+
+/// Whether what stands in brackets can hardly be anything but a unit, or says that there is none.
+fn looks_like_unit(inner: &str) -> bool {
+    const RELATIVE: [&str; 9] =
+        ["a.u.", "au", "a. u.", "arb. units", "arb", "arbitrary units", "relative", "normalized", "normalised"];
+    let is_symbol = |word: &str| symbol(word.trim_end_matches(|c: char| c.is_ascii_digit())).is_some();
+    RELATIVE.contains(&inner.to_lowercase().as_str())
+        || (inner.contains(['/', '^', '*']) && words(inner).any(is_symbol))
+}
+
+/// A unit of power at the end of a name without brackets: `radiance W/m2/sr/nm`.
+fn spectral_power_at_end(text: &str) -> Option<Measure> {
+    let starts = text.char_indices().filter(|(_, c)| c.is_whitespace()).map(|(i, c)| i + c.len_utf8());
+    starts
+        .filter_map(|start| parse(&text[start..]))
+        .find(|measure| measure.powers[WATT] == 1 && measure.powers[METRE] < 0)
+}
+
+/// Whether the words of a name spell a unit of power in no way that could be read: `L_mW_m2_sr_nm`.
+fn spells_power(text: &str) -> bool {
+    let all: Vec<&str> = words(text).collect();
+    let any = |of: &[&str]| all.iter().any(|word| of.contains(word));
+    any(&["W", "mW", "uW"]) && any(&["m2", "cm2", "sr", "nm", "um"])
+}
+
+/// Whether a name says that its values are multiplied by something: `reflectance x 10000`, `R (x1e4)`, `R*100`.
+fn has_factor(text: &str) -> bool {
+    text.char_indices().filter(|(_, c)| matches!(c, 'x' | 'X' | '*')).any(|(i, c)| {
+        let alone = c == '*' || text[..i].chars().next_back().is_none_or(|before| !before.is_alphanumeric());
+        let after = text[i + 1..].trim_start();
+        let end = after
+            .find(|c: char| !(c.is_ascii_digit() || matches!(c, '.' | 'e' | 'E' | '^' | '-')))
+            .unwrap_or(after.len());
+        let number = after[..end].replace("10^", "1e");
+        alone && number.parse::<f64>().is_ok_and(|factor| factor != 1.0)
+    })
 }
 
 /// One form for the many ways to write the same characters: superscripts, minus signs, dots, µ and Å, LaTeX.
@@ -862,12 +937,39 @@ mod tests {
         assert_eq!(absorption("cm-1 atm-1"), Some(Density::Plain(100.0)));
         assert_eq!(absorption("1/km"), Some(Density::Plain(1e-3)));
         assert_eq!(absorption("cm2/molecule"), None);
-        let percent = Stated::in_name("Reflectance (%)").unwrap();
-        assert_eq!((percent.measure.factor, percent.certain), (0.01, true));
-        let radiance = Stated::in_name("Radiance [uW/cm2/sr/nm]").unwrap();
-        assert_eq!(radiance.measure.to(Kind::Radiance), Some(Density::Plain(0.01)));
-        assert_eq!(Stated::in_name("Sample #1"), None);
-        assert_eq!(Stated::in_name("leaf (upper side)"), None);
+    }
+
+    #[test]
+    fn units_in_names_of_columns() {
+        for (name, kind, factor) in [
+            ("Reflectance (%)", Kind::Number, 0.01),
+            ("Reflectance %", Kind::Number, 0.01),
+            ("Radiance [uW/cm2/sr/nm]", Kind::Radiance, 0.01),
+            ("radiance W/m2/sr/um", Kind::Radiance, 1e-3),
+            ("L (10^-3 W m-2 sr-1 nm-1)", Kind::Radiance, 1e-3),
+        ] {
+            let Some(Stated { meaning: Meaning::Unit(measure), certain: true, .. }) = Stated::in_name(name) else {
+                panic!("{name}: {:?}", Stated::in_name(name));
+            };
+            assert_eq!(measure.to(kind), Some(Density::Plain(factor)), "{name}");
+        }
+        for name in ["Sample #1", "leaf (upper side)", "oak (2/3)", "log, oak", "max x", "linen", "x2", "r2"] {
+            assert_eq!(Stated::in_name(name), None, "{name}");
+        }
+        for (name, meaning) in [
+            ("log10 radiance", Meaning::Logarithm),
+            ("log(1/R)", Meaning::Logarithm),
+            ("transmittance (dB)", Meaning::Logarithm),
+            ("log_trans", Meaning::Logarithm),
+            ("radiance (W/m2/sr/furlong)", Meaning::Unknown),
+            ("radiance (a.u.)", Meaning::Unknown),
+            ("L_mW_m2_sr_nm", Meaning::Unknown),
+            ("reflectance x 10000", Meaning::Unknown),
+            ("R (x1e4)", Meaning::Unknown),
+            ("R*100", Meaning::Unknown),
+        ] {
+            assert_eq!(Stated::in_name(name).map(|stated| stated.meaning), Some(meaning), "{name}");
+        }
         assert_eq!(Stated::in_name("wall, W").map(|stated| stated.certain), Some(false));
     }
 

@@ -13,7 +13,7 @@ use crate::error::Problem;
 use crate::format::noise::{self, Range};
 use crate::format::refractive;
 use crate::format::text::{self, Column, SpectrumTable};
-use crate::format::unit::{Density, Kind, Stated, Unit};
+use crate::format::unit::{Density, Kind, Meaning, Stated, Unit};
 use crate::spectral::{Channels, Curve, Outside, upsample};
 
 /// Wavelengths, in nm, far beyond any channel, between which a curve's peak is looked for.
@@ -535,7 +535,26 @@ impl<'a> Spectra<'a> {
         warnings: &mut Vec<String>,
     ) -> Option<()> {
         let Some(file) = table.file else { return Some(()) };
-        let Some(Stated { measure, text, certain }) = &file.unit else { return Some(()) };
+        let Some(Stated { meaning, text, certain }) = &file.unit else { return Some(()) };
+        let path = file.path.display();
+        let taken_as =
+            if quantity.unit().is_empty() { "as they are".to_owned() } else { format!("in {}", quantity.unit()) };
+        let measure = match meaning {
+            Meaning::Unit(measure) => measure,
+            Meaning::Logarithm => {
+                user.error_help(
+                    format!("{path} gives logarithms as its values (`{text}`)"),
+                    "write the values themselves",
+                );
+                return None;
+            }
+            Meaning::Unknown => {
+                warnings.push(format!(
+                    "{path} says `{text}` of its values, which is not understood: they are taken {taken_as}, times `scale`"
+                ));
+                return Some(());
+            }
+        };
         match measure.to(quantity.kind()) {
             Some(Density::Plain(1.0)) => {}
             Some(density) => {
@@ -544,7 +563,6 @@ impl<'a> Spectra<'a> {
             // A share of anything is what reflectances, tabulated beside other things, are without a unit.
             None if measure.is_number() => {}
             None => {
-                let path = file.path.display();
                 let message =
                     format!("gives its values in the unit of `{text}`, which is not that of {}", quantity.noun());
                 if *certain {
@@ -552,7 +570,7 @@ impl<'a> Spectra<'a> {
                     user.error_help(format!("{path} {message}"), help);
                     return None;
                 }
-                warnings.push(format!("{path} {message}: they are taken in {}", quantity.unit()));
+                warnings.push(format!("{path} {message}: they are taken {taken_as}"));
             }
         }
         Some(())

@@ -307,8 +307,7 @@ fn pair(endmembers: &Item, image: &Image, name: &str, warnings: &mut Vec<String>
     if found.iter().all(|channels| channels.len() == 1) && distinct.len() == found.len() {
         return Some(found.concat());
     }
-    let written =
-        || list(items.iter().zip(&names).map(|(item, name)| name.map_or(item.node.value.kind(), |name| name)));
+    let written = || list(items.iter().map(written));
     if found.iter().any(|channels| !channels.is_empty()) {
         let message = format!(
             "only some of the endmembers {} are names of channels of {name}, which has {}",
@@ -327,6 +326,16 @@ fn pair(endmembers: &Item, image: &Image, name: &str, warnings: &mut Vec<String>
         ));
     }
     Some((0..image.planes.len()).collect())
+}
+
+/// An endmember as the scene has it: its name, or its number.
+fn written(item: &Item) -> String {
+    match &item.node.value {
+        Value::String(name) => name.clone(),
+        Value::Float(number) => number.to_string(),
+        Value::Integer(number) => number.to_string(),
+        other => other.kind().to_owned(),
+    }
 }
 
 /// \[y\]\[x\].
@@ -368,8 +377,7 @@ fn numbers(file: &Item, number: Number, image: &Image, name: &str) -> Option<(Ve
 
 /// The channels but an A that is 1 everywhere.
 fn without_alpha<'i>(file: &Item, image: &'i Image, name: &str) -> Option<Vec<&'i Plane>> {
-    let (alpha, others): (Vec<_>, Vec<_>) =
-        image.planes.iter().partition(|plane| plane.parts().1.eq_ignore_ascii_case("a"));
+    let (alpha, others): (Vec<_>, Vec<_>) = image.planes.iter().partition(|plane| image.is_alpha(plane));
     let see_through = alpha.iter().find_map(|plane| plane.samples.iter().position(|a| *a != 1.0));
     if let (Some(i), false) = (see_through, others.is_empty()) {
         let message = format!("{name} is transparent {}, which a texture cannot be", place(image, i));

@@ -5,5 +5,6 @@ mod export;
 mod imports;
 mod outputs;
 mod python;
+mod refractive;
 mod sensor;
 mod store;

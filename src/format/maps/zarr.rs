@@ -26,6 +26,8 @@ const SPECTRUM: [&str; 14] = [
     "channel",
     "spectral",
 ];
+/// Of a map: 64 GiB while it is read.
+const MOST_NUMBERS: u64 = 1 << 33;
 const ROWS: [&str; 8] = ["y", "row", "rows", "lat", "latitude", "line", "height", "theta"];
 const COLUMNS: [&str; 10] = ["x", "column", "columns", "col", "lon", "longitude", "sample", "samples", "width", "phi"];
 
@@ -47,6 +49,9 @@ pub fn read(path: &Path) -> Result<Map, Box<Problem>> {
     let [y, x] = plane(path, &dimensions, spectrum, &mut warnings)?;
     let shape = radiance.shape.clone();
     let size = checked_size(path, shape[x], shape[y])?;
+    if radiance.count().is_none_or(|count| count > MOST_NUMBERS) {
+        return Err(whole(path, format!("has an array of {shape:?} numbers, but at most {MOST_NUMBERS} are read")));
+    }
     let axis = axis(path, &arrays, &dimensions[spectrum], shape[spectrum])?;
     let bands = bands(path, &arrays, axis, &mut warnings)?;
     let density = density(path, radiance, axis.unit()?, &mut warnings)?;
@@ -59,9 +64,6 @@ pub fn read(path: &Path) -> Result<Map, Box<Problem>> {
         _ => false,
     };
 
-    if radiance.count().is_none_or(|count| count > 1 << 33) {
-        return Err(whole(path, format!("has an array of {shape:?} numbers, more than can be read")));
-    }
     let values = radiance.values()?;
     let stride = |dimension: usize| shape[dimension + 1..].iter().product::<u64>() as usize;
     let (by_band, by_row, by_column) = (stride(spectrum), stride(y), stride(x));
