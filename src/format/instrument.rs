@@ -76,6 +76,7 @@ impl Format {
             return Some(Format::Refused(what, help));
         }
         let start = String::from_utf8_lossy(&bytes[..bytes.len().min(4096)]);
+        let untrimmed = &*start;
         let start = start.trim_start_matches('\u{feff}').trim_start();
         if name.ends_with(".spdx") || start.contains("<IESTM2714") || start.contains("<IESTM27") {
             return Some(Format::Spdx);
@@ -100,7 +101,7 @@ impl Format {
         if name.starts_with("rtcoef_") && name.contains("srf") {
             return Some(Format::Rttov);
         }
-        if is_line_list(start) {
+        if is_line_list(untrimmed) {
             let help =
                 "compute absorption coefficients from it, e.g. with HAPI or RADIS, and write them over wavelength";
             return Some(Format::Refused("a list of spectral lines of HITRAN", help));

@@ -67,7 +67,7 @@ pub fn clip<T: Copy + Into<f64>>(
     // What is 0.01 beyond as it is written is so in f32 too.
     let in_f32 = |v: f64| f64::from(v as f32);
     let (least, most, end) = match range {
-        Range::Share => (in_f32(-TOLERATED).min(-TOLERATED), in_f32(1.0 + TOLERATED), 1.0),
+        Range::Share => (in_f32(-TOLERATED).min(-TOLERATED), in_f32(1.0 + TOLERATED).max(1.0 + TOLERATED), 1.0),
         Range::NotNegative => (-TOLERATED * peak(0.0), f64::INFINITY, f64::INFINITY),
         Range::Extinction => (-TOLERATED * peak(1.0), f64::INFINITY, f64::INFINITY),
     };

@@ -20,6 +20,9 @@ type Part = Result<SpectrumTable, Box<Problem>>;
 
 /// Largest relative error of a dispersion formula's table between its nodes: well below the f32 of a device.
 const TABLE_ERROR: f64 = 1e-8;
+/// Beyond these, um, no formula means anything, and products of wavelengths leave f64.
+const SHORTEST_UM: f64 = 1e-6;
+const LONGEST_UM: f64 = 1e9;
 /// Halvings of a formula's range at most. A pole inside the range would need any number.
 const MAX_HALVINGS: u32 = 14;
 
@@ -223,7 +226,7 @@ impl Yaml<'_> {
         let &[from, to] = &range[..] else {
             return Err(self.at(at, format!("a range has two numbers, not {}", range.len()), ""));
         };
-        if !(0.0 < from && from < to && (to * 1e3).is_finite()) {
+        if !(SHORTEST_UM <= from && from < to && to <= LONGEST_UM) {
             return Err(self.at(at, format!("{from} to {to} um is no range of wavelengths"), ""));
         }
 
@@ -236,16 +239,14 @@ impl Yaml<'_> {
         let is_wrong = |(_, n): &&(f64, f64)| !(n.is_finite() && *n > 0.0);
         let mut nodes = tabulated(from, to);
         if let Some(&(um, _)) = nodes.iter().find(is_wrong) {
-            let message = format!("the formula has no real value at {um} um");
-            let [first, last] = match self.needed {
-                Some([first, last]) => [(first * 1e-3).max(from), (last * 1e-3).min(to)],
-                None => [to, from],
+            nodes = match self.needed.map(|needed| needed.map(|nm| (nm / 1e3).clamp(from, to))) {
+                // Channels beside the range see the nearest end of it only.
+                Some([first, last]) if first == last => vec![(first, n(first)); 2],
+                Some([first, last]) => tabulated(first, last),
+                None => nodes,
             };
-            if first < last {
-                nodes = tabulated(first, last);
-            }
-            if first >= last || nodes.iter().any(|node| is_wrong(&node)) {
-                return Err(self.at(line, message, "narrow its range"));
+            if nodes.iter().any(|node| is_wrong(&node)) {
+                return Err(self.at(line, format!("the formula has no real value at {um} um"), "narrow its range"));
             }
             notes.push(format!("has a formula without a real value at {um} um, within the range of its page: it is read within the channels only"));
         }
@@ -440,7 +441,7 @@ mod tests {
             ("DATA:\n  - type: formula 5\n    coefficients: 1.5\n", Some(2), "no `wavelength_range`"),
             ("DATA:\n  - type: formula 5\n    wavelength_range: 2 1\n    coefficients: 1.5\n", Some(3), "no range"),
             (
-                "DATA:\n  - type: formula 5\n    wavelength_range: 1 2\n    coefficients: 1.5 2\n",
+                "DATA:\n  - type: formula 4\n    wavelength_range: 1 2\n    coefficients: 1.5 2\n",
                 Some(4),
                 "2 coefficients",
             ),
@@ -501,6 +502,18 @@ mod tests {
         let expected = (1.0 + 6.44 / (1.0 - 0.05 / 0.25) + 3.16 / (1.0 - 2200.0 / 0.25f64)).sqrt();
         assert!((interpolated(&n, 500.0) - expected).abs() < 2e-8 * expected);
         assert!(read(Some([40_000.0, 49_000.0])).is_err());
+    }
+
+    /// Of a pair that is not whole the second number is 0, and beside its range a formula has the value of its nearest end.
+    #[test]
+    fn what_formulas_leave_out() {
+        let text = "DATA:\n  - type: formula 5\n    wavelength_range: 1 2\n    coefficients: 1.5 2\n";
+        let [Some(n), _] = yaml(text).unwrap() else { panic!("n is given") };
+        assert!(n.value.iter().all(|n| *n == 3.5) && n.notes.len() == 1, "{:?}", n.notes);
+        let text = "DATA:\n  - type: formula 2\n    wavelength_range: 2 50\n    coefficients: 0 6.44 0.05 3.16 2200\n";
+        let n = parse(text.as_bytes(), Path::new("t.yml"), Some([400.0, 700.0])).unwrap().n.unwrap().unwrap();
+        let expected = (1.0 + 6.44 / (1.0 - 0.05 / 4.0) + 3.16 / (1.0 - 2200.0 / 4.0f64)).sqrt();
+        assert!(n.nm == [2000.0; 2] && n.value.iter().all(|n| (n - expected).abs() < 1e-15), "{n:?}");
     }
 
     #[test]

@@ -32,6 +32,12 @@ pub struct Row {
     pub cells: StringRecord,
 }
 
+/// The names of columns, and the row that has them.
+struct Header {
+    names: Vec<String>,
+    row: usize,
+}
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Decimal {
     Point,
@@ -349,72 +355,23 @@ impl Table<'_> {
     /// Takes the names of columns, and whatever stands before them, out of the rows.
     fn find_header(&mut self, separator: Separator, comments: &[(usize, &str)]) -> Read<()> {
         let usual = usual_count(&self.rows);
-        let is_long =
-            |row: &Row| row.cells.len() == 3 && row.cells.get(0).is_some_and(|c| c.eq_ignore_ascii_case("band"));
-        let start = match self.rows.iter().position(is_long) {
-            Some(header) => header + 1,
-            None => {
-                // An index of pandas has no name and is a number, so any of the first two cells will do.
-                let begins = |row: &Row| row.cells.get(0).is_some_and(|cell| self.is_number(cell));
-                let whole = |row: &Row| begins(row) && row.cells.len() == usual;
-                match self.rows.iter().position(whole).or_else(|| self.rows.iter().position(begins)) {
-                    Some(start) => start,
-                    None => {
-                        let row = &self.rows[self.rows.len().min(2) - 1];
-                        let cell = shown(row.cells.get(0).unwrap_or(""));
-                        let message = format!("`{cell}` is not a finite number, and no line begins with one");
-                        return Err(self.problem(Some(row.line), message, "write lines of `nm,value`"));
-                    }
-                }
-            }
-        };
+        let start = self.first_row(usual)?;
         let width = self.rows.get(start).map_or(usual, |row| row.cells.len());
-        // Blanks within names make more cells of them; they are one name if there is one value.
-        let head = self.rows[..start].iter().rposition(|row| row.cells.len() != width).map_or(0, |i| i + 1);
-        let block = start - head;
-        let mut names: Vec<String> = Vec::new();
-        let mut preamble = head;
-        if block > 0 {
-            let cells = |row: usize| self.rows[row].cells.iter().map(str::to_owned).collect::<Vec<_>>();
-            let units = (head + 1..start).find(|&row| self.is_line_of_units(row));
-            let chosen = units.map_or(start - 1, |row| row - 1);
-            names = cells(chosen);
-            self.line = self.rows[chosen].line;
-            preamble = chosen;
-            if let Some(units) = units {
-                for (name, unit) in names.iter_mut().zip(cells(units)) {
-                    let bare = unit.trim_matches(['(', ')', '[', ']', ' ']);
-                    if !bare.is_empty() && *bare != *name {
-                        *name = format!("{name} ({bare})");
-                    }
-                }
-            }
-        } else if start > 0 && separator == Separator::Space {
-            let row = &self.rows[start - 1];
-            let words: Vec<&str> = row.cells.iter().collect();
-            if let Some(joined) = join_names(&words, width) {
-                (names, self.line) = (joined, row.line);
-                preamble = start - 1;
-            }
-        }
-        if names.is_empty()
-            && let Some((line, found)) = self.header_in_comment(separator, width, start, comments)
-        {
+        let header = (self.header_of_cells(start, width))
+            .or_else(|| self.header_of_words(start, width).filter(|_| separator == Separator::Space));
+        let preamble = header.as_ref().map_or(start, |header| header.row);
+        let mut names = Vec::new();
+        if let Some(header) = header {
+            (names, self.line) = (header.names, self.rows[header.row].line);
+        } else if let Some((line, found)) = self.header_in_comment(separator, width, start, comments) {
             let axis = &found[0];
             if !matches!(Unit::stated(axis), Ok(None | Some(Unit::NANOMETRE))) || unit::is_in_air(axis) {
                 let shown = shown(axis);
                 self.notes.push(format!("names its columns in the comment on line {line}, the first one `{shown}`"));
             }
             (names, self.line) = (found, line);
-        }
-        if names.is_empty() && start > 0 {
-            let row = &self.rows[start - 1];
-            let message = format!("has {} cells where the numbers below have {width}", row.cells.len());
-            let names_something = row.cells.len() > 1 || Unit::stated(row.cells.get(0).unwrap_or("")) != Ok(None);
-            if names_something {
-                let help = "give the header a name for every column, and begin lines about something else with `# `";
-                return Err(self.problem(Some(row.line), message, help));
-            }
+        } else if start > 0 {
+            self.refuse_names_of_other_columns(start - 1, width)?;
         }
         self.look_at_preamble(preamble)?;
         self.warn_of_units_in_comments(&names, start, comments);
@@ -424,6 +381,62 @@ impl Table<'_> {
         self.names = names;
         self.rows.drain(..start);
         Ok(())
+    }
+
+    /// The place of the first row of numbers, of which most have `usual` cells; that of a long table of responses begins with a
+    /// name.
+    fn first_row(&self, usual: usize) -> Read<usize> {
+        let is_long =
+            |row: &Row| row.cells.len() == 3 && row.cells.get(0).is_some_and(|c| c.eq_ignore_ascii_case("band"));
+        if let Some(header) = self.rows.iter().position(is_long) {
+            return Ok(header + 1);
+        }
+        let begins = |row: &Row| row.cells.get(0).is_some_and(|cell| self.is_number(cell));
+        let whole = |row: &Row| begins(row) && row.cells.len() == usual;
+        self.rows.iter().position(whole).or_else(|| self.rows.iter().position(begins)).ok_or_else(|| {
+            let row = &self.rows[self.rows.len().min(2) - 1];
+            let cell = shown(row.cells.get(0).unwrap_or(""));
+            let message = format!("`{cell}` is not a finite number, and no line begins with one");
+            self.problem(Some(row.line), message, "write lines of `nm,value`")
+        })
+    }
+
+    /// Names with a cell each, right before the row `start`; a line of units may stand between.
+    fn header_of_cells(&self, start: usize, width: usize) -> Option<Header> {
+        let head = self.rows[..start].iter().rposition(|row| row.cells.len() != width).map_or(0, |i| i + 1);
+        if head == start {
+            return None;
+        }
+        let cells = |row: usize| self.rows[row].cells.iter().map(str::to_owned).collect::<Vec<_>>();
+        let units = (head + 1..start).find(|&row| self.is_line_of_units(row));
+        let row = units.unwrap_or(start) - 1;
+        let mut names = cells(row);
+        for (name, unit) in names.iter_mut().zip(units.map(cells).unwrap_or_default()) {
+            let bare = unit.trim_matches(['(', ')', '[', ']', ' ']);
+            if !bare.is_empty() && *bare != *name {
+                *name = format!("{name} ({bare})");
+            }
+        }
+        Some(Header { names, row })
+    }
+
+    /// Names between blanks, which hold blanks themselves, so that they seem to be more than there are columns.
+    fn header_of_words(&self, start: usize, width: usize) -> Option<Header> {
+        let row = start.checked_sub(1)?;
+        let words: Vec<&str> = self.rows[row].cells.iter().collect();
+        Some(Header { names: join_names(&words, width)?, row })
+    }
+
+    /// A line before the numbers that names columns, but not these.
+    fn refuse_names_of_other_columns(&self, row: usize, width: usize) -> Read<()> {
+        let row = &self.rows[row];
+        let names_something = row.cells.len() > 1 || Unit::stated(row.cells.get(0).unwrap_or("")) != Ok(None);
+        if !names_something {
+            return Ok(());
+        }
+        let message = format!("has {} cells where the numbers below have {width}", row.cells.len());
+        let help = "give the header a name for every column, and begin lines about something else with `# `";
+        Err(self.problem(Some(row.line), message, help))
     }
 
     /// Whether every cell of a row is empty or a unit, the first that of a spectral axis.

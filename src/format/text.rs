@@ -179,7 +179,15 @@ impl Axis {
         let second_is_axis =
             || !matches!(Unit::stated(name(1)), Ok(None)) || name(1).to_lowercase().starts_with("wave");
         let column = usize::from(is_index && table.columns() > 2 && second_is_axis());
-        let is_guessed = unit.is_none() && Unit::stated(name(column)) == Ok(None);
+        let stated = Unit::stated(name(column));
+        if let (Some(unit), Ok(Some(of_header))) = (unit, &stated)
+            && unit != *of_header
+        {
+            let message =
+                format!("calls its first column `{}`, and the scene says another unit", table::shown(name(column)));
+            return Err(table.problem(Some(table.line), message, "remove `unit`, or correct the header"));
+        }
+        let is_guessed = unit.is_none() && stated == Ok(None);
         let unit = match unit {
             Some(unit) => unit,
             None => Unit::from_header(name(column)).map_err(|other| {
@@ -476,14 +484,20 @@ mod tests {
         for wrong in [0, 1, 4] {
             assert!(number("400,1,2\n500,3,4\n", Column::Number(wrong)).unwrap_err().help.unwrap().contains("2 to 3"));
         }
+        let in_um = |text: &str| parse(text.as_bytes(), Path::new("t.csv"), Column::Only, Some(Unit::MICROMETRE));
+        assert_eq!(in_um("Frequency,v\n0.4,1\n0.5,3\n").unwrap().nm, [400.0, 500.0]);
+        assert_eq!(in_um("wl (um),v\n0.4,1\n0.5,3\n").unwrap().nm, [400.0, 500.0]);
+        assert!(in_um("nm,v\n400,1\n500,3\n").unwrap_err().message.contains("the scene says another unit"));
         let twice = number("nm,v,v\n400,1,2\n500,1,2", Column::Named("v")).unwrap_err();
-        assert!(twice.message.contains("several columns") && twice.help.unwrap().contains("2 or 3"));
+        assert!(twice.message.contains("several columns") && twice.help.unwrap().contains("`column = 2` or 3"));
     }
 
     #[test]
     fn an_index_is_two_columns() {
         let index = |text: &str| parse_index(text.as_bytes(), Path::new("nk.csv"));
-        for text in ["400,1.5,0\n500,1.4,0.25\n", "k,nm,x\n", "um,k,x,n\n0.4,0,9,1.5\n0.5,0.25,,1.4\n"] {
+        for text in
+            ["400,1.5,0\n500,1.4,0.25\n", "k,nm,x\n400,1,2\n500,1,2\n", "um,k,x,n\n0.4,0,9,1.5\n0.5,0.25,,1.4\n"]
+        {
             match index(text) {
                 Ok([Some(n), Some(k)]) => {
                     assert_eq!((n.nm, n.value), (vec![400.0, 500.0], vec![1.5, 1.4]), "{text}");

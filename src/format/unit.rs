@@ -304,6 +304,10 @@ impl Stated {
             return stated(Meaning::Logarithm, true);
         }
         if let Some(inner) = bracketed(&text).map(str::trim).filter(|inner| !inner.is_empty()) {
+            // A number by itself is that of a sample, or a factor that is or is not applied.
+            if inner.starts_with(|c: char| c.is_ascii_digit()) && parse(inner).is_some_and(Measure::is_number) {
+                return if inner.contains(['e', 'E', '^']) { stated(Meaning::Unknown, true) } else { None };
+            }
             return match parse(inner) {
                 Some(measure) => stated(Meaning::Unit(measure), true),
                 None if looks_like_unit(inner) || has_factor(&text) => stated(Meaning::Unknown, true),
@@ -365,7 +369,7 @@ fn spells_power(text: &str) -> bool {
 /// Whether a name says that its values are multiplied by something: `reflectance x 10000`, `R (x1e4)`, `R*100`.
 fn has_factor(text: &str) -> bool {
     text.char_indices().filter(|(_, c)| matches!(c, 'x' | 'X' | '*')).any(|(i, c)| {
-        let alone = c == '*' || text[..i].chars().next_back().is_none_or(|before| !before.is_alphanumeric());
+        let alone = c == '*' || text[..i].chars().next_back().is_some_and(|before| !before.is_alphanumeric());
         let after = text[i + 1..].trim_start();
         let end = after
             .find(|c: char| !(c.is_ascii_digit() || matches!(c, '.' | 'e' | 'E' | '^' | '-')))
@@ -383,6 +387,7 @@ fn plain(text: &str) -> String {
         ("\\mathsf", ""),
         ("\\textrm", ""),
         ("\\text", ""),
+        ("\\mu ", "u"),
         ("\\mu", "u"),
         ("\\cdot", "*"),
         ("\\AA", "\u{c5}"),
@@ -967,6 +972,7 @@ mod tests {
             ("reflectance x 10000", Meaning::Unknown),
             ("R (x1e4)", Meaning::Unknown),
             ("R*100", Meaning::Unknown),
+            ("R (1e-4)", Meaning::Unknown),
         ] {
             assert_eq!(Stated::in_name(name).map(|stated| stated.meaning), Some(meaning), "{name}");
         }

@@ -52,8 +52,14 @@ fn whole(path: &Path, message: String, help: &str) -> Box<Problem> {
 /// The arrays of the group at `path`, by name. Only their metadata are looked at: what they are compressed with matters to who
 /// reads them.
 pub fn arrays(path: &Path) -> Read<Vec<Variable>> {
-    if !path.join("zarr.json").is_file() && !path.join(".zgroup").is_file() && !path.join(".zmetadata").is_file() {
-        let what = if path.join(".zarray").is_file() { "is one Zarr array" } else { "is no Zarr store" };
+    let what = if Variable::open(path)?.is_some() {
+        Some("is one Zarr array")
+    } else if !["zarr.json", ".zgroup", ".zmetadata"].iter().any(|name| path.join(name).is_file()) {
+        Some("is no Zarr store")
+    } else {
+        None
+    };
+    if let Some(what) = what {
         let help = "give the folder of a group with `zarr.json` or `.zgroup` in it";
         return Err(whole(path, what.to_owned(), help));
     }

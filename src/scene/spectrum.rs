@@ -462,12 +462,15 @@ impl<'a> Spectra<'a> {
         }
         let nm = &nm[kept.clone()];
         let mut value: Vec<f64> = unscaled[kept.clone()].iter().map(|v| v * source.scale).collect();
-        if let (Some(file), Some(range)) = (file, quantity.noise())
-            && let Ok(Some(clipped)) = noise::clip(&mut value, range, |v| v)
-        {
-            warnings.push(format!("{} holds {}", file.path.display(), clipped.words(range)));
+        let mut wrong = None;
+        if let (Some(file), Some(range)) = (file, quantity.noise()) {
+            match noise::clip(&mut value, range, |v| v) {
+                Ok(None) => {}
+                Ok(Some(clipped)) => warnings.push(format!("{} holds {}", file.path.display(), clipped.words(range))),
+                Err(i) => wrong = Some(i),
+            }
         }
-        if let Some(i) = value.iter().position(|v| !quantity.allows(*v)) {
+        if let Some(i) = wrong.or_else(|| value.iter().position(|v| !quantity.allows(*v))) {
             let text = format!("{} at {} nm", scaled_words(unscaled[kept.start + i], source.scale), nm[i]);
             match file.map(|file| (file, file.lines.get(kept.start + i))) {
                 Some((file, Some(line))) => self.cx.push(Problem {

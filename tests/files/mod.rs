@@ -7,4 +7,5 @@ mod outputs;
 mod python;
 mod refractive;
 mod sensor;
+mod spoilt;
 mod store;

@@ -363,7 +363,8 @@ fn zarr_resolves() {
     let wrong = zarr_folder(["wavelength", "y", "x"], r#"{"units": "K"}"#);
     wrong.refused("map = \"s.zarr\"", &["s.zarr", "\"K\"", "units = \"nm\""]);
     zarr_folder(["wavelength", "y", "x"], "{}").refused("map = \"s.zarr\"", &["in what unit"]);
-    zarr_folder(["wavelength", "y", "x"], "{}").refused("map = \"s.zarr/sky\"", &["sky is no Zarr store"]);
+    zarr_folder(["wavelength", "y", "x"], "{}")
+        .refused("map = \"s.zarr/sky\"", &["sky is one Zarr array", "the folder of a group"]);
 }
 
 #[test]
