@@ -94,7 +94,9 @@ impl Format {
         if start.starts_with("/***") && start.to_lowercase().contains("sig data") {
             return Some(Format::Svc);
         }
-        if name.ends_with(".sed") && start.contains("Data:") || start.contains("Columns [") && start.contains("\nData:")
+        let has_columns = start.contains("Columns [");
+        if name.ends_with(".sed") && (has_columns || start.contains("Data:"))
+            || has_columns && start.contains("\nData:")
         {
             return Some(Format::SpectralEvolution);
         }
@@ -204,7 +206,11 @@ fn spdx(bytes: &[u8], path: &Path, column: Column) -> Read<SpectrumTable> {
         let line = line_at(reader.buffer_position());
         let event = match reader.read_event() {
             Ok(event) => event,
-            Err(e) => return wrong(path, line, format!("is no XML that can be read: {e}"), ""),
+            // The parser quotes names as they are, with the ends of lines in them.
+            Err(e) => {
+                let what = e.to_string().replace('\n', " ");
+                return wrong(path, line, format!("is no XML that can be read: {what}"), "");
+            }
         };
         match event {
             Event::Start(start) => {
@@ -588,7 +594,7 @@ mod tests {
             ("camera.json", CAMERA.to_owned(), Some("X"), "no column \"X\""),
             ("leaf.sig", SIG.replace("Radiance, Radiance", "Counts, Counts"), Some("target"), "no radiance"),
             ("leaf.sig", SIG.replace("400.0", "340.0"), None, "next detector"),
-            ("leaf.sed", SED.replace("\nData:", "\nDaten:").replace("Columns", "Data"), None, "no line `Data:`"),
+            ("leaf.sed", SED.replace("\nData:", "\nDaten:"), None, "no line `Data:`"),
         ] {
             let problem = read(name, &text, column).unwrap_err();
             assert!(problem.message.contains(words), "{name}: {problem}");

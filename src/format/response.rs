@@ -7,7 +7,7 @@ use super::instrument::Format;
 use super::noise::{self, Range};
 use super::table;
 use super::text::{SpectrumTable, ascending, read};
-use super::unit::{self, Unit};
+use super::unit::{self, Meaning, Stated, Unit};
 use crate::error::Problem;
 use crate::spectral::Response;
 
@@ -103,6 +103,11 @@ pub fn parse_responses(bytes: &[u8], path: &Path) -> Result<Responses, Box<Probl
     if tables.is_empty() {
         return Err(wrong(None, "holds no responses".into(), ""));
     }
+    let is_logarithm = |name: &str| Stated::in_name(name).is_some_and(|stated| stated.meaning == Meaning::Logarithm);
+    if let Some((name, _)) = tables.iter().find(|(name, _)| is_logarithm(name)) {
+        let message = format!("gives logarithms as the responses \"{}\"", name.escape_debug());
+        return Err(wrong(Some(table.line), message, "write the responses themselves"));
+    }
     let mut seen = std::collections::BTreeSet::new();
     if let Some((name, _)) = tables.iter().find(|(name, _)| !seen.insert(name.clone())) {
         let message = format!("has two channels named \"{}\"", name.escape_debug());
@@ -196,6 +201,7 @@ mod tests {
             ("nm,a,a\n400,1,1\n500,1,1\n", Some(1), "two channels named \"a\""),
             ("Frequency,a\n400,1\n500,1\n", Some(1), "`Frequency`"),
             ("band,nm,response\n", None, "no responses"),
+            ("nm,log10 a\n400,0\n500,1\n", Some(1), "logarithms"),
             ("band,nm,response\na,400,1\na,500,1\na,450,1\na,600,1\n", Some(4), "follows"),
         ] {
             let problem = parse(text).unwrap_err();
