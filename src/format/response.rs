@@ -136,7 +136,7 @@ fn responses(tables: Vec<(String, SpectrumTable)>, notes: Vec<String>, path: &Pa
                 let help = Some("values down to -1 % of the peak are taken as noise and become 0".to_owned());
                 return Err(Box::new(Problem {
                     file: path.to_owned(),
-                    line: Some(table.line[i]),
+                    line: table.line.get(i).copied(),
                     message,
                     help,
                     ..Problem::default()
