@@ -11,11 +11,13 @@ that said that this machine lacks what they need. Needs nothing but Python 3.9.
 """
 
 import argparse
+import atexit
 import collections
 import json
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -26,6 +28,8 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 TABLE = ROOT / "docs/TESTING.md"
 # A process that is silent for so long hangs: the longest test takes minutes.
 PATIENCE_S = 3600
+# Free memory that temporary folders may be made in.
+MEMORY_FOLDER_BYTES = 8 << 30
 # What tests report beside their result (tests/support/report.rs).
 PARTS = ["compilation", "rendering", "reference", "program"]
 # What libtest prints when a test begins, and at its end.
@@ -114,6 +118,8 @@ class Printer:
 say = Printer()
 # Whether to say how much of the standard error that they may have tests use.
 verbose = False
+# Whether tests make all of their proofs.
+full = False
 
 
 def told(test):
@@ -128,6 +134,8 @@ def run_by_name(job, output, report):
     while left:
         command = [job.executable, "--exact", "--test-threads=1", "--include-ignored", *left]
         environment = dict(os.environ, SPECTILE_TEST_REPORT=report.name)
+        if full:
+            environment["SPECTILE_FULL"] = "1"
         errors = tempfile.TemporaryFile("w+", errors="replace")
         process = subprocess.Popen(
             command, cwd=ROOT, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=errors, env=environment
@@ -239,8 +247,14 @@ def main():
     parser.add_argument("--failed", action="append", default=[], help="another check that failed, to be counted")
     parser.add_argument("words", nargs="*")
     arguments = parser.parse_args()
-    global verbose
-    verbose = arguments.verbose
+    global verbose, full
+    verbose, full = arguments.verbose, arguments.full
+
+    # Tests of what is safe on a disk wait for it a hundred times longer than they work.
+    memory = pathlib.Path("/dev/shm")
+    if "TMPDIR" not in os.environ and memory.is_dir() and shutil.disk_usage(memory).free > MEMORY_FOLDER_BYTES:
+        tempfile.tempdir = os.environ["TMPDIR"] = tempfile.mkdtemp(prefix="spectile-tests-", dir=memory)
+        atexit.register(shutil.rmtree, tempfile.tempdir, ignore_errors=True)
 
     began = time.monotonic()
     programs = build()

@@ -17,4 +17,4 @@ mod scene;
 mod slurm;
 mod support;
 
-use support::{binary, cube_files, cubes, device, outside, report, scene_builder, statistics, tracer, truth};
+use support::{binary, cube_files, cubes, device, outside, report, scene_builder, size, statistics, tracer, truth};

@@ -2,13 +2,13 @@
 
 use std::fmt::Write as _;
 use std::fs::File;
-use std::io::{BufRead, BufReader, BufWriter, Write};
+use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 
 use super::{PIECE_BYTES, Progress};
-use crate::Result;
 use crate::cube::{Rect, Strides, View};
 use crate::files::output::{Product, Replacement};
+use crate::{Error, Result};
 
 /// What [`write`] writes.
 pub const TABLE: Product = Product {
@@ -44,29 +44,29 @@ fn is_table(path: &Path) -> std::result::Result<(), String> {
 /// stored ones exactly; what is not rendered is empty.
 pub fn write(view: &View, path: &Path, progress: &mut Progress) -> Result<Vec<PathBuf>> {
     let mut replacement = Replacement::create(path, TABLE)?;
-    let mut file = BufWriter::with_capacity(1 << 20, replacement.file());
-    let result = write_rows(view, &mut file, progress);
-    let flushed = file.flush();
-    drop(file);
-    match result {
-        Ok(Ok(())) => flushed.map_err(|error| replacement.failed(&error))?,
-        Ok(Err(error)) => return Err(replacement.failed(&error)),
-        Err(error) => return Err(error),
-    }
+    let mut table = csv::WriterBuilder::new().buffer_capacity(1 << 20).from_writer(replacement.file());
+    let written = write_rows(view, &mut table, progress)?;
+    let flushed = written.and_then(|()| Ok(table.flush()?));
+    drop(table);
+    flushed.map_err(|error| match error.into_kind() {
+        csv::ErrorKind::Io(error) => replacement.failed(&error),
+        other => Error::Internal(format!("{}: {other:?}", path.display())),
+    })?;
     replacement.finish()?;
     Ok(vec![path.to_owned()])
 }
 
 /// The outer result is that of reading, the inner one that of writing.
-fn write_rows(view: &View, file: &mut impl Write, progress: &mut Progress) -> Result<std::io::Result<()>> {
+fn write_rows(view: &View, table: &mut csv::Writer<impl Write>, progress: &mut Progress) -> Result<csv::Result<()>> {
     let (mut reader, bands, rect) = (view.reader(), view.channels().len(), view.rect());
     let [left, top] = view.cube().header().origin;
-    // Writing to a string cannot fail.
-    let mut line = "x,y".to_owned();
-    view.channels().names.iter().for_each(|name| _ = write!(line, ",{}", cell(name)));
-    line.push('\n');
+    let names = view.channels().names.iter().map(String::as_str);
+    if let Err(error) = table.write_record(["x", "y"].into_iter().chain(names)) {
+        return Ok(Err(error));
+    }
     let together = (PIECE_BYTES / (4 * bands)).clamp(1, rect.width() as usize) as u32;
     let mut values = Vec::new();
+    let mut cell = String::new();
     for y in rect.y0..rect.y1 {
         for x0 in (rect.x0..rect.x1).step_by(together as usize) {
             let x1 = (x0 + together).min(rect.x1);
@@ -74,19 +74,9 @@ fn write_rows(view: &View, file: &mut impl Write, progress: &mut Progress) -> Re
             let strides = Strides { row: 0, pixel: bands, band: 1 };
             reader.read(Rect { x0, x1, y0: y, y1: y + 1 }, 0..bands, strides, &mut values)?;
             for (x, spectrum) in (x0..x1).zip(values.chunks_exact(bands)) {
-                let _ = write!(line, "{},{}", left + x, top + y);
-                for &value in spectrum {
-                    line.push(',');
-                    if !value.is_nan() {
-                        // Debug, not Display: 1e-30 instead of thirty zeros.
-                        let _ = write!(line, "{value:?}");
-                    }
-                }
-                line.push('\n');
-                if let Err(error) = file.write_all(line.as_bytes()) {
+                if let Err(error) = write_row(table, [left + x, top + y], spectrum, &mut cell) {
                     return Ok(Err(error));
                 }
-                line.clear();
             }
         }
         progress(u64::from(y + 1 - rect.y0) * u64::from(rect.width()), rect.pixels())?;
@@ -94,7 +84,23 @@ fn write_rows(view: &View, file: &mut impl Write, progress: &mut Progress) -> Re
     Ok(Ok(()))
 }
 
-/// A cell of a table, quoted where its text asks for it.
-fn cell(text: &str) -> String {
-    if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
+/// `cell` is for this function only, whose memory is kept between rows.
+fn write_row(
+    table: &mut csv::Writer<impl Write>,
+    place: [u32; 2],
+    spectrum: &[f32],
+    cell: &mut String,
+) -> csv::Result<()> {
+    for coordinate in place {
+        table.write_field(coordinate.to_string())?;
+    }
+    for value in spectrum {
+        cell.clear();
+        if !value.is_nan() {
+            // Debug, not Display: 1e-30 instead of thirty zeros. Writing to a string cannot fail.
+            let _ = write!(cell, "{value:?}");
+        }
+        table.write_field(&*cell)?;
+    }
+    table.write_record(None::<&[u8]>)
 }

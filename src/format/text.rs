@@ -1,12 +1,12 @@
 //! Spectra in files. Here CSV (`nm,value`, with more columns by name or number; `nm,n,k`) and `.spd` (`nm value`); which of
 //! the other formats a file has is told from its name and how it begins.
 
-use std::fmt::{Debug, Write};
+use std::fmt::Debug;
 use std::path::Path;
 
 use super::table::{self, Table};
 use super::unit::{self, Stated, Unit};
-use super::{instrument, library, modtran};
+use super::{csv_table, instrument, library, modtran};
 use crate::error::Problem;
 use crate::spectral::Channels;
 
@@ -43,17 +43,14 @@ impl<'a> From<Option<&'a str>> for Column<'a> {
 /// many digits as bring back the numbers exactly.
 pub fn spectrum_csv<T: Debug>(channels: &Channels, radiance: &[T], standard_error: Option<&[T]>) -> String {
     // The header stands first: many readers of CSV know no comments.
-    let mut csv = "wavelength_nm,radiance".to_owned();
-    csv += if standard_error.is_some() { ",standard_error\n" } else { "\n" };
+    let columns = if standard_error.is_some() { 3 } else { 2 };
+    let mut table = csv_table::Table::new(&["wavelength_nm", "radiance", "standard_error"][..columns]);
     for (k, radiance) in radiance.iter().enumerate() {
-        // Debug, not Display: 1e-30 instead of thirty zeros. Writing to a string cannot fail.
-        let _ = write!(csv, "{},{radiance:?}", channels.centre(k));
-        let _ = match standard_error {
-            Some(errors) => writeln!(csv, ",{:?}", errors[k]),
-            None => writeln!(csv),
-        };
+        // Debug, not Display: 1e-30 instead of thirty zeros.
+        let error = standard_error.map(|errors| format!("{:?}", errors[k]));
+        table.row([channels.centre(k).to_string(), format!("{radiance:?}")].into_iter().chain(error));
     }
-    csv
+    table.finish()
 }
 
 /// Reads the spectrum of `column` of the file at `path`: CSV, `.spd`, an ENVI spectral library, ECOSTRESS or USGS text,

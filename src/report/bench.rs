@@ -7,11 +7,12 @@ use std::fmt::Write;
 use serde_json::{Value, json};
 
 use super::Circumstances;
-use super::chart::{Line, log_log};
 use super::page::Page;
 use super::throughput::{Rates, median};
 use crate::Result;
 use crate::files::format_bytes;
+use crate::format::csv_table::Table;
+use crate::format::plot::{Line, log_log};
 use crate::scene::Evaluator;
 
 /// Pixels of the frames that frames per second are told of: 512 x 512, one sample each.
@@ -98,29 +99,29 @@ pub const CSV_HEADER: &str = "part,scene,evaluator,kernels,channels,pool,paths_p
 
 impl Report {
     pub fn csv(&self) -> String {
-        let mut text = format!("{CSV_HEADER}\n");
+        let mut table = Table::new(&CSV_HEADER.split(',').collect::<Vec<_>>());
         for row in &self.rows {
             let [slowest, fastest] = row.rates.range();
             let micro = |s: f64| format!("{:.5}", 1e6 * s);
-            let _ = writeln!(
-                text,
-                "{},\"{}\",{},{},{},{},{:.1},{slowest:.1},{fastest:.1},{:.4},{},{},{},{},{}",
-                row.part.name(),
-                row.scene.replace('"', "\"\""),
-                row.evaluator.name(),
-                if row.everything { "all" } else { "own" },
-                row.channels,
-                row.pool,
-                row.rates.median(),
-                row.rates.median() / FRAME_PIXELS,
+            table.row([
+                row.part.name().to_owned(),
+                row.scene.clone(),
+                row.evaluator.name().to_owned(),
+                (if row.everything { "all" } else { "own" }).to_owned(),
+                row.channels.to_string(),
+                row.pool.to_string(),
+                format!("{:.1}", row.rates.median()),
+                format!("{slowest:.1}"),
+                format!("{fastest:.1}"),
+                format!("{:.4}", row.rates.median() / FRAME_PIXELS),
                 micro(row.rates.generate_s),
                 micro(row.rates.evaluate_s),
-                row.path_bytes,
-                row.planned_bytes,
+                row.path_bytes.to_string(),
+                row.planned_bytes.to_string(),
                 row.allocated_bytes.map_or(String::new(), |bytes| bytes.to_string()),
-            );
+            ]);
         }
-        text
+        table.finish()
     }
 
     pub fn json(&self) -> Value {

@@ -5,10 +5,11 @@ use std::fmt::Write;
 use serde_json::{Value, json};
 
 use super::Circumstances;
-use super::chart::{Line, log_log};
 use super::convergence::{Point, mean, root_mean_square};
 use super::page::Page;
 use crate::Result;
+use crate::format::csv_table::Table;
+use crate::format::plot::{Line, log_log};
 
 /// Channel groups that curves are drawn for, at most.
 const GROUPS: usize = 4;
@@ -111,7 +112,7 @@ pub const CSV_HEADER: &str = "curve,channels,samples_per_pixel,seconds,group_nm,
 impl Report {
     /// One row a curve, epoch and group of channels.
     pub fn csv(&self) -> String {
-        let mut text = format!("{CSV_HEADER}\n");
+        let mut table = Table::new(&CSV_HEADER.split(',').collect::<Vec<_>>());
         for curve in &self.curves {
             for (group, members) in curve.groups() {
                 for p in &curve.points {
@@ -119,18 +120,20 @@ impl Report {
                     let (relmse, error) = (mean(&of(&p.rel_mse)), root_mean_square(&of(&p.error)));
                     let estimate = root_mean_square(&of(&p.estimate));
                     let estimate = if estimate.is_nan() { String::new() } else { format!("{estimate:e}") };
-                    let _ = writeln!(
-                        text,
-                        "\"{}\",{},{},{:.6},{group},{relmse:e},{error:e},{estimate}",
-                        curve.name.replace('"', "\"\""),
-                        curve.centres.len(),
-                        p.samples,
-                        p.seconds
-                    );
+                    table.row([
+                        curve.name.clone(),
+                        curve.centres.len().to_string(),
+                        p.samples.to_string(),
+                        format!("{:.6}", p.seconds),
+                        group.clone(),
+                        format!("{relmse:e}"),
+                        format!("{error:e}"),
+                        estimate,
+                    ]);
                 }
             }
         }
-        text
+        table.finish()
     }
 
     pub fn json(&self) -> Value {

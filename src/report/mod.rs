@@ -1,7 +1,6 @@
 //! Reports: what is measured, as CSV, JSON and one self-contained page of HTML.
 
 pub mod bench;
-pub mod chart;
 pub mod converge;
 pub mod convergence;
 pub mod page;

@@ -20,6 +20,7 @@ use serde_json::{Value, json};
 pub use bench::{Bench, Machine};
 
 use crate::Result;
+use crate::format::csv_table::Table;
 use crate::report::page::Page;
 use crate::report::{Circumstances, STRESS_CSV_HEADER};
 
@@ -137,24 +138,17 @@ pub fn facts(case: &Case, outcome: &Outcome) -> Value {
 
 /// The report as CSV: one row a check.
 pub fn csv(outcomes: &[(Case, Outcome)]) -> String {
-    let mut text = format!("{STRESS_CSV_HEADER}\n");
+    let mut table = Table::new(&STRESS_CSV_HEADER.split(',').collect::<Vec<_>>());
     for (case, outcome) in outcomes {
         for c in &outcome.checks {
-            text += &format!(
-                "{},{},\"{}\",{:e},{:e},{:e},{:e},{:e},{}\n",
-                case.group,
-                case.name,
-                c.what.replace('"', "\"\""),
-                c.expected,
-                c.got,
-                c.got - c.expected,
-                c.bound,
-                c.standard_error,
-                c.verdict()
-            );
+            let numbers = [c.expected, c.got, c.got - c.expected, c.bound, c.standard_error];
+            let [expected, got, error, bound, standard_error] = numbers.map(|number| format!("{number:e}"));
+            let (group, name) = (case.group.to_owned(), case.name.to_owned());
+            let verdict = c.verdict().to_owned();
+            table.row([group, name, c.what.clone(), expected, got, error, bound, standard_error, verdict]);
         }
     }
-    text
+    table.finish()
 }
 
 /// The report as a page.

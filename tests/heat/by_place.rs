@@ -10,6 +10,7 @@ use super::reference::{BOUNCES, shown};
 use crate::device::{Settings, assert_as_reference, measure, render};
 use crate::scene_builder::heat::*;
 use crate::scene_builder::*;
+use crate::size;
 use crate::statistics::*;
 use crate::truth;
 
@@ -122,6 +123,16 @@ type Ball = fn(Builder, Shape) -> Builder;
 
 /// Surfaces at 300 K all over, whatever they consist of.
 const OF_ONE_TEMPERATURE: [(&str, Ball); 10] = [
+    ("plastic over a mixture", |mut b, s| {
+        let texture = mixture(&mut b);
+        b.coated(s, texture, 1.5, 0.3).at_kelvin(300.0)
+    }),
+    ("masked metal", |mut b, s| {
+        let mask = numbers(&mut b, [0.0, 1.0, 0.3, 0.8]);
+        let b = b.conductor(s.clone(), 5.0, 12.0, [0.3; 2]).diffuse(s.clone(), slope(0.1, 0.6));
+        b.masked_last_two(s, mask).at_kelvin(300.0)
+    }),
+    ("brushed metal", |b, s| b.conductor(s, slope(2.0, 9.0), slope(5.0, 20.0), [0.5, 0.1]).at_kelvin(300.0)),
     ("soot", |mut b, s| {
         let t = numbers(&mut b, [300.0; 4]);
         b.black(s).heated_by(t)
@@ -143,10 +154,6 @@ const OF_ONE_TEMPERATURE: [(&str, Ball); 10] = [
         let texture = mixture(&mut b);
         b.coated(s, texture, 1.5, 0.0).at_kelvin(300.0)
     }),
-    ("plastic over a mixture", |mut b, s| {
-        let texture = mixture(&mut b);
-        b.coated(s, texture, 1.5, 0.3).at_kelvin(300.0)
-    }),
     ("plastic", |mut b, s| {
         let t = numbers(&mut b, [300.0; 4]);
         b.plastic(s, slope(0.2, 0.9), 1.5, 0.3).heated_by(t)
@@ -154,12 +161,6 @@ const OF_ONE_TEMPERATURE: [(&str, Ball); 10] = [
     ("mirror", |mut b, s| {
         let t = numbers(&mut b, [300.0; 4]);
         b.conductor(s, 5.0, 12.0, [0.0; 2]).heated_by(t)
-    }),
-    ("brushed metal", |b, s| b.conductor(s, slope(2.0, 9.0), slope(5.0, 20.0), [0.5, 0.1]).at_kelvin(300.0)),
-    ("masked metal", |mut b, s| {
-        let mask = numbers(&mut b, [0.0, 1.0, 0.3, 0.8]);
-        let b = b.conductor(s.clone(), 5.0, 12.0, [0.3; 2]).diffuse(s.clone(), slope(0.1, 0.6));
-        b.masked_last_two(s, mask).at_kelvin(300.0)
     }),
 ];
 
@@ -176,7 +177,7 @@ fn cavity(ball: Ball) -> Scene {
 #[test]
 fn isothermal_cavities_on_devices() {
     let expected = means(&planck(300.0), &infrared());
-    for (i, (name, ball)) in OF_ONE_TEMPERATURE.into_iter().enumerate() {
+    for (i, (name, ball)) in size::first(4, OF_ONE_TEMPERATURE).enumerate() {
         let bound = Bound { resolution: 0.01, allowance: 10.0 * ORIGIN_OFFSET + 4e-4 };
         assert_estimates(name, &measure(cavity(ball), 1, 430 + i as u64), &expected, bound);
     }
@@ -238,8 +239,9 @@ fn textured_heat_agrees_with_the_reference() {
         .attributes(upright())
         .build();
     // The tables of `scattering` are within 1e-3: over four events, and in the mean.
-    let bound = Bound { resolution: 0.06, allowance: 10.0 * ORIGIN_OFFSET + 1e-3 };
-    assert_as_reference("textured heat", &scene, [32, 128], 20_000, bound);
+    let (reference, resolution) = if size::is_full() { (20_000, 0.06) } else { (5_000, 0.12) };
+    let bound = Bound { resolution, allowance: 10.0 * ORIGIN_OFFSET + 1e-3 };
+    assert_as_reference("textured heat", &scene, [32, 128], reference, bound);
 }
 
 /// Scenes without such surfaces have none of it: not in their shaders' switches, nor in their records.

@@ -11,6 +11,7 @@ use crate::device::{Settings, assert_as_reference, measure, render};
 use crate::scene_builder::closed_forms::{self, Case};
 use crate::scene_builder::heat::*;
 use crate::scene_builder::*;
+use crate::size;
 use crate::statistics::*;
 
 #[test]
@@ -123,18 +124,18 @@ fn heat_pays_for_nothing_but_lamps() {
 fn hot_metals_and_plastics_in_a_cavity() {
     type Ball = fn(Builder) -> Builder;
     let balls: [(&str, Ball); 6] = [
-        ("mirror", |b| b.conductor(sphere(DVec3::ZERO, 0.5), 5.0, 12.0, [0.0; 2])),
-        ("rough metal", |b| b.conductor(sphere(DVec3::ZERO, 0.5), 5.0, 12.0, [0.4; 2])),
-        ("varnish", |b| b.plastic(sphere(DVec3::ZERO, 0.5), 0.6, 1.5, 0.0)),
-        ("plastic", |b| b.plastic(sphere(DVec3::ZERO, 0.5), 0.6, 1.5, 0.3)),
-        ("one-sided", |b| b.one_sided(disk(DVec3::ZERO, DVec3::new(0.1, 0.2, -1.0), 0.5), 0.7)),
         ("blend", |b| {
             let s = || sphere(DVec3::ZERO, 0.5);
             b.conductor(s(), 5.0, 12.0, [0.2; 2]).diffuse(s(), 0.2).blend_of_last_two(s(), 0.4)
         }),
+        ("plastic", |b| b.plastic(sphere(DVec3::ZERO, 0.5), 0.6, 1.5, 0.3)),
+        ("one-sided", |b| b.one_sided(disk(DVec3::ZERO, DVec3::new(0.1, 0.2, -1.0), 0.5), 0.7)),
+        ("mirror", |b| b.conductor(sphere(DVec3::ZERO, 0.5), 5.0, 12.0, [0.0; 2])),
+        ("rough metal", |b| b.conductor(sphere(DVec3::ZERO, 0.5), 5.0, 12.0, [0.4; 2])),
+        ("varnish", |b| b.plastic(sphere(DVec3::ZERO, 0.5), 0.6, 1.5, 0.0)),
     ];
     let expected = means(&planck(300.0), &infrared());
-    for (i, (name, ball)) in balls.into_iter().enumerate() {
+    for (i, (name, ball)) in size::first(3, balls).enumerate() {
         for off in [0.0, 0.35] {
             let base = Builder::new()
                 .camera(look(DVec3::new(0.1, 0.2, 1.2), DVec3::new(off, 0.5 * off, 0.0), DVec3::Y, narrow()))

@@ -12,6 +12,7 @@ use crate::device::{Settings, render};
 use crate::scene_builder::closed_forms::Case;
 use crate::scene_builder::surfaces::*;
 use crate::scene_builder::*;
+use crate::size;
 use crate::statistics::{Bound, Estimate, assert_agreement, assert_estimates};
 use crate::truth::{self, render_image};
 
@@ -121,7 +122,7 @@ fn white_balls_under_a_white_sky() {
     for n in [1.05, 2.4] {
         assert_estimates("glass", &shown(&glass(n, 0.0), 16, 256, 120), &[1.0; 9], bound(0.0));
     }
-    for alpha in [0.1, 1.0] {
+    for alpha in size::first(1, [1.0, 0.1]) {
         assert_estimates("frosted glass", &shown(&glass(1.5, alpha), 16, 1024, 121), &[1.0; 9], bound(4.0));
         let scene = under_white_sky(|b, ball| white_metal(b, ball, [alpha; 2]), 10);
         assert_estimates("metal", &shown(&scene, 16, 512, 122), &[1.0; 9], bound(1.0));
@@ -137,7 +138,7 @@ fn white_balls_under_a_white_sky() {
 fn white_balls_in_a_glowing_room() {
     let bound = Bound { resolution: 0.012, allowance: 4.0 * TABLE + 1e-4 };
     let opaque = Bound { allowance: TABLE + 1e-4, ..bound };
-    for alpha in [0.0, 0.3] {
+    for alpha in size::first(1, [0.3, 0.0]) {
         let scene = in_glowing_room(|b, ball| b.dielectric(ball, 1.5, alpha), 40);
         assert_estimates("glass", &shown(&scene, 16, 512, 140), &[1.0; 9], bound);
         let scene = in_glowing_room(|b, ball| white_metal(b, ball, [alpha; 2]), 10);
@@ -145,7 +146,7 @@ fn white_balls_in_a_glowing_room() {
         let scene = in_glowing_room(|b, ball| b.plastic(ball, 1.0, 1.5, alpha), 10);
         assert_estimates("plastic", &shown(&scene, 16, 512, 142), &[1.0; 9], opaque);
     }
-    for roughness in [0.01, 0.2] {
+    for roughness in size::first(1, [0.2, 0.01]) {
         let mut scene = in_glowing_room(|b, ball| b.dielectric(ball, glass_curve(), roughness), 40);
         scene.channels = Channels::equal(400.0, 700.0, 3);
         let bound = Bound { resolution: 0.03, ..bound };
@@ -244,9 +245,9 @@ fn opaque_materials_are_those_of_the_reference() {
         let b = b.conductor(s.clone(), slanted(0.2, 1.2), 3.4, [0.2; 2]).diffuse(s.clone(), slanted(0.8, 0.1));
         b.blend_of_last_two(s, 0.6)
     };
-    for (what, add) in
-        [("metal", metal), ("rough metal", rough), ("varnish", varnish), ("plastic", plastic), ("blend", blend)]
-    {
+    let materials =
+        [("blend", blend), ("plastic", plastic), ("varnish", varnish), ("rough metal", rough), ("metal", metal)];
+    for (what, add) in size::first(3, materials) {
         against_reference(what, &room_with(add), 128, 4096, [0.35, 0.02]);
     }
 }
@@ -259,9 +260,9 @@ fn glass_is_that_of_the_reference() {
     let dispersive: Add = |b, s| b.dielectric(s, slanted(1.7, 1.4), 0.0);
     let narrow: Add = |b, s| b.dielectric(s, slanted(1.7, 1.4), 0.05);
     let wide: Add = |b, s| b.dielectric(s, slanted(1.52, 1.48), 0.4);
-    for (what, add) in
-        [("clear", clear), ("frosted", frosted), ("dispersive", dispersive), ("narrow", narrow), ("wide", wide)]
-    {
+    let glasses =
+        [("narrow", narrow), ("frosted", frosted), ("dispersive", dispersive), ("wide", wide), ("clear", clear)];
+    for (what, add) in size::first(3, glasses) {
         against_reference(what, &room_with(add), 128, 4096, [0.7, 0.04]);
     }
 }
@@ -270,11 +271,9 @@ fn glass_is_that_of_the_reference() {
 /// reference.
 #[test]
 fn dispersion_is_unbiased() {
-    for (roughness, samples, resolution) in
-        [(0.0, 512, [0.15, 0.06]), (0.02, 512, [0.15, 0.06]), (0.15, 512, [0.15, 0.06])]
-    {
+    for roughness in size::first(2, [0.02, 0.0, 0.15]) {
         let scene = dispersive_ball(Channels::equal(400.0, 700.0, 6), roughness);
-        against_reference(&format!("roughness {roughness}"), &scene, samples, 20_000, resolution);
+        against_reference(&format!("roughness {roughness}"), &scene, 512, 20_000, [0.15, 0.06]);
     }
 }
 

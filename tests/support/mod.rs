@@ -7,6 +7,7 @@ pub mod device;
 pub mod outside;
 pub mod report;
 pub mod scene_builder;
+pub mod size;
 pub mod statistics;
 pub mod tracer;
 pub mod truth;

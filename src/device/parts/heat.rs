@@ -8,6 +8,7 @@ use std::borrow::Cow;
 use std::cell::RefCell;
 use std::collections::HashMap;
 use std::rc::Rc;
+use std::sync::Arc;
 
 use glam::DVec3;
 
@@ -170,9 +171,9 @@ enum Absorber {
     Black,
     Diffuse,
     Mirror,
-    RoughMetal { facets: FacetCosines, again: Option<ReflectionAlbedo> },
+    RoughMetal { facets: Arc<FacetCosines>, again: Option<Arc<ReflectionAlbedo>> },
     Varnish,
-    RoughPlastic { facets: FacetCosines, coat: DielectricAlbedo },
+    RoughPlastic { facets: Arc<FacetCosines>, coat: Arc<DielectricAlbedo> },
 }
 
 impl Leaf<'_> {
@@ -384,8 +385,8 @@ impl HotLeaf {
                 let absorber = match roughness[0] < SMOOTH {
                     true => Absorber::Mirror,
                     false => Absorber::RoughMetal {
-                        facets: FacetCosines::new(roughness),
-                        again: energy_compensation.then(|| ReflectionAlbedo::new(roughness)),
+                        facets: FacetCosines::shared(roughness),
+                        again: energy_compensation.then(|| ReflectionAlbedo::shared(roughness)),
                     },
                 };
                 (absorber, vec![curve(eta), curve(k)])
@@ -394,8 +395,8 @@ impl HotLeaf {
                 let absorber = match roughness < SMOOTH {
                     true => Absorber::Varnish,
                     false => Absorber::RoughPlastic {
-                        facets: FacetCosines::new([roughness; 2]),
-                        coat: DielectricAlbedo::new(roughness, index_range(&curve(eta), &scene.channels)),
+                        facets: FacetCosines::shared([roughness; 2]),
+                        coat: DielectricAlbedo::shared(roughness, index_range(&curve(eta), &scene.channels)),
                     },
                 };
                 (absorber, vec![all_over(reflectance), curve(eta)])

@@ -10,7 +10,7 @@ use crate::device::words::{
 use crate::scene::{Bsdf, Reflectance, SMOOTH, Scene, Temperature};
 use crate::spectral::Curve;
 use crate::spectral::hemisphere::fresnel::{mean_conductor, mean_dielectric};
-use crate::spectral::hemisphere::{ReflectionAlbedo, index_range};
+use crate::spectral::hemisphere::{DielectricAlbedo, ReflectionAlbedo, index_range};
 use crate::{Error, Result};
 
 /// What the surface of a radiator does.
@@ -134,7 +134,7 @@ impl Radiators {
                 radiator.spectra = surfaces.spectrum(eta) | surfaces.spectrum(k) << 16;
                 radiator.alpha = roughness.map(|alpha| alpha as f32);
                 // What is scattered more than once comes back as `surfaces` has it, or is lost.
-                let lost = ReflectionAlbedo::new(roughness).mean_loss();
+                let lost = ReflectionAlbedo::shared(roughness).mean_loss();
                 if energy_compensation {
                     let stays = |v: &[f64]| {
                         let f = mean_conductor(v[0], v[1]);
@@ -150,7 +150,7 @@ impl Radiators {
             Bsdf::Plastic { reflectance, eta, roughness } => {
                 radiator.spectra = surfaces.spectrum(eta);
                 let rough = (roughness >= SMOOTH)
-                    .then(|| surfaces.dielectric_albedo(roughness, index_range(curve(eta), &scene.channels)));
+                    .then(|| DielectricAlbedo::shared(roughness, index_range(curve(eta), &scene.channels)));
                 radiator.alpha = [roughness as f32; 2];
                 let mean_reflected = |eta: f64| match &rough {
                     None => mean_dielectric(eta),

@@ -1,6 +1,5 @@
 //! Materials of general scenes as devices get them: lists of lobes, tables, and the spectra that these need.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use glam::DVec3;
@@ -87,7 +86,6 @@ pub struct Surfaces {
     pub smooth: bool,
     /// Most records of a scattering event.
     pub vertex_records: u32,
-    albedos: BTreeMap<[u64; 3], Arc<DielectricAlbedo>>,
 }
 
 /// Lists of lobes, and records that are instructions of a small program.
@@ -263,7 +261,6 @@ impl Surfaces {
                 _ => lobe.ab = low(lobe.ab),
             }
         }
-        self.albedos.clear();
         // Where nothing scatters, shaders still bind a lobe.
         if self.lobes.is_empty() {
             self.lobes.push(Lobe::default());
@@ -396,7 +393,7 @@ impl Surfaces {
             return vec![leaf(lobe, 0, move |_, cosine, k| reflectance(cosine, k))];
         };
         self.anisotropic |= alpha[0] != alpha[1];
-        let albedo = Arc::new(ReflectionAlbedo::new(alpha));
+        let albedo = ReflectionAlbedo::shared(alpha);
         let once = Lobe { ab, alpha: alpha.map(|a| a as f32), ..lobe_of(Kind::RoughConductor) };
         let single = Arc::clone(&albedo);
         let mut leaves =
@@ -443,7 +440,7 @@ impl Surfaces {
         let curve = &scene.spectra[eta].curve;
         let n = channel_means(scene, eta);
         let range = index_range(curve, &scene.channels);
-        let albedo = self.dielectric_albedo(alpha, range);
+        let albedo = DielectricAlbedo::shared(alpha, range);
         let number = self.eta_table(&albedo);
         let id = self.spectrum(eta);
         let decision = ReflectionProbability::new(curve, &scene.channels);
@@ -519,7 +516,7 @@ impl Surfaces {
         let of_index = &scene.spectra[eta].curve;
         let n = channel_means(scene, eta);
         let id = self.spectrum(eta);
-        let rough = roughness.map(|alpha| self.dielectric_albedo(alpha, index_range(of_index, &scene.channels)));
+        let rough = roughness.map(|alpha| DielectricAlbedo::shared(alpha, index_range(of_index, &scene.channels)));
         let table = rough.clone();
         let mean_reflected = move |eta: f64| match &table {
             None => mean_dielectric(eta),
@@ -597,11 +594,6 @@ impl Surfaces {
     fn table(&mut self, values: &[f32]) -> u32 {
         self.tables.extend_from_slice(values);
         (self.tables.len() - values.len()) as u32
-    }
-
-    pub(super) fn dielectric_albedo(&mut self, alpha: f64, range: [f64; 2]) -> Arc<DielectricAlbedo> {
-        let key = [alpha, range[0], range[1]].map(f64::to_bits);
-        Arc::clone(self.albedos.entry(key).or_insert_with(|| Arc::new(DielectricAlbedo::new(alpha, range))))
     }
 
     /// Appends a table over index and cosine, as `eta_table` in `program.wgsl` reads it, and gives its number.

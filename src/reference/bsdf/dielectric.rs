@@ -26,7 +26,7 @@ pub fn lobes(scene: &Scene, eta: SpectrumId, dispersion: bool, roughness: Option
     match roughness.filter(|_| range.iter().any(|eta| (eta - 1.0).abs() >= MATCHED)) {
         None => vec![Box::new(Mirror(surface.clone())), Box::new(Refraction(surface))],
         Some(alpha) => {
-            let albedo = Arc::new(DielectricAlbedo::new(alpha, range));
+            let albedo = DielectricAlbedo::shared(alpha, range);
             let again = |transmits| Box::new(Again { index, albedo: Arc::clone(&albedo), transmits });
             let mirror = RoughMirror { boundary: surface, ggx: Ggx { alpha: [alpha; 2] } };
             let once = RoughBoundary { mirror, albedo: Arc::clone(&albedo) };

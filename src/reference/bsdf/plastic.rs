@@ -15,7 +15,7 @@ use crate::spectral::hemisphere::{DielectricAlbedo, index_range};
 /// The coat's reflection, and what comes out of the base.
 pub fn lobes(scene: &Scene, reflectance: Reflectance, eta: SpectrumId, roughness: Option<f64>) -> Vec<Box<dyn Lobe>> {
     let range = index_range(&scene.spectra[eta].curve, &scene.channels);
-    let rough = roughness.map(|alpha| Arc::new(DielectricAlbedo::new(alpha, range)));
+    let rough = roughness.map(|alpha| DielectricAlbedo::shared(alpha, range));
     let coat = Coat { eta, rough };
     let base = Box::new(Base { reflectance, coat: coat.clone() });
     match roughness {

@@ -94,7 +94,7 @@ pub fn conductor(
     compensation: bool,
 ) -> Vec<Box<dyn Lobe>> {
     let Some(alpha) = roughness else { return vec![Box::new(Mirror(Metal { eta, k, albedo: None }))] };
-    let albedo = Arc::new(ReflectionAlbedo::new(alpha));
+    let albedo = ReflectionAlbedo::shared(alpha);
     let metal = Metal { eta, k, albedo: Some(Arc::clone(&albedo)) };
     let mut lobes: Vec<Box<dyn Lobe>> = vec![Box::new(RoughMirror { boundary: metal, ggx: Ggx { alpha } })];
     if compensation {

@@ -36,9 +36,9 @@ enum Absorber {
     RoughMetal {
         eta: SpectrumId,
         k: SpectrumId,
-        facets: FacetCosines,
+        facets: Arc<FacetCosines>,
         /// With energy compensation.
-        again: Option<ReflectionAlbedo>,
+        again: Option<Arc<ReflectionAlbedo>>,
     },
     Varnish {
         reflectance: Reflectance,
@@ -47,7 +47,7 @@ enum Absorber {
     RoughPlastic {
         reflectance: Reflectance,
         eta: SpectrumId,
-        facets: FacetCosines,
+        facets: Arc<FacetCosines>,
         /// As the base has it.
         coat: Arc<DielectricAlbedo>,
     },
@@ -70,16 +70,16 @@ impl Hot {
             Description::Conductor { eta, k, roughness, energy_compensation } => Absorber::RoughMetal {
                 eta,
                 k,
-                facets: FacetCosines::new(roughness),
-                again: energy_compensation.then(|| ReflectionAlbedo::new(roughness)),
+                facets: FacetCosines::shared(roughness),
+                again: energy_compensation.then(|| ReflectionAlbedo::shared(roughness)),
             },
             Description::Plastic { reflectance, eta, roughness } if smooth(roughness) => {
                 Absorber::Varnish { reflectance, eta }
             }
             Description::Plastic { reflectance, eta, roughness } => {
                 let range = index_range(&scene.spectra[eta].curve, &scene.channels);
-                let coat = Arc::new(DielectricAlbedo::new(roughness, range));
-                Absorber::RoughPlastic { reflectance, eta, facets: FacetCosines::new([roughness; 2]), coat }
+                let coat = DielectricAlbedo::shared(roughness, range);
+                Absorber::RoughPlastic { reflectance, eta, facets: FacetCosines::shared([roughness; 2]), coat }
             }
             Description::Dielectric { .. } | Description::Blend { .. } => return None,
         };

@@ -1,10 +1,14 @@
 //! How the microfacets that a direction sees are turned towards it: from that, whatever one scattering event by a rough
 //! surface reflects or absorbs, for every Fresnel reflectance at once.
 
+use std::sync::{Arc, LazyLock};
+
 use glam::DVec3;
+use quick_cache::sync::Cache;
 use rayon::prelude::*;
 
 use super::microfacet::{LATTICE, Lattice, azimuth_at, cosine_at, lambda, smith_ratio, turn};
+use super::recent;
 
 /// Cosines between direction and facet for which there is a weight, spread as cubes: metals change fastest near grazing.
 pub const FACET_COSINES: usize = 256;
@@ -32,6 +36,12 @@ pub fn facet_cosine(j: usize) -> f64 {
 }
 
 impl FacetCosines {
+    /// [`Self::new`], or what it has lately given for the same roughness. An anisotropic one takes 34 MiB.
+    pub fn shared(alpha: [f64; 2]) -> Arc<Self> {
+        static RECENT: LazyLock<Cache<[u64; 2], Arc<FacetCosines>>> = LazyLock::new(|| Cache::new(8));
+        recent(&RECENT, alpha.map(f64::to_bits), || Self::new(alpha))
+    }
+
     /// `alpha`: along x and along y, both above 0.
     pub fn new(alpha: [f64; 2]) -> Self {
         let rows = if alpha[0] == alpha[1] { 1 } else { AZIMUTHS };

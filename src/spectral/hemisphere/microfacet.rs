@@ -7,11 +7,13 @@
 //! Benyoub 2023): E = ∫∫ F G2/G1 du dv, whose integrand is bounded by 1 at every roughness.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
+use std::sync::{Arc, LazyLock};
 
 use glam::{DVec2, DVec3};
+use quick_cache::sync::Cache;
 use rayon::prelude::*;
 
-use super::fresnel;
+use super::{fresnel, recent};
 
 /// Nodes along the cosine, and around the normal over a quarter turn.
 const COSINES: usize = 128;
@@ -23,6 +25,8 @@ pub(super) const LATTICE: (usize, usize) = (10_946, 6_765);
 pub(super) const FINE: (usize, usize) = (46_368, 28_657);
 /// Largest step of a table along ln η.
 const INDEX_STEP: f64 = 0.02;
+/// Tables of a kind that are kept: 34 KiB each, of dielectrics 4 KiB for each step of the index.
+const RECENT_TABLES: usize = 256;
 
 /// 1 - E for a surface of GGX roughness α that reflects everything: the flux that single scattering loses.
 ///
@@ -36,6 +40,12 @@ pub struct ReflectionAlbedo {
 }
 
 impl ReflectionAlbedo {
+    /// [`Self::new`], or what it has lately given for the same roughness.
+    pub fn shared(alpha: [f64; 2]) -> Arc<Self> {
+        static RECENT: LazyLock<Cache<[u64; 2], Arc<ReflectionAlbedo>>> = LazyLock::new(|| Cache::new(RECENT_TABLES));
+        recent(&RECENT, alpha.map(f64::to_bits), || Self::new(alpha))
+    }
+
     /// `alpha`: along x and along y, both above 0.
     pub fn new(alpha: [f64; 2]) -> Self {
         let rows = if alpha[0] == alpha[1] { 1 } else { AZIMUTHS };
@@ -116,6 +126,12 @@ struct SideAlbedo {
 }
 
 impl DielectricAlbedo {
+    /// [`Self::new`], or what it has lately given for the same boundary.
+    pub fn shared(alpha: f64, range: [f64; 2]) -> Arc<Self> {
+        static RECENT: LazyLock<Cache<[u64; 3], Arc<DielectricAlbedo>>> = LazyLock::new(|| Cache::new(RECENT_TABLES));
+        recent(&RECENT, [alpha, range[0], range[1]].map(f64::to_bits), || Self::new(alpha, range))
+    }
+
     /// For η within `range` and isotropic roughness `alpha` above 0.
     pub fn new(alpha: f64, range: [f64; 2]) -> Self {
         let [first, last] = range.map(f64::ln);
