@@ -30,6 +30,8 @@ install() {
 need_rust() {
   command -v cargo >/dev/null || stop 2 "missing: Rust 1.95 or newer (cargo). Install it with rustup and try again"
   command -v cc >/dev/null || install "a C linker" build-essential
+  # Blosc brings a library in C++.
+  command -v c++ >/dev/null || install "a C++ compiler" build-essential
 }
 
 # need_component COMMAND COMPONENT: a cargo subcommand that rustup's minimal profile leaves out.

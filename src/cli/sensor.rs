@@ -52,7 +52,7 @@ pub struct Args {
 pub fn run(args: &Args, output: &Output) -> Result<()> {
     let cube = Cube::open(&args.cube)?;
     let responses = response::read_responses(&args.responses).map_err(|problem| Error::Input(vec![*problem]))?;
-    if let Some(warning) = &responses.warning {
+    for warning in &responses.warnings {
         output.warn(warning)?;
     }
     let is_itself = |a: &std::path::Path, b: &std::path::Path| {

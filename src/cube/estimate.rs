@@ -50,6 +50,11 @@ impl Totals {
         }
     }
 
+    /// Whether nothing but zeros was seen, of which the estimate knows nothing.
+    pub fn is_dark(&self) -> bool {
+        self.begun > 0 && self.too_few == 0 && self.square.iter().all(|square| *square <= 0.0)
+    }
+
     /// sqrt(Σ variance of the mean / Σ mean²) per channel; NaN while a tile begun has fewer than two epochs.
     pub fn error_estimate(&self) -> Vec<f64> {
         if self.begun == 0 || self.too_few > 0 {

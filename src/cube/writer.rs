@@ -144,6 +144,11 @@ impl Writer {
         self.state().totals.error_estimate()
     }
 
+    /// Whether every value merged so far is zero.
+    pub fn is_dark(&self) -> bool {
+        self.state().totals.is_dark()
+    }
+
     /// The preview with every unit merged so far; means of `factor` x `factor` pixels.
     pub fn preview(&self, factor: u32) -> Result<Picture> {
         self.look().colour(self.cube.grid().whole(), factor).map(Window::into_picture)

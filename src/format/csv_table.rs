@@ -12,8 +12,7 @@ impl Table {
 
     /// Adds a line of as many cells as the head has.
     pub fn row<T: AsRef<str>>(&mut self, cells: impl IntoIterator<Item = T>) {
-        let cells = cells.into_iter();
-        let written = cells.map(|cell| self.0.write_field(cell.as_ref())).collect::<csv::Result<()>>();
+        let written = cells.into_iter().try_for_each(|cell| self.0.write_field(cell.as_ref()));
         let ended = written.and_then(|()| self.0.write_record(None::<&[u8]>));
         ended.expect("as many cells as in the head, and memory takes all of them");
     }

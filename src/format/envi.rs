@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use super::text::nanometres;
+use super::unit::{Stated, Unit};
 use crate::error::Problem;
 
 /// How the values of an image follow each other.
@@ -101,9 +101,101 @@ pub struct Header {
     pub big_endian: bool,
     /// Of each band (of each sample, in a library), nm; where the header gives them.
     pub wavelength_nm: Option<Vec<f64>>,
+    /// What each spans, by its `fwhm`.
+    pub spans_nm: Option<Vec<[f64; 2]>>,
+    /// What `wavelength units` says.
+    pub axis: Option<Unit>,
+    /// What was left out or had to be guessed, in words that go on after the file's name.
+    pub notes: Vec<String>,
+    /// Which bands (samples of a library) `bbl` calls good; empty where it says nothing.
+    good: Vec<bool>,
+    scaling: Scaling,
     /// Line and text by key.
     entries: BTreeMap<String, (usize, String)>,
 }
+
+/// How stored numbers become values: those of a band times its gain, plus its offset, over the factor.
+#[derive(Debug, Clone, PartialEq)]
+struct Scaling {
+    /// One for each band (of a library: one in all, or one for each sample); empty for 1.
+    gain: Vec<f64>,
+    /// Likewise; empty for 0.
+    offset: Vec<f64>,
+    factor: f64,
+}
+
+impl Scaling {
+    fn apply(&self, value: f64, band: usize) -> f64 {
+        let of = |list: &[f64], otherwise: f64| match list {
+            [] => otherwise,
+            [one] => *one,
+            several => several.get(band).copied().unwrap_or(otherwise),
+        };
+        (value * of(&self.gain, 1.0) + of(&self.offset, 0.0)) / self.factor
+    }
+}
+
+/// Keys that change no number, or that the parser sees to elsewhere.
+const KNOWN: [&str; 58] = [
+    "description",
+    "samples",
+    "lines",
+    "bands",
+    "header offset",
+    "file type",
+    "data type",
+    "interleave",
+    "byte order",
+    "sensor type",
+    "x start",
+    "y start",
+    "default stretch",
+    "default bands",
+    "wavelength units",
+    "wavelength",
+    "fwhm",
+    "bbl",
+    "band names",
+    "spectra names",
+    "data ignore value",
+    "data units",
+    "data gain values",
+    "data offset values",
+    "data reflectance gain values",
+    "data reflectance offset values",
+    "reflectance scale factor",
+    "z plot range",
+    "z plot average",
+    "z plot titles",
+    "plot titles",
+    "map info",
+    "projection info",
+    "coordinate system string",
+    "pixel size",
+    "geo points",
+    "rpc info",
+    "sun azimuth",
+    "sun elevation",
+    "solar irradiance",
+    "cloud cover",
+    "acquisition time",
+    "security tag",
+    "product type",
+    "sensor id",
+    "dem file",
+    "dem band",
+    "timestamp",
+    "class names",
+    "class lookup",
+    "classes",
+    "history",
+    "file compression",
+    "major frame offsets",
+    "minor frame offsets",
+    "complex function",
+    "read procedures",
+    "band name",
+];
 
 impl Header {
     pub fn get(&self, key: &str) -> Option<&str> {
@@ -113,6 +205,16 @@ impl Header {
     /// A list `{ a, b }`.
     pub fn list(&self, key: &str) -> Option<Vec<&str>> {
         self.get(key).map(split_list)
+    }
+
+    /// Whether `bbl` calls a band (a sample, in a library) good, or says nothing.
+    pub fn is_good(&self, band: usize) -> bool {
+        self.good.get(band).is_none_or(|good| *good)
+    }
+
+    /// `data units`, where it is understood.
+    pub fn unit(&self) -> Option<Stated> {
+        Stated::of(self.get("data units")?)
     }
 
     /// A number, where the key is there.
@@ -170,8 +272,14 @@ impl Data<'_> {
             Interleave::Bip => (line * samples + sample) * bands + band,
         };
         let value = data_type.decode(&self.bytes[place * data_type.bytes()..], self.header.big_endian);
-        let is_missing = self.missing.is_some_and(|missing| value == missing || (value.is_nan() && missing.is_nan()));
-        (!is_missing).then_some(value)
+        // A number of f32 is written in a header with fewer digits than it has.
+        let same = |missing: f64| match data_type {
+            DataType::F32 => value as f32 == missing as f32,
+            _ => value == missing,
+        };
+        let is_missing = self.missing.is_some_and(|missing| same(missing) || (value.is_nan() && missing.is_nan()));
+        let column = if self.header.is_library() { sample } else { band };
+        (!is_missing).then(|| self.header.scaling.apply(value, column))
     }
 }
 
@@ -226,6 +334,12 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Header, Box<Problem>> {
             }
         }
         let key = key.split_whitespace().collect::<Vec<_>>().join(" ").to_lowercase();
+        if let Some((before, same)) = entries.get(&key)
+            && *same != value
+        {
+            let message = format!("gives `{key}` a second time, and differently from line {before}");
+            return Err(wrong(Some(number), message, "keep one of them"));
+        }
         entries.insert(key, (number, value));
     }
 
@@ -276,46 +390,138 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Header, Box<Problem>> {
         interleave,
         big_endian: order == 1,
         wavelength_nm: None,
+        spans_nm: None,
+        axis: None,
+        notes: Vec::new(),
+        good: Vec::new(),
+        scaling: Scaling { gain: Vec::new(), offset: Vec::new(), factor: 1.0 },
         entries: BTreeMap::new(),
     };
     if header.data_bytes().is_none() {
         return Err(wrong(None, "describes an image of more bytes than can be counted".into(), ""));
     }
-    let wavelengths = take("wavelength");
     header.entries = entries;
-    let expected = if header.is_library() { samples } else { bands };
-    if let Some((line, text)) = wavelengths {
-        let unit = header.get("wavelength units").map(str::to_lowercase);
-        let is_wavenumber = matches!(unit.as_deref(), Some("wavenumber" | "wavenumbers" | "cm-1"));
-        let factor = match unit.as_deref() {
-            None | Some("unknown") => None,
-            Some(_) if is_wavenumber => None,
-            Some(unit) => Some(nanometres(unit).ok_or_else(|| {
-                let message =
-                    format!("must be Nanometers, Micrometers or Wavenumber, but is `{}`", unit.escape_debug());
-                header.problem("wavelength units", &message)
-            })?),
-        };
-        let items = split_list(&text);
-        let parsed: Option<Vec<f64>> =
-            items.iter().map(|item| item.parse().ok().filter(|v: &f64| v.is_finite() && *v > 0.0)).collect();
-        let Some(values) = parsed.filter(|values| values.len() == expected) else {
-            let (of, has) = (if header.is_library() { "samples" } else { "bands" }, items.len());
-            let message =
-                format!("`wavelength` must have a number for each of {expected} {of}, above 0, but lists {has}");
-            return Err(wrong(Some(line), message, ""));
-        };
-        // Wavelengths of reflected light below 100 are micrometres, as every instrument's are.
-        let in_micrometres = values.iter().all(|v| *v < 100.0);
-        let to_nm = |v: f64| match factor {
-            Some(factor) => v * factor,
-            None if is_wavenumber => 1e7 / v,
-            None if in_micrometres => v * 1e3,
-            None => v,
-        };
-        header.wavelength_nm = Some(values.into_iter().map(to_nm).collect());
+    header.refuse_what_is_not_applied()?;
+    header.find_wavelengths()?;
+    header.find_scaling()?;
+    let known = |key: &&String| !KNOWN.contains(&key.as_str());
+    let unknown: Vec<&str> = header.entries.keys().filter(known).map(String::as_str).collect();
+    if !unknown.is_empty() {
+        header.notes.push(format!("has a header with keys that are not known, and left out: {}", unknown.join(", ")));
     }
     Ok(header)
+}
+
+impl Header {
+    /// Bands of an image, samples of a library: what lists have an entry for.
+    fn places(&self) -> usize {
+        if self.is_library() { self.samples } else { self.bands }
+    }
+
+    /// Statements without which the numbers are others, and that nothing here applies.
+    fn refuse_what_is_not_applied(&self) -> Result<(), Box<Problem>> {
+        let refuse = |key: &str| Err(self.problem(key, "is not applied: save the file without it"));
+        if self.get("file compression").is_some_and(|text| text.trim() != "0") {
+            return Err(self.problem("file compression", "says that the data are compressed: save them uncompressed"));
+        }
+        for key in ["major frame offsets", "minor frame offsets"] {
+            if self.list(key).unwrap_or_default().iter().any(|item| item.parse() != Ok(0)) {
+                return refuse(key);
+            }
+        }
+        if self.entries.contains_key("read procedures") {
+            return refuse("read procedures");
+        }
+        if let Some(kind) = self.get("file type") {
+            let lower = kind.trim().to_lowercase();
+            let plain = lower.is_empty()
+                || ["envi", "envi standard", "standard", "envi spectral library", "unknown"].contains(&lower.as_str());
+            if !plain {
+                let message = format!("must be ENVI Standard or ENVI Spectral Library, but is {}", kind.escape_debug());
+                return Err(self.problem("file type", &message));
+            }
+        }
+        Ok(())
+    }
+
+    /// The numbers of a list, where the key is there: one for each of `counts`' numbers of things.
+    fn numbers(&self, key: &str, counts: &[usize]) -> Result<Option<Vec<f64>>, Box<Problem>> {
+        let Some(items) = self.list(key) else { return Ok(None) };
+        let numbers: Option<Vec<f64>> =
+            items.iter().map(|item| item.parse().ok().filter(|v: &f64| v.is_finite())).collect();
+        match numbers {
+            Some(numbers) if counts.contains(&numbers.len()) => Ok(Some(numbers)),
+            Some(numbers) => {
+                let expected = counts.iter().map(usize::to_string).collect::<Vec<_>>().join(" or ");
+                Err(self.problem(key, &format!("must list {expected} numbers, but lists {}", numbers.len())))
+            }
+            None => Err(self.problem(key, "must list numbers")),
+        }
+    }
+
+    fn find_wavelengths(&mut self) -> Result<(), Box<Problem>> {
+        let places = self.places();
+        let stated = self.get("wavelength units").map(str::trim).filter(|text| !text.is_empty());
+        self.axis = match stated.filter(|text| !text.eq_ignore_ascii_case("unknown")) {
+            None => None,
+            Some(text) => Some(Unit::named(text).ok_or_else(|| {
+                let message = format!(
+                    "must be Nanometers, Micrometers, Wavenumber or another unit of a spectrum, but is `{}`",
+                    text.to_lowercase().escape_debug()
+                );
+                self.problem("wavelength units", &message)
+            })?),
+        };
+        let Some(items) = self.list("wavelength") else { return Ok(()) };
+        let parsed: Option<Vec<f64>> =
+            items.iter().map(|item| item.parse().ok().filter(|v: &f64| v.is_finite() && *v > 0.0)).collect();
+        let Some(values) = parsed.filter(|values| values.len() == places) else {
+            let of = if self.is_library() { "samples" } else { "bands" };
+            let message = format!("must have a number for each of {places} {of}, above 0, but lists {}", items.len());
+            return Err(self.problem("wavelength", &message));
+        };
+        let unit = self.axis.unwrap_or_else(|| {
+            // Wavelengths of reflected light below 100 are micrometres, as every instrument's are.
+            let unit = if values.iter().all(|v| *v < 100.0) { Unit::MICROMETRE } else { Unit::NANOMETRE };
+            let name = if unit == Unit::MICROMETRE { "um" } else { "nm" };
+            self.notes.push(format!("does not say in what its wavelengths are: they are taken as {name}"));
+            unit
+        });
+        self.wavelength_nm = Some(values.iter().map(|v| unit.to_nm(*v)).collect());
+        let widths = self.numbers("fwhm", &[places])?;
+        self.spans_nm = widths.filter(|widths| widths.iter().all(|width| *width > 0.0)).map(|widths| {
+            let span = |(x, width): (&f64, &f64)| [unit.to_nm(x - 0.5 * width), unit.to_nm(x + 0.5 * width)];
+            values.iter().zip(&widths).map(span).collect()
+        });
+        Ok(())
+    }
+
+    fn find_scaling(&mut self) -> Result<(), Box<Problem>> {
+        let places = self.places();
+        // A library is one band to who wrote it, or has a number for every sample.
+        let counts = if self.is_library() { vec![1, places] } else { vec![places] };
+        self.good = self.numbers("bbl", &[places])?.unwrap_or_default().iter().map(|good| *good != 0.0).collect();
+        let gain = self.numbers("data gain values", &counts)?.unwrap_or_default();
+        let offset = self.numbers("data offset values", &counts)?.unwrap_or_default();
+        let factor = match self.number("reflectance scale factor")? {
+            None => 1.0,
+            Some(scale) if scale.is_finite() && scale > 0.0 => scale,
+            Some(scale) => {
+                return Err(self.problem("reflectance scale factor", &format!("must be above 0, but is {scale}")));
+            }
+        };
+        let scales = gain.iter().any(|v| *v != 1.0) || offset.iter().any(|v| *v != 0.0);
+        if scales && factor != 1.0 {
+            return Err(
+                self.problem("reflectance scale factor", "and `data gain values` are two scales for the same numbers")
+            );
+        }
+        if self.is_library() && self.entries.contains_key("data reflectance gain values") {
+            return Err(self.problem("data reflectance gain values", "is not applied: scale the library by it"));
+        }
+        self.scaling = Scaling { gain, offset, factor };
+        Ok(())
+    }
 }
 
 /// What a header of an image that Spectile writes says.
@@ -488,7 +694,7 @@ mod tests {
             (
                 "ENVI\nsamples = 1\nlines = 1\ndata type = 4\nwavelength units = Index\nwavelength = { 1 }\n",
                 Some(5),
-                "Wavenumber, but is `index`",
+                "unit of a spectrum, but is `index`",
             ),
             ("ENVI\nsamples = 1\nlines = 1\nbands = 2\ndata type = 4\n", None, "lacks `interleave`"),
             ("ENVI\nsamples = 9999999999999\nlines = 9999999999999\ndata type = 4\n", None, "counted"),

@@ -10,7 +10,9 @@ use exr::image::read::read as exr_reader;
 use exr::meta::MetaData;
 use exr::meta::attribute::SampleType;
 
+use super::primaries::Primaries;
 use crate::error::Problem;
+use crate::spectral::colour::srgb_decode;
 
 /// A picture. Rows go from the top down, each from left to right.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,6 +22,106 @@ pub struct Image {
     pub size: [u32; 2],
     /// In the order of the file: R, G, B, A or Y, A in a PNG; in an EXR that of its header, which is by name.
     pub planes: Vec<Plane>,
+    /// What its colours are.
+    pub colours: Colours,
+}
+
+/// What numbers of a picture mean as colours.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Colours {
+    pub transfer: Transfer,
+    /// Where they are not those of sRGB.
+    pub primaries: Option<Primaries>,
+    /// A statement about colours that is not understood, in words that go on after "its colours are those of".
+    pub foreign: Option<String>,
+}
+
+/// From numbers to light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Transfer {
+    Linear,
+    Srgb,
+    /// To this power.
+    Gamma(f64),
+}
+
+impl Transfer {
+    pub fn decode(self, v: f32) -> f32 {
+        match self {
+            Transfer::Linear => v,
+            Transfer::Srgb => srgb_decode(v.into()) as f32,
+            Transfer::Gamma(power) => f64::from(v).powf(power) as f32,
+        }
+    }
+}
+
+/// Red, green and blue, or one grey.
+#[derive(Debug, Clone, Copy)]
+pub enum Rgb<'i> {
+    Colour([&'i Plane; 3]),
+    Grey(&'i Plane),
+}
+
+/// What the channels of a layer are in a picture.
+struct Layer<'i> {
+    name: &'i str,
+    rgb: [Option<&'i Plane>; 3],
+    grey: Option<&'i Plane>,
+}
+
+impl<'i> Rgb<'i> {
+    /// Among `planes`, by their names, whatever their case and the layer before them. `Ok(None)`: there are none; `Err` says what
+    /// is in the way.
+    pub fn of(planes: &[&'i Plane]) -> Result<Option<Rgb<'i>>, String> {
+        const GREY: [&str; 8] = ["y", "l", "v", "i", "gray", "grey", "luminance", "intensity"];
+        let mut layers: Vec<Layer> = Vec::new();
+        for plane in planes {
+            let (name, channel) = plane.parts();
+            let index = layers.iter().position(|layer| layer.name == name).unwrap_or_else(|| {
+                layers.push(Layer { name, rgb: [None; 3], grey: None });
+                layers.len() - 1
+            });
+            let layer = &mut layers[index];
+            match channel.to_lowercase().as_str() {
+                "r" | "red" => layer.rgb[0] = Some(plane),
+                "g" | "green" => layer.rgb[1] = Some(plane),
+                "b" | "blue" => layer.rgb[2] = Some(plane),
+                channel if GREY.contains(&channel) => layer.grey = Some(plane),
+                _ => {}
+            }
+        }
+        let colour = |layer: &Layer<'i>| {
+            let [r, g, b] = layer.rgb;
+            Some((layer.name, [r?, g?, b?]))
+        };
+        let coloured: Vec<(&str, [&'i Plane; 3])> = layers.iter().filter_map(colour).collect();
+        match coloured[..] {
+            [(_, rgb)] => return Ok(Some(Rgb::Colour(rgb))),
+            [] => {}
+            _ => {
+                // Programs write what is meant to be seen without a layer's name.
+                if let Some((_, rgb)) = coloured.iter().find(|(layer, _)| layer.is_empty()) {
+                    return Ok(Some(Rgb::Colour(*rgb)));
+                }
+                let names: Vec<&str> = coloured.iter().map(|(layer, _)| *layer).collect();
+                return Err(format!("has colours in several layers: {}", names.join(", ")));
+            }
+        }
+        let named = |wanted: &str| planes.iter().any(|plane| plane.parts().1.eq_ignore_ascii_case(wanted));
+        if ["x", "y", "z"].iter().all(|name| named(name)) {
+            return Err("holds CIE X, Y and Z, which are not read: convert it to linear sRGB".to_owned());
+        }
+        let [only] = planes else { return Ok(None) };
+        Ok(layers.iter().find_map(|layer| layer.grey).map(|_| Rgb::Grey(only)))
+    }
+
+    /// The plane of each of red, green and blue.
+    pub fn planes(&self) -> [&'i Plane; 3] {
+        match self {
+            Rgb::Colour(planes) => *planes,
+            Rgb::Grey(plane) => [plane; 3],
+        }
+    }
 }
 
 /// One channel of a picture.
@@ -30,6 +132,22 @@ pub struct Plane {
     pub samples: Vec<f32>,
     /// How far a number just below 1 may be from what was meant: half the step of its type.
     pub rounding: f32,
+}
+
+impl Plane {
+    /// Its layer, which is mostly none, and its name in there.
+    pub fn parts(&self) -> (&str, &str) {
+        self.name.rsplit_once('.').unwrap_or(("", &self.name))
+    }
+}
+
+impl Image {
+    /// Whether a channel is how opaque the others of its layer are; `a` beside other names than those of colours is an `a`.
+    pub fn is_alpha(&self, plane: &Plane) -> bool {
+        let (layer, name) = plane.parts();
+        let has = |wanted: &str| self.planes.iter().any(|other| other.parts() == (layer, wanted));
+        name == "A" || (name == "a" && (["r", "g", "b"].iter().all(|colour| has(colour)) || has("y")))
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -73,6 +191,7 @@ fn png(bytes: &[u8]) -> Result<Image, String> {
     decoder.set_transformations(png::Transformations::EXPAND);
     let mut reader = decoder.read_info().map_err(wrong)?;
     let size = check_size([reader.info().width.into(), reader.info().height.into()])?;
+    let colours = png_colours(reader.info());
     let mut data = vec![0; reader.output_buffer_size().ok_or("is too large")?];
     let shape = reader.next_frame(&mut data).map_err(wrong)?;
 
@@ -94,7 +213,44 @@ fn png(bytes: &[u8]) -> Result<Image, String> {
         let samples = pixels.map(|pixel| (f64::from(number(pixel)) / largest) as f32).collect();
         Plane { name: (*name).to_owned(), samples, rounding: (0.5 / largest) as f32 }
     };
-    Ok(Image { format: Format::Png, size, planes: names.iter().enumerate().map(plane).collect() })
+    Ok(Image { format: Format::Png, size, planes: names.iter().enumerate().map(plane).collect(), colours })
+}
+
+/// What the chunks of a PNG say of its colours; those that say most count, as its specification has it.
+fn png_colours(info: &png::Info) -> Colours {
+    let srgb = Colours { transfer: Transfer::Srgb, primaries: None, foreign: None };
+    if let Some(code) = info.coding_independent_code_points {
+        let foreign = format!("cICP {}/{}", code.color_primaries, code.transfer_function);
+        return match (code.color_primaries, code.transfer_function) {
+            (1, 13) => srgb,
+            (1, 8) => Colours { transfer: Transfer::Linear, ..srgb },
+            _ => Colours { foreign: Some(foreign), ..srgb },
+        };
+    }
+    if let Some(profile) = &info.icc_profile {
+        // Its description holds the name, in one byte a letter or in two.
+        let holds = |name: &[u8]| profile.windows(name.len()).any(|bytes| bytes == name);
+        if holds(b"sRGB") || holds(b"\0s\0R\0G\0B") {
+            return srgb;
+        }
+        return Colours { foreign: Some("an ICC profile other than sRGB's".to_owned()), ..srgb };
+    }
+    if info.srgb.is_some() {
+        return srgb;
+    }
+    let transfer = match info.gama_chunk.map(|gamma| f64::from(gamma.into_value())) {
+        // Programs that mean sRGB write 1/2.2.
+        None => Transfer::Srgb,
+        Some(gamma) if (gamma - 1.0 / 2.2).abs() < 5e-3 => Transfer::Srgb,
+        Some(gamma) if (gamma - 1.0).abs() < 1e-3 => Transfer::Linear,
+        Some(gamma) if gamma > 0.05 => Transfer::Gamma(1.0 / gamma),
+        Some(gamma) => return Colours { foreign: Some(format!("a gamma of {gamma}")), ..srgb },
+    };
+    let primaries = info.chrm_chunk.map(|given| {
+        let xy = |(x, y): (png::ScaledFloat, png::ScaledFloat)| [x.into_value().into(), y.into_value().into()];
+        Primaries([xy(given.red), xy(given.green), xy(given.blue), xy(given.white)])
+    });
+    Colours { transfer, primaries: primaries.filter(|primaries| !primaries.are_srgb()), foreign: None }
 }
 
 fn exr(bytes: &[u8]) -> Result<Image, String> {
@@ -121,6 +277,13 @@ fn exr(bytes: &[u8]) -> Result<Image, String> {
         }
     }
 
+    let primaries = header.shared_attributes.chromaticities.map(|given| {
+        let xy = |v: exr::math::Vec2<f32>| [f64::from(v.x()), f64::from(v.y())];
+        Primaries([xy(given.red), xy(given.green), xy(given.blue), xy(given.white)])
+    });
+    let primaries = primaries.filter(|primaries| !primaries.are_srgb());
+    let colours = Colours { transfer: Transfer::Linear, primaries, foreign: None };
+
     let reader = exr_reader().no_deep_data().largest_resolution_level().all_channels().first_valid_layer();
     let image = reader.all_attributes().non_parallel().from_buffered(Cursor::new(bytes)).map_err(wrong)?;
     let plane = |channel: exr::image::AnyChannel<FlatSamples>| {
@@ -131,7 +294,7 @@ fn exr(bytes: &[u8]) -> Result<Image, String> {
         Plane { name: channel.name.to_string(), samples: channel.sample_data.values_as_f32().collect(), rounding }
     };
     let planes = image.layer_data.channel_data.list.into_iter().map(plane).collect();
-    Ok(Image { format: Format::Exr, size, planes })
+    Ok(Image { format: Format::Exr, size, planes, colours })
 }
 
 #[cfg(test)]

@@ -5,7 +5,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::envi;
-use super::text::{SpectrumTable, Unit, ascending, named, read};
+use super::text::{Column as Wanted, SpectrumTable, ascending, named, read};
+use super::unit::Unit;
 use crate::error::Problem;
 
 type Read<T> = Result<T, Box<Problem>>;
@@ -21,8 +22,8 @@ pub fn is_envi(path: &Path, bytes: &[u8]) -> bool {
     extension.eq_ignore_ascii_case("sli") || (extension.eq_ignore_ascii_case("hdr") && bytes.starts_with(b"ENVI"))
 }
 
-/// The spectrum called `name` (absent: the only one) of an ENVI spectral library.
-pub fn read_envi(path: &Path, name: Option<&str>) -> Read<SpectrumTable> {
+/// The spectrum of that name or number (by default the only one) of an ENVI spectral library.
+pub fn read_envi(path: &Path, wanted: Wanted) -> Read<SpectrumTable> {
     let is_header = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("hdr"));
     let (header_path, data) = if is_header {
         (path.to_owned(), path.with_extension("sli"))
@@ -33,7 +34,7 @@ pub fn read_envi(path: &Path, name: Option<&str>) -> Read<SpectrumTable> {
         }
     };
     let header = envi::parse(&read(&header_path)?, &header_path)?;
-    parse_envi(&header, &header_path, &read(&data)?, &data, name)
+    parse_envi(&header, &header_path, &read(&data)?, &data, wanted)
 }
 
 /// [`read_envi`] on the content of both files.
@@ -42,7 +43,7 @@ pub fn parse_envi(
     header_path: &Path,
     data: &[u8],
     data_path: &Path,
-    name: Option<&str>,
+    wanted: Wanted,
 ) -> Read<SpectrumTable> {
     if !header.is_library() || header.bands != 1 {
         let help = "its file type must be ENVI Spectral Library, with one band";
@@ -56,9 +57,9 @@ pub fn parse_envi(
         let message = format!("has {} `spectra names` for {} spectra", names.len(), header.lines);
         return wrong(header_path, None, message, "names are separated by commas, and hold none");
     }
-    let index = match name {
-        None if header.lines == 1 => 0,
-        None => {
+    let index = match wanted {
+        Wanted::Only if header.lines == 1 => 0,
+        Wanted::Only => {
             return wrong(
                 data_path,
                 None,
@@ -66,30 +67,54 @@ pub fn parse_envi(
                 &format!("pick one with `column`: {}", list(&names)),
             );
         }
-        Some(wanted) => match names.iter().position(|name| *name == wanted) {
+        Wanted::Number(number) => match number.checked_sub(1).filter(|index| *index < header.lines) {
             Some(index) => index,
             None => {
-                let message = format!("has no spectrum \"{wanted}\"");
-                return wrong(data_path, None, message, &format!("its spectra are {}", list(&names)));
+                let message = format!("has no spectrum {number}");
+                return wrong(data_path, None, message, &format!("it has {}, counted from 1", header.lines));
             }
         },
-    };
-    let data = header.data(data, data_path)?;
-    let scale = match header.number("reflectance scale factor")? {
-        None => 1.0,
-        Some(scale) if scale.is_finite() && scale > 0.0 => scale,
-        Some(scale) => {
-            return Err(header.problem("reflectance scale factor", &format!("must be above 0, but is {scale}")));
+        Wanted::Named(wanted) => {
+            let found: Vec<usize> = (0..names.len()).filter(|i| names[*i] == wanted).collect();
+            match found[..] {
+                [index] => index,
+                [] => {
+                    let message = format!("has no spectrum \"{wanted}\"");
+                    return wrong(data_path, None, message, &format!("its spectra are {}", list(&names)));
+                }
+                [first, second, ..] => {
+                    let message = format!("has several spectra \"{wanted}\"");
+                    let help = format!("pick one by its number: `column = {}` or {}", first + 1, second + 1);
+                    return wrong(data_path, None, message, &help);
+                }
+            }
         }
     };
-    let mut table = SpectrumTable { nm: Vec::new(), value: Vec::new(), line: Vec::new() };
+    let data = header.data(data, data_path)?;
+    let mut table = SpectrumTable { unit: header.unit(), notes: header.notes.clone(), ..SpectrumTable::default() };
+    let (mut bad, mut missing) = (0usize, 0usize);
     for (i, nm) in nm.into_iter().enumerate() {
-        let Some(value) = data.value(i, index, 0) else { continue };
+        if !header.is_good(i) {
+            bad += 1;
+            continue;
+        }
+        let Some(value) = data.value(i, index, 0) else {
+            missing += 1;
+            continue;
+        };
         if !value.is_finite() {
             return wrong(data_path, None, format!("holds {value} at {nm} nm"), "");
         }
         table.nm.push(nm);
-        table.value.push(value / scale);
+        table.value.push(value);
+    }
+    if bad > 0 {
+        table.notes.push(format!(
+            "has {bad} bands that its `bbl` calls bad: they are left out, and bridged by their neighbours"
+        ));
+    }
+    if missing > 0 {
+        table.notes.push(format!("has {missing} bands without a value: they are bridged by their neighbours"));
     }
     ascending(table, data_path, "")
 }
@@ -121,7 +146,7 @@ pub fn parse_ecostress(bytes: &[u8], path: &Path) -> Read<SpectrumTable> {
     };
     let mut unit: Option<Unit> = None;
     let (mut percent, mut y_first, mut promised) = (false, false, None);
-    let mut table = SpectrumTable { nm: Vec::new(), value: Vec::new(), line: Vec::new() };
+    let mut table = SpectrumTable::default();
     let mut pairs = 0usize;
     for (number, line) in (1..).zip(text.lines()) {
         if let Some([a, b]) = pair(line) {
@@ -146,14 +171,20 @@ pub fn parse_ecostress(bytes: &[u8], path: &Path) -> Read<SpectrumTable> {
             pairs += usize::from(pairs > 0 && !line.trim().is_empty());
             continue;
         };
-        let value = value.trim().to_lowercase();
+        let raw = value.trim();
+        let value = raw.to_lowercase();
         match key.trim().to_lowercase().as_str() {
             "x units" => {
-                unit = Some(match unit_of(&value) {
-                    Some(unit) => unit,
-                    None => {
+                unit = Some(match Unit::stated(raw) {
+                    Ok(Some(unit)) => unit,
+                    _ => {
                         let message = format!("gives wavelengths in `{}`", value.escape_debug());
-                        return wrong(path, Some(number), message, "micrometers, nanometers and cm-1 can be read");
+                        return wrong(
+                            path,
+                            Some(number),
+                            message,
+                            "micrometers, nanometers, cm-1 and other units of a spectrum can be read",
+                        );
                     }
                 });
             }
@@ -172,19 +203,6 @@ pub fn parse_ecostress(bytes: &[u8], path: &Path) -> Read<SpectrumTable> {
         );
     }
     ascending(table, path, "")
-}
-
-/// The unit that a header names in words.
-fn unit_of(text: &str) -> Option<Unit> {
-    if text.contains("wavenumber") || text.contains("cm-1") {
-        Some(Unit::Wavenumber)
-    } else if text.contains("micro") || text.contains("um") {
-        Some(Unit::Micrometre)
-    } else if text.contains("nano") || text.contains("nm") {
-        Some(Unit::Nanometre)
-    } else {
-        None
-    }
 }
 
 /// Values of the USGS library at or below this are deleted points (-1.23e34).
@@ -267,9 +285,12 @@ pub fn read_usgs(bytes: &[u8], path: &Path) -> Read<SpectrumTable> {
 }
 
 fn pair_usgs(spectrum: &Column, wavelengths: &Column, path: &Path, of: &Path) -> Read<SpectrumTable> {
-    let title = wavelengths.title.to_lowercase();
-    let unit = if title.contains("nanomet") || title.contains("(nm)") { Unit::Nanometre } else { Unit::Micrometre };
-    let mut table = SpectrumTable { nm: Vec::new(), value: Vec::new(), line: Vec::new() };
+    // Microns go without saying in this library.
+    let unit = match Unit::stated(wavelengths.title.split_once(':').map_or("", |(_, title)| title)) {
+        Ok(unit) => unit.unwrap_or(Unit::MICROMETRE),
+        Err(other) => return wrong(of, Some(1), format!("gives wavelengths in {other}"), ""),
+    };
+    let mut table = SpectrumTable::default();
     for (i, (&x, &value)) in wavelengths.values.iter().zip(&spectrum.values).enumerate() {
         if value <= DELETED || x <= DELETED {
             continue;
@@ -285,13 +306,13 @@ fn pair_usgs(spectrum: &Column, wavelengths: &Column, path: &Path, of: &Path) ->
 }
 
 /// Columns that a reader of one spectrum has no use for.
-pub fn no_columns(path: &Path, column: Option<&str>) -> Read<()> {
-    match column {
-        None => Ok(()),
-        Some(column) => {
-            wrong(path, None, format!("holds one spectrum, and no column {}", named(column)), "remove `column`")
-        }
-    }
+pub fn no_columns(path: &Path, wanted: Wanted) -> Read<()> {
+    let which = match wanted {
+        Wanted::Only => return Ok(()),
+        Wanted::Named(name) => named(name),
+        Wanted::Number(number) => number.to_string(),
+    };
+    wrong(path, None, format!("holds one spectrum, and no column {which}"), "remove `column`")
 }
 
 #[cfg(test)]
@@ -372,7 +393,7 @@ mod tests {
         let header = envi::parse(library("dry soil, wet").as_bytes(), path).unwrap();
         let data: Vec<u8> = [1f32, 2.0, 3.0, 10.0, 20.0, 30.0].iter().flat_map(|v| v.to_le_bytes()).collect();
         let read = |header: &envi::Header, data: &[u8], name: Option<&str>| {
-            parse_envi(header, path, data, Path::new("a.sli"), name)
+            parse_envi(header, path, data, Path::new("a.sli"), name.into())
         };
         let table = read(&header, &data, Some("wet")).unwrap();
         assert_eq!((table.nm, table.value), (vec![400.0, 500.0, 600.0], vec![0.3, 0.2, 0.1]));

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::text::{SpectrumTable, ascending, named};
+use super::text::{Column as Wanted, SpectrumTable, ascending, named};
 use crate::error::Problem;
 
 /// Whether the file is such a table: by its name, or by its header.
@@ -45,7 +45,7 @@ struct Column {
 
 /// The column `column` over wavelength. Radiance and irradiance, in W cm⁻² (sr⁻¹) per cm⁻¹, become W m⁻² (sr⁻¹) nm⁻¹:
 /// L_λ = L_ν · 10⁷/λ² · 10⁴ with λ in nm. Transmittance and depth have no unit.
-pub fn parse(bytes: &[u8], path: &Path, column: Option<&str>) -> Result<SpectrumTable, Box<Problem>> {
+pub fn parse(bytes: &[u8], path: &Path, wanted: Wanted) -> Result<SpectrumTable, Box<Problem>> {
     let wrong = |line: Option<usize>, message: String, help: &str| {
         let help = (!help.is_empty()).then(|| help.to_owned());
         Box::new(Problem { file: path.to_owned(), line, message, help, ..Problem::default() })
@@ -63,17 +63,34 @@ pub fn parse(bytes: &[u8], path: &Path, column: Option<&str>) -> Result<Spectrum
         let plain = |text: &str| text.to_lowercase().replace([' ', '_', '-'], "");
         plain(a) == plain(b)
     };
-    let Some(wanted) = column else {
-        let message = format!("has {} columns beside the wavenumber", columns.len() - 1);
-        return Err(wrong(Some(header_line), message, &format!("pick one with `column`: {}", choices())));
+    let found: Vec<usize> = match wanted {
+        Wanted::Only => {
+            let message = format!("has {} columns beside the wavenumber", columns.len() - 1);
+            return Err(wrong(Some(header_line), message, &format!("pick one with `column`: {}", choices())));
+        }
+        Wanted::Number(number) => (1..columns.len()).filter(|i| i + 1 == number).collect(),
+        Wanted::Named(name) => (1..columns.len()).filter(|i| same(&columns[*i].name, name)).collect(),
     };
-    let Some(index) = columns.iter().skip(1).position(|c| same(&c.name, wanted)).map(|i| i + 1) else {
-        let message = format!("has no column {}", named(wanted));
-        return Err(wrong(Some(header_line), message, &format!("its columns are {}", choices())));
+    let name = match wanted {
+        Wanted::Named(name) => named(name),
+        Wanted::Number(number) => number.to_string(),
+        Wanted::Only => String::new(),
+    };
+    let index = match found[..] {
+        [index] => index,
+        [] => {
+            let message = format!("has no column {name}");
+            return Err(wrong(Some(header_line), message, &format!("its columns are {}", choices())));
+        }
+        [first, second, ..] => {
+            let message = format!("has several columns {name}");
+            let help = format!("pick one by its number: `column = {}` or {}", first + 1, second + 1);
+            return Err(wrong(Some(header_line), message, &help));
+        }
     };
     let has_no_unit = ["TRANS", "DEPTH", "LOG", "BBODY"].iter().any(|word| columns[index].name.contains(word));
 
-    let mut table = SpectrumTable { nm: Vec::new(), value: Vec::new(), line: Vec::new() };
+    let mut table = SpectrumTable::default();
     for (number, line) in lines {
         let words = words(line);
         let Some(&(first, _)) = words.first() else { continue };
@@ -178,7 +195,7 @@ mod tests {
     const TRANSMITTANCE: &str = " FREQ   COMBIN    H2O   UMIX\n CM-1    TRANS  TRANS  TRANS\n  500.   0.5000 0.6 0.7\n  600.   0.4 0.5 0.6\n-9999.\n";
 
     fn read(text: &str, column: Option<&str>) -> Result<SpectrumTable, Box<Problem>> {
-        parse(text.as_bytes(), Path::new("tape7"), column)
+        parse(text.as_bytes(), Path::new("tape7"), column.into())
     }
 
     #[test]

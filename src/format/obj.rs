@@ -6,6 +6,7 @@ use std::borrow::Cow;
 use std::io::{self, BufRead, Read};
 use std::path::Path;
 
+use super::polygon::{self, Outline};
 use crate::error::Problem;
 
 /// The triangles of one run of faces under the same `o`, `g` and `usemtl` whose corners are given alike.
@@ -46,6 +47,10 @@ pub struct Obj {
     pub parts: Vec<Part>,
     /// Point and line elements, which have no surface.
     pub without_surface: usize,
+    /// Faces whose corners do not lie in one plane: how many, and the line of the first.
+    pub bent: Option<(usize, usize)>,
+    /// Faces whose outline crosses itself, likewise.
+    pub crossing: Option<(usize, usize)>,
 }
 
 /// Reads the file at `path`. Errors name the line; without one, the file as a whole could not be read.
@@ -61,9 +66,11 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Obj, Box<Problem>> {
     let problem = |line: Option<usize>, message: &str| {
         Box::new(Problem { file: path.to_owned(), line, message: message.to_owned(), ..Problem::default() })
     };
+    let bytes = &*with_newlines(bytes);
     let mut feeder = Feeder::new(bytes);
-    // Without single_index a vertex is its position alone, so triangles share vertices across texture seams.
-    let options = tobj::LoadOptions { triangulate: true, ..tobj::LoadOptions::default() };
+    // Without single_index a vertex is its position alone, so triangles share vertices across texture seams. tobj would cut
+    // polygons as fans, whatever their outline.
+    let options = tobj::LoadOptions { triangulate: false, ..tobj::LoadOptions::default() };
     let no_materials = |_: &Path| Err(tobj::LoadError::GenericFailure);
     let models = match tobj::load_obj_buf(&mut feeder, &options, no_materials) {
         Ok((models, _)) => models,
@@ -87,6 +94,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Obj, Box<Problem>> {
     };
 
     let mut parts = Vec::with_capacity(models.len());
+    let mut polygons = Polygons::new(&feeder.polygons);
     for model in models.into_iter().filter(|model| !model.mesh.indices.is_empty()) {
         // The feeder names every model by the index of its labels.
         let (labels, line, given) =
@@ -96,26 +104,79 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Obj, Box<Problem>> {
         if mesh.positions.iter().chain(&mesh.texcoords).chain(&mesh.normals).any(|x| !x.is_finite()) {
             return Err(not_finite(bytes, problem));
         }
-        let triangles = mesh.indices.as_chunks::<3>().0.to_vec();
         // tobj has no indices where the file has no such coordinates at all.
         let missing = |indices: &[u32]| indices.len() != mesh.indices.len();
         if given.uv && missing(&mesh.texcoord_indices) || given.normals && missing(&mesh.normal_indices) {
             return Err(bad_index(bytes, problem));
         }
         let (texcoords, normals) = (mesh.texcoords.as_chunks::<2>().0, mesh.normals.as_chunks::<3>().0);
-        let uv = given.uv.then(|| corners(&mesh.texcoord_indices, texcoords));
-        let normals = given.normals.then(|| corners(&mesh.normal_indices, normals));
+        // Places in the lists of indices.
+        let cut = polygons.cut(&mesh.face_arities, &mesh.indices, &positions);
+        let triangles = cut.iter().map(|corners| corners.map(|i| mesh.indices[i as usize])).collect();
+        let uv = given.uv.then(|| corners(&cut, &mesh.texcoord_indices, texcoords));
+        let normals = given.normals.then(|| corners(&cut, &mesh.normal_indices, normals));
         parts.push(Part { labels, line, positions, triangles, uv, normals });
     }
     if parts.is_empty() {
         return Err(problem(None, "has no faces"));
     }
-    Ok(Obj { parts, without_surface: feeder.without_surface })
+    let Polygons { bent, crossing, .. } = polygons;
+    Ok(Obj { parts, without_surface: feeder.without_surface, bent, crossing })
 }
 
-/// The values that three indices each pick.
-fn corners<T: Copy>(indices: &[u32], values: &[T]) -> Vec<[T; 3]> {
-    indices.as_chunks::<3>().0.iter().map(|triangle| triangle.map(|i| values[i as usize])).collect()
+/// The lines of a file whose lines end as those of old Macs do, as everybody's.
+fn with_newlines(bytes: &[u8]) -> Cow<'_, [u8]> {
+    if bytes.contains(&b'\n') || !bytes.contains(&b'\r') {
+        return Cow::Borrowed(bytes);
+    }
+    bytes.iter().map(|byte| if *byte == b'\r' { b'\n' } else { *byte }).collect()
+}
+
+/// The values at the corners of triangles, which are places in `indices`.
+fn corners<T: Copy>(triangles: &[[u32; 3]], indices: &[u32], values: &[T]) -> Vec<[T; 3]> {
+    triangles.iter().map(|triangle| triangle.map(|i| values[indices[i as usize] as usize])).collect()
+}
+
+/// Cuts the faces of one mesh after the other.
+struct Polygons<'f> {
+    /// The lines of those of more than three corners that are still to come.
+    lines: std::slice::Iter<'f, usize>,
+    bent: Option<(usize, usize)>,
+    crossing: Option<(usize, usize)>,
+}
+
+impl<'f> Polygons<'f> {
+    fn new(lines: &'f [usize]) -> Self {
+        Polygons { lines: lines.iter(), bent: None, crossing: None }
+    }
+
+    /// The triangles of the faces of `arities` corners (all three where there are none), as places in `indices`.
+    fn cut(&mut self, arities: &[u32], indices: &[u32], positions: &[[f64; 3]]) -> Vec<[u32; 3]> {
+        if arities.is_empty() {
+            return (0..indices.len() as u32 / 3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        }
+        let mut triangles = Vec::with_capacity(indices.len());
+        let mut start = 0u32;
+        for &arity in arities {
+            let corners: Vec<[f64; 3]> =
+                (start..start + arity).map(|i| positions[indices[i as usize] as usize]).collect();
+            if arity == 3 {
+                triangles.push([start, start + 1, start + 2]);
+            } else if arity > 3 {
+                let line = self.lines.next().copied().unwrap_or(0);
+                let Outline { triangles: cut, bent, crossing } = polygon::cut(&corners);
+                triangles.extend(cut.iter().map(|corners| corners.map(|i| start + i)));
+                for (found, kind) in [(bent, &mut self.bent), (crossing, &mut self.crossing)] {
+                    if found {
+                        let (count, first) = kind.unwrap_or((0, line));
+                        *kind = Some((count + 1, first));
+                    }
+                }
+            }
+            start += arity;
+        }
+        triangles
+    }
 }
 
 /// Finds the first face that names what the file does not have (tobj notices it only at the end of a part).
@@ -271,6 +332,8 @@ struct Feeder<'a> {
     given: Given,
     parts: Vec<(Labels, usize, Given)>,
     without_surface: usize,
+    /// The lines of faces of more than three corners.
+    polygons: Vec<usize>,
     /// What the feeder itself found wrong with `line`.
     refusal: Option<String>,
 }
@@ -287,6 +350,7 @@ impl<'a> Feeder<'a> {
             given: Given::default(),
             parts: Vec::new(),
             without_surface: 0,
+            polygons: Vec::new(),
             refusal: None,
         }
     }
@@ -349,6 +413,9 @@ impl<'a> Feeder<'a> {
         let corners = rest.split_whitespace().count();
         if corners < 3 {
             return Err(format!("a face needs at least 3 vertices, but has {corners}"));
+        }
+        if corners > 3 {
+            self.polygons.push(self.line);
         }
         let all =
             |place: usize| rest.split_whitespace().all(|c| c.split('/').nth(place).is_some_and(|w| !w.is_empty()));
@@ -414,7 +481,7 @@ mod tests {
     const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
 
     #[test]
-    fn polygons_become_fans() {
+    fn convex_polygons_become_fans() {
         let mesh = obj(&format!("{SQUARE}f 1/1/1 2//1 3/2 -1 # four\n")).unwrap();
         assert_eq!(mesh.parts.len(), 1);
         assert_eq!(mesh.parts[0].positions, [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]]);
@@ -422,6 +489,37 @@ mod tests {
         assert_eq!(mesh.parts[0].labels, Labels::default());
         let pentagon = obj("v 0 0 0\nv 2 0 0\nv 3 1 0\nv 1 2 0\nv -1 1 0\nf 1 2 3 4 5").unwrap();
         assert_eq!(pentagon.parts[0].triangles, [[0, 1, 2], [0, 2, 3], [0, 3, 4]]);
+    }
+
+    fn area(mesh: &Obj) -> f64 {
+        let of = |part: &Part| -> f64 {
+            let at = |i: u32| glam::DVec3::from_array(part.positions[i as usize]);
+            part.triangles.iter().map(|t| 0.5 * (at(t[1]) - at(t[0])).cross(at(t[2]) - at(t[0])).z).sum()
+        };
+        mesh.parts.iter().map(of).sum()
+    }
+
+    /// Signed areas sum to that of the outline however it is cut, so all triangles must face the same way too.
+    #[test]
+    fn other_polygons_cover_their_outline_and_no_more() {
+        for (text, expected) in [
+            ("v -1 -1 0\nv 0 0 0\nv 1 -1 0\nv 0 1 0\nf 1 2 3 4\n", 1.0),
+            ("v -1 -1 0\nv 1 -1 0\nv 1 0 0\nv 0 0 0\nv 0 1 0\nv -1 1 0\nf 2 3 4 5 6 1\n", 3.0),
+            // A square with a square hole, cut open by a bridge.
+            ("v 0 0 0\nv 4 0 0\nv 4 4 0\nv 0 4 0\nv 1 1 0\nv 1 3 0\nv 3 3 0\nv 3 1 0\nf 1 2 3 4 1 5 6 7 8 5\n", 12.0),
+        ] {
+            let mesh = obj(text).unwrap();
+            assert!((area(&mesh) - expected).abs() < 1e-12, "{text}: {}", area(&mesh));
+            let part = &mesh.parts[0];
+            let single =
+                |t: &[u32; 3]| area(&Obj { parts: vec![Part { triangles: vec![*t], ..part.clone() }], ..mesh.clone() });
+            assert!(part.triangles.iter().all(|t| single(t) > 0.0), "{text}: {:?}", part.triangles);
+            assert_eq!((mesh.bent, mesh.crossing), (None, None), "{text}");
+        }
+        let bent = obj("v 0 0 0\nv 1 0 0\nv 1 1 0.5\nv 0 1 0\n\nf 1 2 3 4\n").unwrap();
+        assert_eq!((bent.bent, bent.crossing), (Some((1, 6)), None));
+        let crossing = obj("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3 4\n").unwrap();
+        assert_eq!(crossing.crossing, Some((1, 5)));
     }
 
     #[test]

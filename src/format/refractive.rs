@@ -5,18 +5,24 @@ use std::path::Path;
 use serde::Deserialize;
 use serde_saphyr::Spanned;
 
+use super::table;
 use super::text::{self, SpectrumTable};
 use crate::error::Problem;
 
-/// n and k over wavelength in nm, as far as a file gives them. k > 0 absorbs.
+/// n and k over wavelength in nm, as far as a file gives them; each may be wrong by itself. k > 0 absorbs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Index {
-    pub n: Option<SpectrumTable>,
-    pub k: Option<SpectrumTable>,
+    pub n: Option<Part>,
+    pub k: Option<Part>,
 }
+
+type Part = Result<SpectrumTable, Box<Problem>>;
 
 /// Largest relative error of a dispersion formula's table between its nodes: well below the f32 of a device.
 const TABLE_ERROR: f64 = 1e-8;
+/// Beyond these, um, no formula means anything, and products of wavelengths leave f64.
+const SHORTEST_UM: f64 = 1e-6;
+const LONGEST_UM: f64 = 1e9;
 /// Halvings of a formula's range at most. A pole inside the range would need any number.
 const MAX_HALVINGS: u32 = 14;
 
@@ -25,20 +31,21 @@ pub fn is_yaml(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("yml") || e.eq_ignore_ascii_case("yaml"))
 }
 
-/// Reads the file at `path`: YAML by its name, otherwise text with the columns n and k.
+/// Reads the file at `path`: YAML by its name, otherwise text with the columns n and k. A dispersion formula that is not real all
+/// over the range of its page is read between the two wavelengths of `needed`, nm.
 ///
 /// Errors name the line; without one, the file as a whole could not be read.
-pub fn read(path: &Path) -> Result<Index, Box<Problem>> {
-    parse(&text::read(path)?, path)
+pub fn read(path: &Path, needed: Option<[f64; 2]>) -> Result<Index, Box<Problem>> {
+    parse(&text::read(path)?, path, needed)
 }
 
 /// [`read`] on the content of the file.
-pub fn parse(bytes: &[u8], path: &Path) -> Result<Index, Box<Problem>> {
+pub fn parse(bytes: &[u8], path: &Path, needed: Option<[f64; 2]>) -> Result<Index, Box<Problem>> {
     if is_yaml(path) {
-        return Yaml { path }.parse(&String::from_utf8_lossy(bytes));
+        return Yaml { path, needed }.parse(&table::text(bytes, path)?);
     }
     let [n, k] = text::parse_index(bytes, path)?;
-    Ok(Index { n: Some(n), k: Some(k) })
+    Ok(Index { n: n.map(Ok), k: k.map(Ok) })
 }
 
 /// What is read of a file; the rest (references, comments, properties) is left aside.
@@ -61,6 +68,7 @@ struct Block {
 
 struct Yaml<'a> {
     path: &'a Path,
+    needed: Option<[f64; 2]>,
 }
 
 impl Yaml<'_> {
@@ -73,32 +81,33 @@ impl Yaml<'_> {
         let document: Document = serde_saphyr::from_str(text).map_err(|e| {
             let line = e.location().map(|at| at.line() as usize).filter(|line| *line > 0);
             let message = e.without_snippet().to_string();
+            if message.contains("uplicate") {
+                return self.at(line, "has a key here that it has had before", "keep one of the two");
+            }
             // The place is named once.
             let message = message.split(" at line ").next().unwrap_or_default();
             let help = "a refractiveindex.info file has a list `DATA:` of blocks with `type:`";
             self.at(line, format!("is not what is expected of it: {}", message.replace('\n', " ")), help)
         })?;
         let mut index = Index { n: None, k: None };
+        let mut others = Vec::new();
         for block in &document.data {
-            let kind = block.kind.value.trim();
+            let kind = block.kind.value.split_whitespace().collect::<Vec<_>>();
             let line = line_of(&block.kind);
-            let (n, k) = match kind.split_once(' ') {
-                Some(("tabulated", "nk")) => {
-                    let [n, k] = self.columns(block, line)?;
+            let (n, k) = match kind[..] {
+                ["tabulated", "nk"] => {
+                    let (n, k) = match self.columns(block, line) {
+                        Ok([n, k]) => (Ok(n), Ok(k)),
+                        Err(problem) => (Err(problem.clone()), Err(problem)),
+                    };
                     (Some(n), Some(k))
                 }
-                Some(("tabulated", "n")) => {
-                    let [n] = self.columns(block, line)?;
-                    (Some(n), None)
-                }
-                Some(("tabulated", "k")) => {
-                    let [k] = self.columns(block, line)?;
-                    (None, Some(k))
-                }
-                Some(("formula", number)) => (Some(self.formula(block, line, number)?), None),
+                ["tabulated", "n"] => (Some(self.columns(block, line).map(|[n]| n)), None),
+                ["tabulated", "k"] => (None, Some(self.columns(block, line).map(|[k]| k))),
+                ["formula", number] => (Some(self.formula(block, line, number)), None),
                 _ => {
-                    let help = "known types: tabulated nk, tabulated n, tabulated k, formula 1 to 9";
-                    return Err(self.at(line, format!("has a block of type `{}`", kind.escape_debug()), help));
+                    others.push((line, block.kind.value.trim()));
+                    continue;
                 }
             };
             for (name, new, old) in [("n", n, &mut index.n), ("k", k, &mut index.k)] {
@@ -108,8 +117,17 @@ impl Yaml<'_> {
                 *old = new.or(old.take());
             }
         }
+        if let ((None, None), Some((line, kind))) = ((&index.n, &index.k), others.first()) {
+            let help = "known types: tabulated nk, tabulated n, tabulated k, formula 1 to 9";
+            return Err(self.at(*line, format!("has a block of type `{}`", kind.escape_debug()), help));
+        }
         if index.n.is_none() && index.k.is_none() {
             return Err(self.at(None, "has no data", "give at least one block under `DATA:`"));
+        }
+        for table in [&mut index.n, &mut index.k].into_iter().flatten().flatten() {
+            let left_out =
+                |(_, kind): &(Option<usize>, &str)| format!("has a block of type `{}`, left out", table::shown(kind));
+            table.notes.extend(others.iter().map(left_out));
         }
         Ok(index)
     }
@@ -119,7 +137,12 @@ impl Yaml<'_> {
         let Some(data) = &block.data else { return Err(self.at(line, "a tabulated block has no `data`", "")) };
         let first = line_of(data);
         let mut rows: Vec<(Option<usize>, Vec<f64>)> = Vec::new();
-        for (i, row) in data.value.lines().enumerate().filter(|(_, row)| !row.trim().is_empty()) {
+        let mut notes = Vec::new();
+        for (i, row) in data.value.lines().enumerate() {
+            let row = row.split('#').next().unwrap_or("").trim();
+            if row.is_empty() {
+                continue;
+            }
             let line = first.map(|first| first + i);
             let numbers = self.numbers(row, line)?;
             if numbers.len() != N + 1 {
@@ -131,20 +154,51 @@ impl Yaml<'_> {
             }
             rows.push((line, numbers));
         }
+        match &rows[..] {
+            [] => return Err(self.at(line, "has no rows", "give at least one wavelength")),
+            [only] => {
+                notes.push(format!("gives one wavelength only, {} um: its values are taken to be constant", only.1[0]));
+                // Two equal wavelengths, of which everything else is held.
+                rows.push(rows[0].clone());
+            }
+            [first, .., last] if first.1[0] > last.1[0] => rows.reverse(),
+            _ => {}
+        }
+        if let Some(pair) = rows.windows(2).find(|pair| pair[1].1[0] < pair[0].1[0]) {
+            notes.push(format!(
+                "has rows out of order, first at {} um, which follows {} um: they are sorted",
+                pair[1].1[0], pair[0].1[0]
+            ));
+            rows.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]));
+        }
+        let count = rows.len();
+        if count > 2 {
+            rows.dedup_by(|after, before| after.1 == before.1);
+        }
+        // What is left of equal wavelengths is a step from the first value to the last.
+        let mut i = 2;
+        while i < rows.len() {
+            if rows[i - 2].1[0] == rows[i].1[0] {
+                rows.remove(i - 1);
+            } else {
+                i += 1;
+            }
+        }
+        if rows.len() < count {
+            notes.push(format!(
+                "has {} rows for wavelengths that it has already given: they are left out",
+                count - rows.len()
+            ));
+        }
         if rows.len() < 2 {
-            return Err(self.at(line, format!("has {} rows", rows.len()), "give at least two wavelengths"));
-        }
-        if rows[0].1[0] > rows[rows.len() - 1].1[0] {
-            rows.reverse();
-        }
-        if let Some(pair) = rows.windows(2).find(|pair| pair[1].1[0] <= pair[0].1[0]) {
-            let message = format!("{} um and {} um are out of order", pair[0].1[0], pair[1].1[0]);
-            return Err(self.at(pair[1].0, message, "sort the rows by wavelength, each once"));
+            rows.push(rows[0].clone());
         }
         Ok(std::array::from_fn(|column| SpectrumTable {
             nm: rows.iter().map(|row| row.1[0] * 1e3).collect(),
             value: rows.iter().map(|row| row.1[column + 1]).collect(),
             line: rows.iter().map(|row| row.0.or(line).unwrap_or(1)).collect(),
+            unit: None,
+            notes: notes.clone(),
         }))
     }
 
@@ -157,7 +211,12 @@ impl Yaml<'_> {
         let Some(formula) = number.parse().ok().and_then(Formula::new) else {
             return Err(self.at(line, format!("has a formula `{}`", number.escape_debug()), "formulas are 1 to 9"));
         };
-        let coefficients = list(&block.coefficients, "coefficients")?;
+        let mut coefficients = list(&block.coefficients, "coefficients")?;
+        let mut notes = Vec::new();
+        if formula.lacks_one(coefficients.len()) {
+            notes.push(format!("has a formula {number} without its last coefficient, which is taken as 0"));
+            coefficients.push(0.0);
+        }
         if !formula.takes(coefficients.len()) {
             let message = format!("formula {number} cannot have {} coefficients", coefficients.len());
             return Err(self.at(block.coefficients.as_ref().and_then(line_of).or(line), message, ""));
@@ -167,18 +226,32 @@ impl Yaml<'_> {
         let &[from, to] = &range[..] else {
             return Err(self.at(at, format!("a range has two numbers, not {}", range.len()), ""));
         };
-        if !(0.0 < from && from < to && (to * 1e3).is_finite()) {
+        if !(SHORTEST_UM <= from && from < to && to <= LONGEST_UM) {
             return Err(self.at(at, format!("{from} to {to} um is no range of wavelengths"), ""));
         }
 
         let n = |um: f64| formula.eval(&coefficients, um);
-        let mut nodes = vec![(from, n(from))];
-        subdivide(&n, (from, n(from)), (to, n(to)), MAX_HALVINGS, &mut nodes);
-        if let Some((um, _)) = nodes.iter().find(|(_, n)| !n.is_finite()) {
-            return Err(self.at(line, format!("the formula has no real value at {um} um"), "narrow its range"));
+        let tabulated = |from: f64, to: f64| {
+            let mut nodes = vec![(from, n(from))];
+            subdivide(&n, (from, n(from)), (to, n(to)), MAX_HALVINGS, &mut nodes);
+            nodes
+        };
+        let is_wrong = |(_, n): &&(f64, f64)| !(n.is_finite() && *n > 0.0);
+        let mut nodes = tabulated(from, to);
+        if let Some(&(um, _)) = nodes.iter().find(is_wrong) {
+            nodes = match self.needed.map(|needed| needed.map(|nm| (nm / 1e3).clamp(from, to))) {
+                // Channels beside the range see the nearest end of it only.
+                Some([first, last]) if first == last => vec![(first, n(first)); 2],
+                Some([first, last]) => tabulated(first, last),
+                None => nodes,
+            };
+            if nodes.iter().any(|node| is_wrong(&node)) {
+                return Err(self.at(line, format!("the formula has no real value at {um} um"), "narrow its range"));
+            }
+            notes.push(format!("has a formula without a real value at {um} um, within the range of its page: it is read within the channels only"));
         }
         let (nm, value): (Vec<f64>, Vec<f64>) = nodes.into_iter().map(|(um, n)| (um * 1e3, n)).unzip();
-        Ok(SpectrumTable { line: vec![line.unwrap_or(1); nm.len()], nm, value })
+        Ok(SpectrumTable { line: vec![line.unwrap_or(1); nm.len()], nm, value, unit: None, notes })
     }
 
     fn numbers(&self, text: &str, line: Option<usize>) -> Result<Vec<f64>, Box<Problem>> {
@@ -233,6 +306,11 @@ impl Formula {
         }
     }
 
+    /// Whether the second number of the last pair is missing.
+    fn lacks_one(self, count: usize) -> bool {
+        matches!(self.0, 1 | 2 | 3 | 5 | 6) && count > 1 && !self.takes(count)
+    }
+
     /// n at `um`; not finite where the formula has no real value.
     fn eval(self, c: &[f64], um: f64) -> f64 {
         let at = |i: usize| c.get(i).copied().unwrap_or(0.0);
@@ -271,8 +349,10 @@ impl Formula {
 mod tests {
     use super::*;
 
-    fn yaml(text: &str) -> Result<Index, Box<Problem>> {
-        parse(text.as_bytes(), Path::new("t.yml"))
+    /// n and k, both right if they are there.
+    fn yaml(text: &str) -> Result<[Option<SpectrumTable>; 2], Box<Problem>> {
+        let Index { n, k } = parse(text.as_bytes(), Path::new("t.yml"), None)?;
+        Ok([n.transpose()?, k.transpose()?])
     }
 
     fn interpolated(table: &SpectrumTable, nm: f64) -> f64 {
@@ -284,11 +364,11 @@ mod tests {
     #[test]
     fn tables_and_their_lines() {
         let text = "# about\nREFERENCES: |\n    A. Name, <i>J.</i> (2012): 5\nCOMMENTS: \"none\"\nDATA:\n  - type: tabulated nk\n    data: |\n        3.000E-01 1.596E+00 1.888\n        0.4 1.5 0\nPROPERTIES:\n  - type: formula A\n";
-        let Index { n: Some(n), k: Some(k) } = yaml(text).unwrap() else { panic!("both are given") };
+        let [Some(n), Some(k)] = yaml(text).unwrap() else { panic!("both are given") };
         assert_eq!((n.nm, n.value, n.line), (vec![300.0, 400.0], vec![1.596, 1.5], vec![8, 9]));
         assert_eq!(k.value, [1.888, 0.0]);
         let apart = "DATA:\n- type: tabulated k\n  data: |\n    0.5 2\n    0.4 1\n- type: tabulated n\n  data: |\n    0.3 1.5\n    0.5 1.6\n";
-        let Index { n: Some(n), k: Some(k) } = yaml(apart).unwrap() else { panic!("both are given") };
+        let [Some(n), Some(k)] = yaml(apart).unwrap() else { panic!("both are given") };
         assert_eq!((n.nm, k.nm, k.value), (vec![300.0, 500.0], vec![400.0, 500.0], vec![1.0, 2.0]));
         assert_eq!(k.line, [5, 4]);
     }
@@ -298,7 +378,7 @@ mod tests {
     #[test]
     fn sellmeier_formulas_have_their_published_values() {
         let bk7 = "DATA:\n  - type: formula 2\n    wavelength_range: 0.3 2.5\n    coefficients: 0 1.03961212 0.00600069867 0.231792344 0.0200179144 1.01046945 103.560653\n  - type: tabulated k\n    data: |\n      0.3 2.8607E-06\n      2.5 1E-4\n";
-        let Index { n: Some(n), k: Some(k) } = yaml(bk7).unwrap() else { panic!("both are given") };
+        let [Some(n), Some(k)] = yaml(bk7).unwrap() else { panic!("both are given") };
         for (nm, index) in [
             (404.66, 1.530239),
             (486.13, 1.522376),
@@ -312,7 +392,7 @@ mod tests {
         assert_eq!(k.nm, [300.0, 2500.0]);
         assert!(n.nm.len() < 5000, "{} nodes", n.nm.len());
         let silica = "DATA:\n  - type: formula 1\n    range: 0.21 6.7\n    coefficients: 0 0.6961663 0.0684043 0.4079426 0.1162414 0.8974794 9.896161\n";
-        let n = yaml(silica).unwrap().n.unwrap();
+        let [Some(n), _] = yaml(silica).unwrap() else { panic!("n is given") };
         // Malitson's table I.
         for (nm, index) in [(587.5618, 1.45846), (1529.582, 1.44427)] {
             assert!((interpolated(&n, nm) - index).abs() < 1e-5, "{nm} nm: {}", interpolated(&n, nm));
@@ -361,7 +441,7 @@ mod tests {
             ("DATA:\n  - type: formula 5\n    coefficients: 1.5\n", Some(2), "no `wavelength_range`"),
             ("DATA:\n  - type: formula 5\n    wavelength_range: 2 1\n    coefficients: 1.5\n", Some(3), "no range"),
             (
-                "DATA:\n  - type: formula 5\n    wavelength_range: 1 2\n    coefficients: 1.5 2\n",
+                "DATA:\n  - type: formula 4\n    wavelength_range: 1 2\n    coefficients: 1.5 2\n",
                 Some(4),
                 "2 coefficients",
             ),
@@ -372,12 +452,8 @@ mod tests {
             ),
             ("DATA:\n  - type: tabulated nk\n    data: |\n      1 1 1\n      2 1\n", Some(5), "2 numbers where 3"),
             ("DATA:\n  - type: tabulated n\n    data: |\n      1 1\n      2 x\n", Some(5), "`x` is not a finite"),
-            ("DATA:\n  - type: tabulated n\n    data: |\n      1 1\n", Some(2), "1 rows"),
-            (
-                "DATA:\n  - type: tabulated n\n    data: |\n      1 1\n      3 1\n      2 1\n      4 1\n",
-                Some(6),
-                "out of order",
-            ),
+            ("DATA:\n  - type: tabulated n\n    data: |\n      # none\n", Some(2), "no rows"),
+            ("COMMENTS: a\nCOMMENTS: b\nDATA:\n  - type: tabulated n\n    data: |\n      1 1\n", Some(2), "had before"),
             (
                 "DATA:\n  - type: tabulated n\n    data: |\n      1 1\n      2 1\n  - type: formula 5\n    wavelength_range: 1 2\n    coefficients: 1.5\n",
                 Some(6),
@@ -392,8 +468,58 @@ mod tests {
     }
 
     #[test]
+    fn blemishes_are_mended_with_a_word() {
+        let table = |rows: &str| {
+            let text =
+                format!("DATA:\n  - type: tabulated nk\n    data: |\n        {}\n", rows.replace('\n', "\n        "));
+            let [Some(n), Some(k)] = yaml(&text).unwrap() else { panic!("both are given") };
+            (n.nm, n.value, k.value, n.notes.join("; "))
+        };
+        let (nm, n, k, notes) = table("# wl n k\n0.4 1.5 0 # first\n0.5 1.4 1\n0.5 1.4 1\n0.6 1.3 2");
+        assert_eq!((nm, n, k), (vec![400.0, 500.0, 600.0], vec![1.5, 1.4, 1.3], vec![0.0, 1.0, 2.0]));
+        assert!(notes.contains("1 rows"), "{notes}");
+        // Different values at one wavelength are a step, of the first and the last of them.
+        let (nm, n, ..) = table("0.4 1.5 0\n0.5 1.4 1\n0.5 9 9\n0.5 1.2 1\n0.6 1.3 2");
+        assert_eq!((nm, n), (vec![400.0, 500.0, 500.0, 600.0], vec![1.5, 1.4, 1.2, 1.3]));
+        let (nm, _, k, notes) = table("0.4 1 0\n0.6 1 2\n0.5 1 1\n0.7 1 3");
+        assert_eq!((nm, k), (vec![400.0, 500.0, 600.0, 700.0], vec![0.0, 1.0, 2.0, 3.0]));
+        assert!(notes.contains("out of order"), "{notes}");
+        let (nm, n, _, notes) = table("0.5876 1.473 0");
+        assert_eq!((nm, n), (vec![587.6, 587.6], vec![1.473, 1.473]));
+        assert!(notes.contains("one wavelength only"), "{notes}");
+    }
+
+    /// A formula that is real in the channels, and not all over the range of its page.
+    #[test]
+    fn a_pole_far_away_is_left_out() {
+        let text =
+            "DATA:\n  - type: formula 2\n    wavelength_range: 0.35 50\n    coefficients: 0 6.44 0.05 3.16 2200\n";
+        let read = |needed| parse(text.as_bytes(), Path::new("t.yml"), needed).unwrap().n.unwrap();
+        assert!(read(None).unwrap_err().message.contains("no real value"));
+        let n = read(Some([400.0, 700.0])).unwrap();
+        assert_eq!((n.nm.first(), n.nm.last(), n.notes.len()), (Some(&400.0), Some(&700.0), 1));
+        // n² = 1 + 6.44/(1 - 0.05/λ²) + 3.16/(1 - 2200/λ²) at 0.5 um.
+        let expected = (1.0 + 6.44 / (1.0 - 0.05 / 0.25) + 3.16 / (1.0 - 2200.0 / 0.25f64)).sqrt();
+        assert!((interpolated(&n, 500.0) - expected).abs() < 2e-8 * expected);
+        assert!(read(Some([40_000.0, 49_000.0])).is_err());
+    }
+
+    /// Of a pair that is not whole the second number is 0, and beside its range a formula has the value of its nearest end.
+    #[test]
+    fn what_formulas_leave_out() {
+        let text = "DATA:\n  - type: formula 5\n    wavelength_range: 1 2\n    coefficients: 1.5 2\n";
+        let [Some(n), _] = yaml(text).unwrap() else { panic!("n is given") };
+        assert!(n.value.iter().all(|n| *n == 3.5) && n.notes.len() == 1, "{:?}", n.notes);
+        let text = "DATA:\n  - type: formula 2\n    wavelength_range: 2 50\n    coefficients: 0 6.44 0.05 3.16 2200\n";
+        let n = parse(text.as_bytes(), Path::new("t.yml"), Some([400.0, 700.0])).unwrap().n.unwrap().unwrap();
+        let expected = (1.0 + 6.44 / (1.0 - 0.05 / 4.0) + 3.16 / (1.0 - 2200.0 / 4.0f64)).sqrt();
+        assert!(n.nm == [2000.0; 2] && n.value.iter().all(|n| (n - expected).abs() < 1e-15), "{n:?}");
+    }
+
+    #[test]
     fn a_single_coefficient_is_a_list_too() {
-        let n = yaml("DATA:\n  - type: formula 5\n    range: 1 2\n    coefficients: 1.5\n").unwrap().n.unwrap();
+        let text = "DATA:\n  - type: formula 5\n    range: 1 2\n    coefficients: 1.5\n";
+        let [Some(n), _] = yaml(text).unwrap() else { panic!("n is given") };
         assert!(n.value.iter().all(|n| *n == 1.5) && n.nm.first() == Some(&1000.0) && n.nm.last() == Some(&2000.0));
     }
 }

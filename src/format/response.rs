@@ -3,7 +3,11 @@
 
 use std::path::Path;
 
-use super::text::{Separator, SpectrumTable, Unit, ascending, read};
+use super::instrument::Format;
+use super::noise::{self, Range};
+use super::table;
+use super::text::{SpectrumTable, ascending, read};
+use super::unit::{self, Meaning, Stated, Unit};
 use crate::error::Problem;
 use crate::spectral::Response;
 
@@ -11,12 +15,9 @@ use crate::spectral::Response;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Responses {
     pub named: Vec<(String, Response)>,
-    /// What was not as it should be and could be put right, in words.
-    pub warning: Option<String>,
+    /// What was not as it should be and could be put right, or was left out; each names the file.
+    pub warnings: Vec<String>,
 }
-
-/// Negative values are measurement noise down to this share of the peak, and become 0.
-const NOISE: f64 = 0.01;
 
 pub fn read_responses(path: &Path) -> Result<Responses, Box<Problem>> {
     parse_responses(&read(path)?, path)
@@ -28,111 +29,119 @@ pub fn parse_responses(bytes: &[u8], path: &Path) -> Result<Responses, Box<Probl
         let help = (!help.is_empty()).then(|| help.to_owned());
         Box::new(Problem { file: path.to_owned(), line, message, help, ..Problem::default() })
     };
-    // Only comments and names can hold anything but ASCII.
-    let text = String::from_utf8_lossy(bytes);
-    let text = text.trim_start_matches('\u{feff}');
-    let mut lines = (1..)
-        .zip(text.lines())
-        .map(|(line, text)| (line, text.split('#').next().unwrap_or("").trim()))
-        .filter(|(_, text)| !text.is_empty());
-    let Some((header_line, header)) = lines.next() else {
-        return Err(wrong(None, "holds no data".into(), "write lines of `nm,response` under a header with names"));
-    };
-    let separator = Separator::of(header);
-    let names = separator.split(header);
-    if names.len() < 2 || names[0].parse::<f64>().is_ok() {
-        let help = "begin with a header: `wavelength_nm,red,green,blue`, or `band,wavelength_nm,response`";
-        return Err(wrong(Some(header_line), "has no names of channels".into(), help));
+    if let Some(found) = Format::of(path, bytes).and_then(|format| format.responses(bytes, path)) {
+        return responses(found?, Vec::new(), path);
     }
-    let is_long = names.len() == 3 && names[0].eq_ignore_ascii_case("band");
-    let of_wavelength = names[usize::from(is_long)];
-    let unit = Unit::from_header(of_wavelength).map_err(|unit| {
-        let message = format!("gives wavelengths in `{}`", unit.escape_debug());
-        wrong(Some(header_line), message, "give them in nm, um or cm-1")
+    let table = table::read(bytes, path)?;
+    let mut notes = table.notes.clone();
+    let count = table.columns();
+    if count < 2 {
+        return Err(wrong(
+            Some(table.line),
+            "has one column only".into(),
+            "write lines of `nm,response` under a header",
+        ));
+    }
+    let name = |column: usize| table.names.get(column).map_or("", String::as_str);
+    let is_long = count == 3 && name(0).eq_ignore_ascii_case("band");
+    let axis = usize::from(is_long);
+    let unit = Unit::from_header(name(axis)).map_err(|other| {
+        let message = format!("gives its wavelengths as {other}, from which none follows");
+        wrong(Some(table.line), message, "name wavelength and unit: nm, um, angstrom, cm-1, THz, eV")
     })?;
+    let in_air = unit::is_in_air(name(axis));
 
     let mut tables: Vec<(String, SpectrumTable)> = Vec::new();
-    let empty = || SpectrumTable { nm: Vec::new(), value: Vec::new(), line: Vec::new() };
-    if !is_long {
-        tables.extend(names[1..].iter().map(|name| ((*name).to_owned(), empty())));
+    if table.names.is_empty() {
+        tables.extend((2..=count).map(|number| (format!("column {number}"), SpectrumTable::default())));
+        notes
+            .push("names no channels: they are called after their columns, and wavelengths are taken as nm".to_owned());
+    } else if !is_long {
+        tables.extend(table.names[1..].iter().map(|name| (name.clone(), SpectrumTable::default())));
     }
-    for (line, text) in lines {
-        let cells = separator.split(text);
-        if cells.len() != names.len() {
-            let message = format!("has {} cells where {} are expected", cells.len(), names.len());
-            return Err(wrong(Some(line), message, "give every line the same number of cells"));
-        }
-        let number = |cell: &str| {
-            let value = cell.parse::<f64>().ok().filter(|v| v.is_finite());
-            value.ok_or_else(|| wrong(Some(line), format!("`{}` is not a finite number", cell.escape_debug()), ""))
-        };
-        let x = number(cells[usize::from(is_long)])?;
+    for row in &table.rows {
+        table.check_row(row)?;
+        let Some(x) = table.number(row, axis)? else { continue };
         if x <= 0.0 {
-            return Err(wrong(Some(line), format!("the wavelength must be greater than 0, but is {x}"), ""));
+            return Err(wrong(Some(row.line), format!("the wavelength must be greater than 0, but is {x}"), ""));
         }
+        let nm = if in_air { unit::vacuum_nm(unit.to_nm(x)) } else { unit.to_nm(x) };
         let mut push = |index: usize, value: f64| {
-            let table = &mut tables[index].1;
-            table.nm.push(unit.to_nm(x));
+            let table: &mut SpectrumTable = &mut tables[index].1;
+            table.nm.push(nm);
             table.value.push(value);
-            table.line.push(line);
+            table.line.push(row.line);
         };
-        if is_long {
-            let value = number(cells[2])?;
-            let known = tables.iter().position(|(name, _)| name == cells[0]);
-            let index = known.unwrap_or_else(|| {
-                tables.push((cells[0].to_owned(), empty()));
-                tables.len() - 1
-            });
-            let table = &mut tables[index].1;
-            table.nm.push(unit.to_nm(x));
-            table.value.push(value);
-            table.line.push(line);
-        } else {
-            for (index, cell) in cells[1..].iter().enumerate() {
-                // Empty: not given there.
-                if !cell.is_empty() {
-                    push(index, number(cell)?);
+        if !is_long {
+            for column in 1..count {
+                if let Some(value) = table.number(row, column)? {
+                    push(column - 1, value);
                 }
+            }
+            continue;
+        }
+        let Some(value) = table.number(row, 2)? else { continue };
+        let band = row.cells.get(0).unwrap_or("");
+        match tables.iter().position(|(name, _)| name == band) {
+            Some(known) => {
+                let table = &mut tables[known].1;
+                table.nm.push(nm);
+                table.value.push(value);
+                table.line.push(row.line);
+            }
+            None => {
+                let table = SpectrumTable {
+                    nm: vec![nm],
+                    value: vec![value],
+                    line: vec![row.line],
+                    ..SpectrumTable::default()
+                };
+                tables.push((band.to_owned(), table));
             }
         }
     }
     if tables.is_empty() {
         return Err(wrong(None, "holds no responses".into(), ""));
     }
+    let is_logarithm = |name: &str| Stated::in_name(name).is_some_and(|stated| stated.meaning == Meaning::Logarithm);
+    if let Some((name, _)) = tables.iter().find(|(name, _)| is_logarithm(name)) {
+        let message = format!("gives logarithms as the responses \"{}\"", name.escape_debug());
+        return Err(wrong(Some(table.line), message, "write the responses themselves"));
+    }
     let mut seen = std::collections::BTreeSet::new();
     if let Some((name, _)) = tables.iter().find(|(name, _)| !seen.insert(name.clone())) {
         let message = format!("has two channels named \"{}\"", name.escape_debug());
-        return Err(wrong(Some(header_line), message, "give each its own name"));
+        return Err(wrong(Some(table.line), message, "give each its own name"));
     }
-    responses(tables, path)
+    responses(tables, notes, path)
 }
 
-fn responses(tables: Vec<(String, SpectrumTable)>, path: &Path) -> Result<Responses, Box<Problem>> {
-    let (mut named, mut noisy, mut count, mut least) = (Vec::new(), Vec::new(), 0usize, 0f64);
+fn responses(tables: Vec<(String, SpectrumTable)>, notes: Vec<String>, path: &Path) -> Result<Responses, Box<Problem>> {
+    let mut named = Vec::new();
+    let (mut noisy, mut count, mut worst) = (Vec::new(), 0, 0f64);
+    let mut warnings: Vec<String> = notes.into_iter().map(|note| format!("{} {note}", path.display())).collect();
     for (name, table) in tables {
         let of = format!(" of the channel \"{}\"", name.escape_debug());
         let mut table = ascending(table, path, &of)?;
-        let peak = table.value.iter().copied().fold(0.0, f64::max);
-        let mut is_noisy = false;
-        for (i, value) in table.value.iter_mut().enumerate().filter(|(_, value)| **value < 0.0) {
-            if *value < -NOISE * peak {
-                let message = format!("the response{of} must not be negative, but is {value}");
+        warnings.extend(table.notes.drain(..).map(|note| format!("{} {note}{of}", path.display())));
+        match noise::clip(&mut table.value, Range::NotNegative, |v| v) {
+            Ok(None) => {}
+            Ok(Some(clipped)) => {
+                noisy.push(name.clone());
+                count += clipped.count;
+                worst = worst.min(clipped.worst);
+            }
+            Err(i) => {
+                let message = format!("the response{of} must not be negative, but is {}", table.value[i]);
                 let help = Some("values down to -1 % of the peak are taken as noise and become 0".to_owned());
                 return Err(Box::new(Problem {
                     file: path.to_owned(),
-                    line: Some(table.line[i]),
+                    line: table.line.get(i).copied(),
                     message,
                     help,
                     ..Problem::default()
                 }));
             }
-            least = least.min(*value);
-            count += 1;
-            is_noisy = true;
-            *value = 0.0;
-        }
-        if is_noisy {
-            noisy.push(name.clone());
         }
         let response = Response::new(table.nm, table.value).map_err(|what| {
             let message = format!("the response{of} {what}");
@@ -140,14 +149,15 @@ fn responses(tables: Vec<(String, SpectrumTable)>, path: &Path) -> Result<Respon
         })?;
         named.push((name, response));
     }
-    let warning = (count > 0).then(|| {
-        format!(
-            "{}: {count} slightly negative responses (down to {least}) of the channels {} became 0",
+    if count > 0 {
+        warnings.push(format!(
+            "{}: the responses of the channels {} hold {count} negative values, the lowest {worst}, within 1 % of their peak: \
+             taken as noise, and as 0",
             path.display(),
             noisy.join(", ")
-        )
-    });
-    Ok(Responses { named, warning })
+        ));
+    }
+    Ok(Responses { named, warnings })
 }
 
 #[cfg(test)]
@@ -164,15 +174,15 @@ mod tests {
         let long = parse("band,um,response\nred,0.5,0\nred,0.6,1\nblue,0.4,1\nblue,0.5,0.5\n").unwrap();
         assert_eq!(wide, long);
         assert_eq!(wide.named[1].1.integral(), 75.0);
-        assert_eq!(wide.warning, None);
+        assert!(wide.warnings.is_empty());
     }
 
     #[test]
     fn noise_becomes_zero_and_is_told() {
         let noisy = parse("nm,a,b\n400,-0.009,0\n500,1,2\n600,-0.001,0\n").unwrap();
-        let warning = noisy.warning.unwrap();
+        let [warning] = &noisy.warnings[..] else { panic!("{:?}", noisy.warnings) };
         assert!(
-            warning.contains("2 slightly negative") && warning.contains("-0.009") && warning.contains("channels a "),
+            warning.contains("2 negative values") && warning.contains("-0.009") && warning.contains("channels a hold"),
             "{warning}"
         );
         assert_eq!(noisy.named[0].1.integral(), 100.0);
@@ -182,7 +192,6 @@ mod tests {
     fn mistakes_name_their_line() {
         for (text, line, words) in [
             ("", None, "no data"),
-            ("400,1\n500,1\n", Some(1), "no names"),
             ("nm,a\n400,1\n500,x\n", Some(3), "`x` is not a finite number"),
             ("nm,a\n400,1\n500,1,2\n", Some(3), "3 cells"),
             ("nm,a\n400,1\n0,1\n", Some(3), "greater than 0"),
@@ -190,8 +199,9 @@ mod tests {
             ("nm,a\n400,1\n500,-0.02\n", Some(3), "must not be negative, but is -0.02"),
             ("nm,a\n400,0\n500,0\n", None, "zero everywhere"),
             ("nm,a,a\n400,1,1\n500,1,1\n", Some(1), "two channels named \"a\""),
-            ("thz,a\n400,1\n500,1\n", Some(1), "`thz`"),
+            ("Frequency,a\n400,1\n500,1\n", Some(1), "`Frequency`"),
             ("band,nm,response\n", None, "no responses"),
+            ("nm,log10 a\n400,0\n500,1\n", Some(1), "logarithms"),
             ("band,nm,response\na,400,1\na,500,1\na,450,1\na,600,1\n", Some(4), "follows"),
         ] {
             let problem = parse(text).unwrap_err();

@@ -1,21 +1,42 @@
-//! Spectra in files. Here CSV (`nm,value`, with more columns by name; `nm,n,k`) and `.spd` (`nm value`); which of the other
-//! formats a file has is told from its name and its first line.
+//! Spectra in files. Here CSV (`nm,value`, with more columns by name or number; `nm,n,k`) and `.spd` (`nm value`); which of
+//! the other formats a file has is told from its name and how it begins.
 
 use std::fmt::Debug;
 use std::path::Path;
 
-use super::csv_table::Table;
-use super::{library, modtran};
+use super::table::{self, Table};
+use super::unit::{self, Stated, Unit};
+use super::{csv_table, instrument, library, modtran};
 use crate::error::Problem;
 use crate::spectral::Channels;
 
-/// Wavelengths in nm, ascending (two equal ones make a step), and a value for each.
-#[derive(Debug, Clone, PartialEq)]
+/// Wavelengths in nm, in vacuum, ascending (two equal ones make a step), and a value for each.
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct SpectrumTable {
     pub nm: Vec<f64>,
     pub value: Vec<f64>,
     /// The 1-based line each value stands on; empty where the file has no lines.
     pub line: Vec<usize>,
+    /// The unit of the values, where the file says one that has not been applied yet.
+    pub unit: Option<Stated>,
+    /// What was left out or mended, in words that go on after the file's name.
+    pub notes: Vec<String>,
+}
+
+/// Which spectrum of a file is wanted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Column<'a> {
+    /// The only one.
+    Only,
+    Named(&'a str),
+    /// Counted from 1, in a table with that of the wavelengths.
+    Number(usize),
+}
+
+impl<'a> From<Option<&'a str>> for Column<'a> {
+    fn from(name: Option<&'a str>) -> Self {
+        name.map_or(Column::Only, Column::Named)
+    }
 }
 
 /// A spectrum as CSV: a header, then the centre of each channel in nm, its radiance and, where known, standard error, with as
@@ -23,7 +44,7 @@ pub struct SpectrumTable {
 pub fn spectrum_csv<T: Debug>(channels: &Channels, radiance: &[T], standard_error: Option<&[T]>) -> String {
     // The header stands first: many readers of CSV know no comments.
     let columns = if standard_error.is_some() { 3 } else { 2 };
-    let mut table = Table::new(&["wavelength_nm", "radiance", "standard_error"][..columns]);
+    let mut table = csv_table::Table::new(&["wavelength_nm", "radiance", "standard_error"][..columns]);
     for (k, radiance) in radiance.iter().enumerate() {
         // Debug, not Display: 1e-30 instead of thirty zeros.
         let error = standard_error.map(|errors| format!("{:?}", errors[k]));
@@ -32,14 +53,17 @@ pub fn spectrum_csv<T: Debug>(channels: &Channels, radiance: &[T], standard_erro
     table.finish()
 }
 
-/// Reads the spectrum of `column` (by name; absent: the only one) of the file at `path`: CSV, `.spd`, an ENVI spectral
-/// library, ECOSTRESS or USGS text, or MODTRAN's tape7. `unit` is that of CSV's first column where its header does not say.
+/// Reads the spectrum of `column` of the file at `path`: CSV, `.spd`, an ENVI spectral library, ECOSTRESS or USGS text,
+/// MODTRAN's tape7, or what instruments and other programs write ([`instrument`]). `unit` is that of CSV's first column where
+/// its header does not say.
 ///
 /// Errors name the line; without one, the file as a whole could not be read.
-pub fn read_spectrum(path: &Path, column: Option<&str>, unit: Option<Unit>) -> Result<SpectrumTable, Box<Problem>> {
+pub fn read_spectrum(path: &Path, column: Column, unit: Option<Unit>) -> Result<SpectrumTable, Box<Problem>> {
     let bytes = read(path)?;
     let other = if library::is_envi(path, &bytes) {
         library::read_envi(path, column)
+    } else if let Some(format) = instrument::Format::of(path, &bytes) {
+        format.read(&bytes, path, column)
     } else if library::is_ecostress(&bytes) {
         library::no_columns(path, column).and_then(|()| library::parse_ecostress(&bytes, path))
     } else if library::is_usgs(&bytes) {
@@ -47,7 +71,7 @@ pub fn read_spectrum(path: &Path, column: Option<&str>, unit: Option<Unit>) -> R
     } else if modtran::is_tape7(path, &bytes) {
         modtran::parse(&bytes, path, column)
     } else {
-        return parse(&bytes, path, column.map_or(Column::Only, Column::Named), unit);
+        return parse(&bytes, path, column, unit);
     };
     match unit {
         None => other,
@@ -69,12 +93,32 @@ pub(super) fn read(path: &Path) -> Result<Vec<u8>, Box<Problem>> {
 
 /// [`read_spectrum`] on the content of a CSV or `.spd` file, which `path` tells apart; it stands in messages too.
 pub fn parse_spectrum(bytes: &[u8], path: &Path, column: Option<&str>) -> Result<SpectrumTable, Box<Problem>> {
-    parse(bytes, path, column.map_or(Column::Only, Column::Named), None)
+    parse(bytes, path, column.into(), None)
 }
 
-/// The columns `n` and `k` of an `nm,n,k` file; without a header, the second and the third of three.
-pub fn parse_index(bytes: &[u8], path: &Path) -> Result<[SpectrumTable; 2], Box<Problem>> {
-    Ok([parse(bytes, path, Column::OfIndex("n"), None)?, parse(bytes, path, Column::OfIndex("k"), None)?])
+/// n and k of an `nm,n,k` file, or of one of refractiveindex.info's, as far as it gives them; without a header, the second and
+/// the third of three columns.
+pub fn parse_index(bytes: &[u8], path: &Path) -> Result<[Option<SpectrumTable>; 2], Box<Problem>> {
+    let text = table::text(bytes, path)?;
+    if let Some(blocks) = downloaded(&text) {
+        let block = |name: &str| match blocks.iter().find(|block| block.name == name) {
+            Some(block) => block.read(path).map(Some),
+            None => Ok(None),
+        };
+        return Ok([block("n")?, block("k")?]);
+    }
+    let table = table::parse(&text, 1, path)?;
+    let axis = Axis::of(&table, None)?;
+    let mut found = ["n", "k"].map(|name| position(&table, name));
+    if table.names.is_empty() {
+        if table.columns() != 3 {
+            let message = format!("has {} columns and no header line", table.columns());
+            return Err(table.problem(Some(table.line), message, "write lines of `nm,n,k`"));
+        }
+        found = [Ok(1), Ok(2)];
+    }
+    let [n, k] = found;
+    Ok([Some(axis.column(&table, n?, " of n")?), Some(axis.column(&table, k?, " of k")?)])
 }
 
 /// Every column beside the wavelength, with the name that the header gives it.
@@ -84,230 +128,275 @@ pub fn read_columns(path: &Path) -> Result<Vec<(String, SpectrumTable)>, Box<Pro
 
 /// [`read_columns`] on the content of the file.
 pub fn parse_columns(bytes: &[u8], path: &Path) -> Result<Vec<(String, SpectrumTable)>, Box<Problem>> {
-    let text = String::from_utf8_lossy(bytes);
-    let header = text.trim_start_matches('\u{feff}').lines();
-    let header = header.map(|line| line.split('#').next().unwrap_or("").trim()).find(|line| !line.is_empty());
-    let names = header.map_or_else(Vec::new, |header| Separator::of(header).split(header));
-    if let [_] | [] = names[..] {
-        // Says what is wrong.
-        return parse(bytes, path, Column::Only, None).map(|table| vec![(String::new(), table)]);
-    }
-    names[1..].iter().map(|name| Ok(((*name).to_owned(), parse(bytes, path, Column::Named(name), None)?))).collect()
-}
-
-/// Which column of a file is wanted.
-#[derive(Clone, Copy)]
-enum Column<'a> {
-    /// The only one beside the wavelength.
-    Only,
-    Named(&'a str),
-    /// `n` or `k`, which stand in this order where there is no header.
-    OfIndex(&'a str),
+    let table = table::read(bytes, path)?;
+    let axis = Axis::of(&table, None)?;
+    let name = |column: usize| table.names.get(column).cloned().unwrap_or_default();
+    let of =
+        |column: usize| if table.names.is_empty() { String::new() } else { format!(" of {}", named(&name(column))) };
+    axis.columns(&table, &(axis.column + 1..table.columns()).collect::<Vec<_>>(), of)?
+        .into_iter()
+        .map(|(column, table)| Ok((name(column), table)))
+        .collect()
 }
 
 fn parse(bytes: &[u8], path: &Path, column: Column, unit: Option<Unit>) -> Result<SpectrumTable, Box<Problem>> {
-    // Only comments and names can hold anything but ASCII, so old encodings do no harm.
-    let text = String::from_utf8_lossy(bytes);
-    let text = text.trim_start_matches('\u{feff}');
-    let reader = Reader { path, column };
-    let mut lines = (1..)
-        .zip(text.lines())
-        .map(|(line, text)| (line, text.split('#').next().unwrap_or("").trim()))
-        .filter(|(_, text)| !text.is_empty())
-        .peekable();
-    let Some(&(first_line, first)) = lines.peek() else {
-        return Err(reader.at(None, "holds no data".to_owned(), "write lines of `nm,value`"));
-    };
-
-    let is_spd = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("spd"));
-    let separator = if is_spd { Separator::Space } else { Separator::of(first) };
-    let first_cells = separator.split(first);
-    let header = first_cells[0].parse::<f64>().is_err();
-    let mut layout = reader.layout(first_line, &first_cells, header)?;
-    layout.unit = unit.unwrap_or(layout.unit);
-    if header {
-        lines.next();
+    let text = table::text(bytes, path)?;
+    if unit.is_none()
+        && let Some(blocks) = downloaded(&text)
+    {
+        return Block::pick(&blocks, path, column)?.read(path);
     }
-
-    let mut table = SpectrumTable { nm: Vec::new(), value: Vec::new(), line: Vec::new() };
-    for (line, text) in lines {
-        if let Some((x, value)) = reader.row(line, &separator.split(text), &layout)? {
-            table.nm.push(layout.unit.to_nm(x));
-            table.value.push(value);
-            table.line.push(line);
-        }
-    }
-    reader.ascending(table)
+    let table = table::parse(&text, 1, path)?;
+    let axis = Axis::of(&table, unit)?;
+    let value = axis.pick(&table, column)?;
+    axis.column(&table, value, "")
 }
 
-/// How the cells of a line are told apart; decided by the first line.
-#[derive(Clone, Copy)]
-pub(super) enum Separator {
-    Char(char),
-    Space,
-}
-
-impl Separator {
-    pub fn of(line: &str) -> Self {
-        [';', '\t', ','].into_iter().find(|c| line.contains(*c)).map_or(Separator::Space, Separator::Char)
-    }
-
-    /// At least one cell, without surrounding blanks and quotes.
-    pub fn split(self, line: &str) -> Vec<&str> {
-        match self {
-            Separator::Char(c) => line.split(c).map(|cell| cell.trim().trim_matches('"').trim()).collect(),
-            Separator::Space => line.split_whitespace().collect(),
-        }
-    }
-}
-
-/// Unit of the first column.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Unit {
-    Nanometre,
-    Micrometre,
-    Wavenumber,
-}
-
-impl Unit {
-    pub(super) fn to_nm(self, x: f64) -> f64 {
-        match self {
-            Unit::Nanometre => x,
-            Unit::Micrometre => x * 1e3,
-            Unit::Wavenumber => 1e7 / x,
-        }
-    }
-
-    /// `Err` names a unit that is none of ours.
-    pub(super) fn from_header(name: &str) -> Result<Self, String> {
-        let name = name.to_lowercase();
-        if name.contains("cm-1") || name.contains("cm^-1") || name.contains("wavenumber") {
-            return Ok(Unit::Wavenumber);
-        }
-        for word in name.split(|c: char| !c.is_alphanumeric()) {
-            match word {
-                "angstrom" | "angstroms" | "å" | "ev" | "hz" | "thz" => return Err(word.to_owned()),
-                _ => match nanometres(word) {
-                    Some(1e3) => return Ok(Unit::Micrometre),
-                    Some(1e6..) => return Err(word.to_owned()),
-                    _ => {}
-                },
-            }
-        }
-        Ok(Unit::Nanometre)
-    }
-}
-
-/// Nanometres in a unit of wavelength, under the names that files give it.
-pub(super) fn nanometres(unit: &str) -> Option<f64> {
-    match unit.trim().to_ascii_lowercase().as_str() {
-        "nm" | "nanometer" | "nanometers" | "nanometre" | "nanometres" => Some(1.0),
-        "um" | "µm" | "μm" | "micron" | "microns" | "micrometer" | "micrometers" | "micrometre" | "micrometres" => {
-            Some(1e3)
-        }
-        "mm" | "millimeter" | "millimeters" | "millimetre" | "millimetres" => Some(1e6),
-        "m" | "meter" | "meters" | "metre" | "metres" => Some(1e9),
-        _ => None,
-    }
-}
-
-/// Where in a line the numbers are.
-struct Layout {
-    cells: usize,
-    value: usize,
+/// The column of wavelengths, and what its numbers are.
+struct Axis {
+    column: usize,
     unit: Unit,
+    /// Whether the header says that these are wavelengths in air.
+    in_air: bool,
+    /// Whether nothing says the unit, so that it is nm.
+    is_guessed: bool,
+    /// What is to be said of the table.
+    notes: Vec<String>,
 }
 
-/// What every message needs.
-struct Reader<'a> {
-    path: &'a Path,
-    column: Column<'a>,
-}
-
-impl Reader<'_> {
-    fn at(&self, line: Option<usize>, message: String, help: &str) -> Box<Problem> {
-        let help = (!help.is_empty()).then(|| help.to_owned());
-        Box::new(Problem { file: self.path.to_owned(), line, message, help, ..Problem::default() })
+impl Axis {
+    /// `unit` is what the scene says; otherwise the header does.
+    fn of(table: &Table, unit: Option<Unit>) -> Result<Axis, Box<Problem>> {
+        if table.columns() < 2 {
+            return Err(table.problem(Some(table.line), "has one column only".to_owned(), "write lines of `nm,value`"));
+        }
+        let name = |column: usize| table.names.get(column).map_or("", String::as_str);
+        // pandas writes the numbers of its rows first.
+        let is_index = ["", "index", "unnamed: 0", "no", "nr", "row"].contains(&name(0).to_lowercase().as_str());
+        let second_is_axis =
+            || !matches!(Unit::stated(name(1)), Ok(None)) || name(1).to_lowercase().starts_with("wave");
+        let column = usize::from(is_index && table.columns() > 2 && second_is_axis());
+        let stated = Unit::stated(name(column));
+        if let (Some(unit), Ok(Some(of_header))) = (unit, &stated)
+            && unit != *of_header
+        {
+            let message =
+                format!("calls its first column `{}`, and the scene says another unit", table::shown(name(column)));
+            return Err(table.problem(Some(table.line), message, "remove `unit`, or correct the header"));
+        }
+        let is_guessed = unit.is_none() && stated == Ok(None);
+        let unit = match unit {
+            Some(unit) => unit,
+            None => Unit::from_header(name(column)).map_err(|other| {
+                let message = format!("gives its first column as {other}, from which no wavelength follows");
+                let help =
+                    "name wavelength and unit in the header: nm, um, angstrom, cm-1, THz, eV; or write `unit = \"nm\"`";
+                table.problem(Some(table.line), message, help)
+            })?,
+        };
+        let mut notes = table.notes.clone();
+        if column > 0 {
+            let axis = table::shown(name(column));
+            notes.push(format!(
+                "begins with a column of row numbers, which is left out: wavelengths are those of `{axis}`"
+            ));
+        }
+        Ok(Axis { column, unit, in_air: unit::is_in_air(name(column)), is_guessed, notes })
     }
 
-    fn layout(&self, line: usize, cells: &[&str], header: bool) -> Result<Layout, Box<Problem>> {
-        let names = || cells[1..].join(", ");
-        if cells.len() < 2 {
-            return Err(self.at(Some(line), "has one column only".to_owned(), "write lines of `nm,value`"));
-        }
-        let value = match self.column {
-            Column::Named(_) if !header => {
-                let help = "name the columns in a first line such as `nm,value`, or leave `column` out";
-                return Err(self.at(
-                    Some(line),
+    /// The number of the column that is wanted.
+    fn pick(&self, table: &Table, column: Column) -> Result<usize, Box<Problem>> {
+        let others: Vec<usize> = (self.column + 1..table.columns()).collect();
+        let names = || others.iter().filter_map(|i| table.names.get(*i)).cloned().collect::<Vec<_>>().join(", ");
+        let by_number = |number: usize| {
+            let found = number.checked_sub(1).filter(|i| others.contains(i));
+            found.ok_or_else(|| {
+                let message = format!("has no column {number} of values");
+                let help = format!("its columns of values are {} to {}", self.column + 2, table.columns());
+                table.problem(Some(table.line), message, &help)
+            })
+        };
+        match column {
+            Column::Number(number) => by_number(number),
+            Column::Named(wanted) if table.names.is_empty() => match wanted.trim().parse() {
+                Ok(number) => by_number(number),
+                Err(_) => Err(table.problem(
+                    Some(table.line),
                     "has no header line, so no column can be picked by name".to_owned(),
-                    help,
-                ));
-            }
-            Column::OfIndex(wanted) if !header => {
-                if cells.len() != 3 {
-                    let message = format!("has {} columns and no header line", cells.len());
-                    return Err(self.at(Some(line), message, "write lines of `nm,n,k`"));
-                }
-                if wanted == "n" { 1 } else { 2 }
-            }
-            Column::Named(wanted) | Column::OfIndex(wanted) => {
-                let found = cells.iter().skip(1).position(|cell| *cell == wanted);
-                found.map(|i| i + 1).ok_or_else(|| {
-                    self.at(Some(line), format!("has no column \"{wanted}\""), &format!("its columns are {}", names()))
-                })?
-            }
-            Column::Only if cells.len() == 2 => 1,
-            Column::Only if header => {
-                let message = format!("has {} value columns", cells.len() - 1);
-                return Err(self.at(Some(line), message, &format!("pick one with `column`: {}", names())));
+                    "give its number (`column = 2` is the one after the wavelengths), or name the columns in a first line",
+                )),
+            },
+            Column::Named(wanted) => position(table, wanted),
+            Column::Only if others.len() == 1 => Ok(others[0]),
+            Column::Only if table.names.is_empty() => {
+                let message = format!("has {} columns and no header line", table.columns());
+                let help = "pick one by its number: `column = 2` is the one after the wavelengths";
+                Err(table.problem(Some(table.line), message, help))
             }
             Column::Only => {
-                let message = format!("has {} columns and no header line", cells.len());
-                return Err(self.at(
-                    Some(line),
-                    message,
-                    "name the columns in a first line and pick one with `column`",
-                ));
+                let message = format!("has {} value columns", others.len());
+                Err(table.problem(Some(table.line), message, &format!("pick one with `column`: {}", names())))
             }
-        };
-        let unit = if header { Unit::from_header(cells[0]) } else { Ok(Unit::Nanometre) };
-        let unit = unit.map_err(|unit| {
-            self.at(Some(line), format!("the first column is in `{unit}`"), "give wavelengths in nm, um or cm-1")
-        })?;
-        Ok(Layout { cells: cells.len(), value, unit })
+        }
     }
 
-    /// The two numbers of a line; `None` where a file of several columns leaves the value empty: not given there.
-    fn row(&self, line: usize, cells: &[&str], layout: &Layout) -> Result<Option<(f64, f64)>, Box<Problem>> {
-        if cells.len() != layout.cells {
-            let message = format!("has {} cells where {} are expected", cells.len(), layout.cells);
-            return Err(self.at(Some(line), message, "give every line the same number of cells"));
+    /// Wavelengths and values of one column, ascending; `of` says which it is.
+    fn column(&self, table: &Table, value: usize, of: &str) -> Result<SpectrumTable, Box<Problem>> {
+        let mut all = self.columns(table, &[value], |_| of.to_owned())?;
+        Ok(all.pop().map(|(_, table)| table).unwrap_or_default())
+    }
+
+    /// Several columns in one pass.
+    fn columns(
+        &self,
+        table: &Table,
+        wanted: &[usize],
+        of: impl Fn(usize) -> String,
+    ) -> Result<Vec<(usize, SpectrumTable)>, Box<Problem>> {
+        let mut found: Vec<SpectrumTable> = vec![SpectrumTable::default(); wanted.len()];
+        for row in &table.rows {
+            table.check_row(row)?;
+            let Some(x) = table.number(row, self.column)? else { continue };
+            let nm = self.nm(table, row.line, x)?;
+            for (column, found) in wanted.iter().zip(&mut found) {
+                if let Some(value) = table.number(row, *column)? {
+                    found.nm.push(nm);
+                    found.value.push(value);
+                    found.line.push(row.line);
+                }
+            }
         }
-        let number = |cell: &str| {
-            cell.parse::<f64>()
-                .ok()
-                .filter(|v| v.is_finite())
-                .ok_or_else(|| self.at(Some(line), format!("`{}` is not a finite number", cell.escape_debug()), ""))
+        let finish = |(column, mut found): (&usize, SpectrumTable)| {
+            let name = table.names.get(*column).map_or("", String::as_str);
+            found.unit = Stated::in_name(name);
+            found.notes.clone_from(&self.notes);
+            found.notes.extend(self.looks_like_micrometres(&found.nm));
+            if self.in_air {
+                found.notes.push(
+                    "gives wavelengths in air: they are converted to vacuum (Ciddor 1996, dry air of 15 °C)".to_owned(),
+                );
+            }
+            Ok((*column, ascending(found, table.path, &of(*column))?))
         };
-        let x = number(cells[0])?;
+        wanted.iter().zip(found).map(finish).collect()
+    }
+
+    /// What to say of wavelengths in nm that nobody has there.
+    fn looks_like_micrometres(&self, nm: &[f64]) -> Option<String> {
+        const SHORTEST: f64 = 100.0;
+        let longest = nm.iter().copied().fold(0.0, f64::max);
+        (self.is_guessed && longest < SHORTEST).then(|| {
+            format!(
+                "does not say in what its wavelengths are: up to {longest}, they are taken as nm (if they are micrometres, \
+                 write `unit = \"um\"`)"
+            )
+        })
+    }
+
+    /// A wavelength in vacuum.
+    fn nm(&self, table: &Table, line: usize, x: f64) -> Result<f64, Box<Problem>> {
         if x <= 0.0 {
-            return Err(self.at(Some(line), format!("the wavelength must be greater than 0, but is {x}"), ""));
+            return Err(table.problem(Some(line), format!("the wavelength must be greater than 0, but is {x}"), ""));
         }
-        if cells[layout.value].is_empty() && layout.cells > 2 {
-            return Ok(None);
+        let nm = self.unit.to_nm(x);
+        Ok(if self.in_air { unit::vacuum_nm(nm) } else { nm })
+    }
+}
+
+/// The column called `wanted`, which no other must be.
+fn position(table: &Table, wanted: &str) -> Result<usize, Box<Problem>> {
+    let exact = |name: &String| name == wanted;
+    // Beside a header of units, or of capitals, the bare name is meant.
+    let bare = |name: &String| {
+        let bare = name.split(['(', '[']).next().unwrap_or("").trim();
+        bare.eq_ignore_ascii_case(wanted.trim())
+    };
+    let all = |matches: &dyn Fn(&String) -> bool| {
+        table.names.iter().enumerate().skip(1).filter(|(_, name)| matches(name)).map(|(i, _)| i).collect::<Vec<_>>()
+    };
+    let mut found = all(&exact);
+    if found.is_empty() {
+        found = all(&bare);
+    }
+    match found[..] {
+        [one] => Ok(one),
+        [] => {
+            let names = table.names.iter().skip(1).cloned().collect::<Vec<_>>().join(", ");
+            let message = format!("has no column \"{wanted}\"");
+            Err(table.problem(Some(table.line), message, &format!("its columns are {names}")))
         }
-        Ok(Some((x, number(cells[layout.value])?)))
+        [first, second, ..] => {
+            let message = format!("has several columns \"{wanted}\"");
+            let help = format!("pick one by its number: `column = {}` or {}", first + 1, second + 1);
+            Err(table.problem(Some(table.line), message, &help))
+        }
+    }
+}
+
+/// One of the tables that a download of refractiveindex.info has one under the other: `wl` in um, and n or k.
+struct Block<'t> {
+    name: &'t str,
+    text: &'t str,
+    line: usize,
+}
+
+impl<'t> Block<'t> {
+    fn pick<'b>(blocks: &'b [Block<'t>], path: &Path, column: Column) -> Result<&'b Block<'t>, Box<Problem>> {
+        let found = match column {
+            Column::Only if blocks.len() == 1 => blocks.first(),
+            // What an index file gives unless asked for k.
+            Column::Only => blocks.iter().find(|block| block.name == "n"),
+            Column::Named(name) => blocks.iter().find(|block| block.name == name),
+            Column::Number(number) => number.checked_sub(2).and_then(|i| blocks.get(i)),
+        };
+        found.ok_or_else(|| {
+            let names: Vec<&str> = blocks.iter().map(|block| block.name).collect();
+            let message = "has no such column".to_owned();
+            let help = Some(format!("its columns are {}", names.join(", ")));
+            Box::new(Problem { file: path.to_owned(), message, help, ..Problem::default() })
+        })
     }
 
-    /// The table in ascending order, which its lines must have one way or the other.
-    fn ascending(&self, table: SpectrumTable) -> Result<SpectrumTable, Box<Problem>> {
-        let of = match self.column {
-            Column::OfIndex(name) => format!(" of {name}"),
-            _ => String::new(),
-        };
-        ascending(table, self.path, &of)
+    fn read(&self, path: &Path) -> Result<SpectrumTable, Box<Problem>> {
+        let table = table::parse(self.text, self.line, path)?;
+        let axis =
+            Axis { column: 0, unit: Unit::MICROMETRE, in_air: false, is_guessed: false, notes: table.notes.clone() };
+        if table.columns() != 2 {
+            return Err(table.problem(
+                Some(table.line),
+                format!("has {} columns", table.columns()),
+                "two are expected",
+            ));
+        }
+        axis.column(&table, 1, &format!(" of {}", self.name))
     }
+}
+
+/// The blocks of a download of refractiveindex.info, if `text` is one.
+fn downloaded(text: &str) -> Option<Vec<Block<'_>>> {
+    let heads = |line: &str| -> Option<&'static str> {
+        let mut words =
+            line.split([',', '\t', ';', ' ']).map(|word| word.trim().trim_matches('"')).filter(|w| !w.is_empty());
+        let name = match (words.next(), words.next(), words.next()) {
+            (Some("wl"), Some("n"), None) => "n",
+            (Some("wl"), Some("k"), None) => "k",
+            _ => return None,
+        };
+        Some(name)
+    };
+    let first = text.lines().find(|line| !line.trim().is_empty())?;
+    heads(first)?;
+    let mut starts: Vec<(usize, usize, &'static str)> = Vec::new();
+    let mut offset = 0;
+    for (number, line) in (1..).zip(text.split('\n')) {
+        if let Some(name) = heads(line) {
+            starts.push((number, offset, name));
+        }
+        offset += line.len() + 1;
+    }
+    let ends: Vec<usize> = starts.iter().skip(1).map(|(_, offset, _)| *offset).chain([text.len()]).collect();
+    let blocks = starts.into_iter().zip(ends);
+    Some(blocks.map(|((line, start, name), end)| Block { name, text: &text[start..end], line }).collect())
 }
 
 /// A table in ascending order, which it must have one way or the other; `of` says what of the file at `path` it is.
@@ -366,6 +455,9 @@ mod tests {
             "nm\tr\n400\t0.5\n500\t0.75",
             "\"wavelength (um)\",\"r\"\n0.5,0.75\n0.4,0.5",
             "wavenumber_cm-1,r\n20000,0.75\n25000,0.5",
+            "\u{3bb} (\u{c5}),r\n4000,0.5\n5000,0.75",
+            ",nm,r\n0,400,0.5\n1,500,0.75",
+            "# wavelength_um,r\n0.4,0.5\n0.5,0.75",
             "400 0.5\n500   0.75",
         ] {
             let table = csv(text, None).unwrap();
@@ -383,25 +475,55 @@ mod tests {
         assert_eq!((b.nm, b.value, b.line), (vec![500.0, 600.0], vec![5.0, 6.0], vec![3, 4]));
         assert!(csv(text, None).unwrap_err().help.unwrap().contains("a, b"));
         assert!(csv(text, Some("c")).unwrap_err().help.unwrap().contains("a, b"));
+        let number = |text: &str, column| parse(text.as_bytes(), Path::new("t.csv"), column, None);
+        assert_eq!(number("400,1,2\n500,3,4\n", Column::Number(3)).unwrap().value, [2.0, 4.0]);
+        assert_eq!(number("400,1,2\n500,3,4\n", Column::Named("2")).unwrap().value, [1.0, 3.0]);
+        for wrong in [0, 1, 4] {
+            assert!(number("400,1,2\n500,3,4\n", Column::Number(wrong)).unwrap_err().help.unwrap().contains("2 to 3"));
+        }
+        let in_um = |text: &str| parse(text.as_bytes(), Path::new("t.csv"), Column::Only, Some(Unit::MICROMETRE));
+        assert_eq!(in_um("Frequency,v\n0.4,1\n0.5,3\n").unwrap().nm, [400.0, 500.0]);
+        assert_eq!(in_um("wl (um),v\n0.4,1\n0.5,3\n").unwrap().nm, [400.0, 500.0]);
+        assert!(in_um("nm,v\n400,1\n500,3\n").unwrap_err().message.contains("the scene says another unit"));
+        let twice = number("nm,v,v\n400,1,2\n500,1,2", Column::Named("v")).unwrap_err();
+        assert!(twice.message.contains("several columns") && twice.help.unwrap().contains("`column = 2` or 3"));
     }
 
     #[test]
     fn an_index_is_two_columns() {
         let index = |text: &str| parse_index(text.as_bytes(), Path::new("nk.csv"));
-        for text in ["400,1.5,0\n500,1.4,0.25\n", "k,nm,x\n", "um,k,x,n\n0.4,0,9,1.5\n0.5,0.25,,1.4\n"] {
+        for text in
+            ["400,1.5,0\n500,1.4,0.25\n", "k,nm,x\n400,1,2\n500,1,2\n", "um,k,x,n\n0.4,0,9,1.5\n0.5,0.25,,1.4\n"]
+        {
             match index(text) {
-                Ok([n, k]) => {
+                Ok([Some(n), Some(k)]) => {
                     assert_eq!((n.nm, n.value), (vec![400.0, 500.0], vec![1.5, 1.4]), "{text}");
                     assert_eq!((k.nm, k.value), (vec![400.0, 500.0], vec![0.0, 0.25]), "{text}");
                 }
+                Ok(_) => panic!("{text} gives both"),
                 Err(problem) => assert!(text.starts_with('k') && problem.message.contains("no column \"n\"")),
             }
         }
         // Each has the wavelengths at which it is given.
-        let [n, k] = index("nm,n,k\n400,1.5,\n500,1.4,1\n600,1.3,2\n").unwrap();
+        let [Some(n), Some(k)] = index("nm,n,k\n400,1.5,\n500,1.4,1\n600,1.3,2\n").unwrap() else { panic!("both") };
         assert_eq!((n.nm.len(), k.nm), (3, vec![500.0, 600.0]));
         assert!(index("nm,n,k\n400,1.5,\n500,1.4,\n").unwrap_err().message.contains("0 values of k"));
         assert!(index("400,1.5\n500,1.4\n").unwrap_err().message.contains("2 columns and no header"));
+    }
+
+    /// As refractiveindex.info offers them: um, n and k one under the other.
+    #[test]
+    fn downloads_are_two_tables() {
+        for separator in [",", "\t"] {
+            let text = "wl,n\n0.4,0.2\n0.7,0.25\n\nwl,k\n0.4,3\n0.7,4\n".replace(',', separator);
+            let [Some(n), Some(k)] = parse_index(text.as_bytes(), Path::new("a.csv")).unwrap() else { panic!("both") };
+            assert_eq!((n.nm, n.value, k.value), (vec![400.0, 700.0], vec![0.2, 0.25], vec![3.0, 4.0]));
+            assert_eq!(k.line, [6, 7]);
+            assert_eq!(csv(&text, Some("k")).unwrap().value, [3.0, 4.0]);
+            assert_eq!(csv(&text, None).unwrap().value, [0.2, 0.25]);
+        }
+        let [n, k] = parse_index(b"wl,n\n0.4,1.5\n0.7,1.4\n", Path::new("a.csv")).unwrap();
+        assert!(n.is_some() && k.is_none());
     }
 
     #[test]
@@ -425,7 +547,8 @@ mod tests {
             ("400,1\n500,1\n450,1\n600,1", Some(3), "follows"),
             ("400,1\n400,2\n400,3\n500,1", Some(3), "third time"),
             ("400,1", None, "1 values"),
-            ("angstrom,v\n4000,1\n5000,1", Some(1), "angstrom"),
+            ("Frequency,v\n4000,1\n5000,1", Some(1), "`Frequency`"),
+            ("nm,v,v\n400,1,2\n500,1,2", Some(1), "2 value columns"),
         ] {
             let problem = csv(text, None).unwrap_err();
             assert_eq!(problem.line, line, "{text:?}: {problem}");

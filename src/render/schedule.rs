@@ -348,7 +348,13 @@ impl<'a> Render<'a> {
         for epoch in first.. {
             let n = epoch_samples(epoch, full);
             let enough = self.samples_limit.is_some_and(|limit| self.status.samples >= limit);
-            if enough || self.too_late(n) || self.is_accurate() {
+            let is_accurate = self.is_accurate();
+            if is_accurate && cube.is_dark() {
+                let what = "every value of the picture is 0, of which --error knows nothing: either no light reaches the \
+                            camera, or it is too rare to have been met yet";
+                observe(Event::Warning(what.into()))?;
+            }
+            if enough || self.too_late(n) || is_accurate {
                 return Ok(());
             }
             let (began, rested, there) = (Instant::now(), self.rested(), self.merged.front().copied().unwrap_or(0));

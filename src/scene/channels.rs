@@ -10,6 +10,11 @@ use crate::spectral::{Channels, Response};
 const MAX_CHANNELS: u32 = 65_536;
 /// Beyond a millimetre geometric optics has nothing to say.
 const MAX_NM: f64 = 1e6;
+/// nm; the range that Spectile is made and tested for.
+const SHORTEST: f64 = 380.0;
+const LONGEST: f64 = 20_000.0;
+/// Wavelengths below this are those of nobody's optics in nm, and of everybody's in um.
+const MICROMETRES: f64 = 100.0;
 const WAVELENGTHS: &str = "greater than 0 and at most 1000000 (nm)";
 
 pub fn decode(item: &Item) -> Option<Channels> {
@@ -21,7 +26,9 @@ pub fn decode(item: &Item) -> Option<Channels> {
             Some(item) => Some(self::false_colour(&item, named.as_ref().map(Vec::len))?),
             None => None,
         };
-        return Some(Channels::from_responses(named?, false_colour));
+        let channels = Channels::from_responses(named?, false_colour);
+        warn_of_far_channels(kind, &channels);
+        return Some(channels);
     }
     let bounds = kind.as_ref().and_then(|kind| match kind.path.as_str() {
         "channels.equal" => equal(kind),
@@ -34,22 +41,47 @@ pub fn decode(item: &Item) -> Option<Channels> {
         Some(item) => Some(self::false_colour(&item, bounds.as_ref().map(Vec::len))?),
         None => None,
     };
-    Some(Channels::from_bounds(bounds?, false_colour))
+    let channels = Channels::from_bounds(bounds?, false_colour);
+    warn_of_far_channels(&kind?, &channels);
+    Some(channels)
+}
+
+/// Channels outside of what the renderer is made for are rendered, with a word; whose numbers look like micrometres are told so.
+fn warn_of_far_channels(kind: &Item, channels: &Channels) {
+    // A response may have tails.
+    let far = |k: &usize| match channels.responses.get(*k) {
+        Some(_) => !(SHORTEST..=LONGEST).contains(&channels.centre(*k)),
+        None => channels.bounds[*k][0] < SHORTEST || channels.bounds[*k][1] > LONGEST,
+    };
+    let found: Vec<[f64; 2]> = (0..channels.len()).filter(far).map(|k| channels.bounds[k]).collect();
+    let Some(hull) = found.iter().copied().reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]) else { return };
+    let all = channels.bounds.iter().flatten().copied();
+    let hint = if all.fold(0.0, f64::max) < MICROMETRES {
+        "; the numbers look like micrometres, of which one is 1000 nm"
+    } else {
+        ""
+    };
+    kind.cx.warn(format!(
+        "`{}`: {} of {} channels, between {} and {} nm, lie outside of {SHORTEST} to {LONGEST} nm{hint}",
+        kind.path,
+        found.len(),
+        channels.len(),
+        hull[0],
+        hull[1]
+    ));
 }
 
 /// The responses in the file that `item` names.
 fn responses(item: &Item) -> Option<Vec<(String, Response)>> {
     let path = item.cx.path(item.text()?);
-    let Responses { named, warning } =
+    let Responses { named, warnings } =
         response::read_responses(&path).map_err(|problem| report_in_file(item, *problem)).ok()?;
     if let Some((name, response)) = named.iter().find(|(_, response)| response.support()[1] > MAX_NM) {
         let message = format!("the response of the channel \"{name}\" reaches {} nm", response.support()[1]);
         item.error_help(message, format!("wavelengths must be {WAVELENGTHS}"));
         return None;
     }
-    if let Some(warning) = warning {
-        item.cx.warn(warning);
-    }
+    warnings.into_iter().for_each(|warning| item.cx.warn(warning));
     Some(named)
 }
 

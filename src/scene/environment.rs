@@ -8,6 +8,7 @@ use super::spectrum::{Quantity, Spectra, report_in_file};
 use super::{Environment, EnvironmentMap, Texels};
 use crate::error::Problem;
 use crate::format::maps::{self, Content, Map};
+use crate::format::noise::{self, Range};
 use crate::spectral::upsample;
 
 /// `None` where something is wrong, which has been said.
@@ -79,6 +80,14 @@ fn read_map(item: &Item, spectra: &Spectra) -> Option<(Map, Vec<String>)> {
             .ok()?
             .map(|w| format!("environment map {name} {w}")),
     );
+    let [width, height] = map.size;
+    // One texel is the same in every direction.
+    if width != 2 * height && map.size != [1, 1] {
+        warnings.push(format!(
+            "environment map {name} has {width} x {height} pixels: what covers all directions by longitude and latitude is \
+             twice as wide as high"
+        ));
+    }
     if matches!(map.content, Content::Rgb(_)) {
         let (first, last) = (f64::from(upsample::FIRST_NM), f64::from(upsample::LAST_NM));
         warnings.extend(spectra.uncovered(first, last).map(|gap| {
@@ -88,36 +97,20 @@ fn read_map(item: &Item, spectra: &Spectra) -> Option<(Map, Vec<String>)> {
     Some((map, warnings))
 }
 
-/// What is not finite or clearly negative is an error; what is negative by at most 1 % of the peak, as filters and lossy
-/// compression leave it, becomes 0, which is said.
+/// What is not finite or clearly negative is an error; what is negative by no more than noise becomes 0, which is said.
 fn mend(map: &mut Map) -> Result<Option<String>, String> {
-    const TOLERATED: f32 = 0.01;
     let per_texel = map.per_texel();
     let width = map.size[0] as usize;
-    let place = |i: usize| {
-        let texel = i / per_texel;
-        format!("column {}, row {}", texel % width, texel / width)
-    };
     let values = map.values_mut();
-    if let Some(i) = values.iter().position(|v| !v.is_finite()) {
-        return Err(format!("holds {} at {}, where radiance must be finite", values[i], place(i)));
+    match noise::clip(values, Range::NotNegative, |v| v as f32) {
+        Ok(clipped) => Ok(clipped.map(|clipped| format!("holds {}", clipped.words(Range::NotNegative)))),
+        Err(i) => {
+            let (value, texel) = (values[i], i / per_texel);
+            let must = if value.is_finite() { "0 or greater" } else { "finite" };
+            let (column, row) = (texel % width, texel / width);
+            Err(format!("holds {value} at column {column}, row {row}, where radiance must be {must}"))
+        }
     }
-    let peak = values.iter().copied().fold(0.0, f32::max);
-    let Some((i, lowest)) = values.iter().copied().enumerate().min_by(|a, b| a.1.total_cmp(&b.1)) else {
-        return Ok(None);
-    };
-    if lowest >= 0.0 {
-        return Ok(None);
-    }
-    if lowest < -TOLERATED * peak {
-        return Err(format!("holds {lowest} at {}, where radiance must be 0 or greater", place(i)));
-    }
-    let mut count = 0;
-    for value in values.iter_mut().filter(|v| **v < 0.0) {
-        *value = 0.0;
-        count += 1;
-    }
-    Ok(Some(format!("holds {count} negative values, the lowest {lowest}, within 1 % of its peak: they are taken as 0")))
 }
 
 fn texels(map: Map, spectra: &mut Spectra, name: &str) -> Texels {

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::camera;
 use super::channels;
 use super::context::{Context, position};
+use super::coverage;
 use super::decode::{Fields, Item};
 use super::digest::digest;
 use super::environment;
@@ -74,6 +75,8 @@ pub fn parse(text: &str, file: &Path, overrides: &[(String, String)]) -> Result<
     let mut scene = scene.ok_or_else(|| Error::Internal("a scene was refused without saying why".to_owned()))?;
     scene.file = std::path::absolute(file).unwrap_or_else(|_| file.to_owned());
     scene.warnings = warnings;
+    let coverage = coverage::warnings(&scene);
+    scene.warnings.extend(coverage);
     scene.digest = digest(&scene);
     Ok(scene)
 }

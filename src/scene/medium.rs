@@ -10,6 +10,8 @@ use super::material::kelvin;
 use super::spectrum::{Handle, Quantity, Spectra, report_in_file};
 use super::tree::Value;
 use super::{Absorber, Field, Grid, Medium, MediumId};
+use crate::format::noise::{self, Range};
+use crate::format::unit::Measure;
 use crate::format::volume::{self, Volume};
 
 /// Strength, and columns of a temperature and a spectrum each.
@@ -88,8 +90,8 @@ fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>, grids: &mut Grids) -> 
     let later = |key: &&str| fields.has(key);
     let refused = keys::MEDIUM.later.iter().any(later);
     let given = fields.exactly_one("absorption");
-    let temperature = field(&fields, "temperature", grids, kelvin, |kelvin| kelvin >= 0.0, "temperatures in K");
-    let density = field(&fields, "density", grids, Item::not_negative, |d| d >= 0.0, "densities");
+    let temperature = field(&fields, "temperature", grids, kelvin, Describes::Temperature);
+    let density = field(&fields, "density", grids, Item::not_negative, Describes::Density);
     let pressure = match fields.get("pressure") {
         Some(item) if fields.has("absorption") => {
             item.error_help("goes with `species` only", "remove it; `density` scales an absorption");
@@ -191,51 +193,121 @@ fn species<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Vec<Term>> 
     all
 }
 
+/// What a grid describes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+enum Describes {
+    /// K.
+    Temperature,
+    /// Relative.
+    Density,
+}
+
 /// A number, or `{ grid = "t.zarr" }`; the inner `None` where the key is absent.
 fn field<'a>(
     fields: &Fields<'a>,
     key: &str,
     grids: &mut Grids,
     number: impl Fn(&Item<'a>) -> Option<f64>,
-    allowed: impl Fn(f32) -> bool,
-    what: &str,
+    describes: Describes,
 ) -> Option<Option<Field>> {
     let Some(item) = fields.get(key) else { return Some(None) };
     if !matches!(item.node.value, Value::Table(_)) {
         return number(&item).map(|value| Some(Field::Constant(value)));
     }
     let grid = item.table(&keys::GRID)?.require("grid", "grid = \"t.zarr\"")?;
-    let values = grids.read(&grid)?;
-    if let Some(wrong) = values.values.iter().position(|value| !(value.is_finite() && allowed(*value))) {
-        let [nx, ny, _] = values.size.map(|n| n as usize);
-        let [z, y, x] = [wrong / (nx * ny), wrong / nx % ny, wrong % nx];
-        grid.error_help(
-            format!("must hold {what}, not negative, but is {} at [{z}, {y}, {x}]", values.values[wrong]),
-            "correct the array",
-        );
-        return None;
-    }
-    Some(Some(Field::Grid(values)))
+    Some(Some(Field::Grid(grids.read(&grid, describes)?)))
 }
 
-/// Grids by their path: each is read once.
+/// Grids by their path and what they describe: each is read once.
 #[derive(Default)]
-struct Grids(HashMap<PathBuf, Option<Arc<Grid>>>);
+struct Grids(HashMap<(PathBuf, Describes), Option<Arc<Grid>>>);
 
 impl Grids {
-    fn read(&mut self, item: &Item) -> Option<Arc<Grid>> {
-        let path = item.cx.path(item.text()?);
-        if let Some(known) = self.0.get(&path) {
+    fn read(&mut self, item: &Item, describes: Describes) -> Option<Arc<Grid>> {
+        let key = (item.cx.path(item.text()?), describes);
+        if let Some(known) = self.0.get(&key) {
             return known.clone();
         }
-        let grid = match volume::read(&path) {
-            Ok(Volume { size, values }) => Some(Arc::new(Grid { size, values })),
+        let grid = match volume::read(&key.0) {
+            Ok(volume) => checked(item, volume, describes).map(Arc::new),
             Err(problem) => {
                 report_in_file(item, *problem);
                 None
             }
         };
-        self.0.insert(path, grid.clone());
+        self.0.insert(key, grid.clone());
         grid
     }
+}
+
+/// A volume in Spectile's units, without noise; what is missing or impossible is an error.
+fn checked(item: &Item, volume: Volume, describes: Describes) -> Option<Grid> {
+    let Volume { size, mut values, unit } = volume;
+    let name = item.text()?;
+    let place = |i: usize| {
+        let [nx, ny, _] = size.map(|n| n as usize);
+        format!("[{}, {}, {}]", i / (nx * ny), i / nx % ny, i % nx)
+    };
+    if let Some((text, measure)) = unit {
+        convert(item, name, &mut values, describes, &text, measure)?;
+    }
+    if let Some(i) = values.iter().position(|value| value.is_nan()) {
+        item.error_help(format!("{name} has no value at {}", place(i)), "fill the gaps");
+        return None;
+    }
+    match noise::clip(&mut values, Range::NotNegative, |v| v as f32) {
+        Ok(None) => {}
+        Ok(Some(clipped)) => item.cx.warn(format!("{name} holds {}", clipped.words(Range::NotNegative))),
+        Err(i) => {
+            let what = if describes == Describes::Temperature { "temperatures in K" } else { "densities" };
+            item.error_help(
+                format!("must hold {what}, not negative, but is {} at {}", values[i], place(i)),
+                "correct the array",
+            );
+            return None;
+        }
+    }
+    Some(Grid { size, values })
+}
+
+/// Brings values into K, or sees that densities are numbers without a unit.
+fn convert(
+    item: &Item,
+    name: &str,
+    values: &mut [f32],
+    describes: Describes,
+    text: &str,
+    measure: Option<Measure>,
+) -> Option<()> {
+    let lower = text.to_lowercase();
+    let celsius = ["celsius", "degc", "deg_c", "\u{b0}c", "c", "degree_celsius", "degrees_celsius", "deg c"];
+    match (describes, measure) {
+        (Describes::Temperature, Some(measure)) if measure.kelvin().is_some() => {
+            let kelvin = measure.kelvin()? as f32;
+            if kelvin != 1.0 {
+                values.iter_mut().for_each(|value| *value *= kelvin);
+            }
+        }
+        (Describes::Temperature, _) if celsius.contains(&lower.as_str()) => {
+            values.iter_mut().for_each(|value| *value = (f64::from(*value) + 273.15) as f32);
+            item.cx.warn(format!("{name} is in `{text}`: converted to K"));
+        }
+        (Describes::Density, Some(measure)) if measure.is_number() => {
+            if measure.factor != 1.0 {
+                values.iter_mut().for_each(|value| *value = (f64::from(*value) * measure.factor) as f32);
+            }
+        }
+        (Describes::Temperature, _) => {
+            item.error_help(format!("must be in K, but {name} is in `{text}`"), "convert it, or correct its `units`");
+            return None;
+        }
+        (Describes::Density, _) => {
+            item.error_help(
+                format!("is relative, a number without a unit, but {name} is in `{text}`"),
+                "divide it by the density at which the absorption was measured, and remove its `units`",
+            );
+            return None;
+        }
+    }
+    Some(())
 }

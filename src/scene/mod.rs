@@ -6,6 +6,7 @@ mod camera;
 mod channels;
 mod closed;
 mod context;
+mod coverage;
 mod decode;
 mod digest;
 mod environment;

@@ -375,6 +375,17 @@ fn warn_about(item: &Item, mesh: &Obj) {
     if mesh.without_surface > 0 {
         item.cx.warn(format!("{file}: {} points and lines have no surface and are left out", mesh.without_surface));
     }
+    if let Some((count, line)) = mesh.bent {
+        item.cx.warn(format!(
+            "{file}: {count} faces of more than three corners, the first on line {line}, do not lie in one plane: how they are cut \
+             into triangles is a choice"
+        ));
+    }
+    if let Some((count, line)) = mesh.crossing {
+        item.cx.warn(format!(
+            "{file}: the outlines of {count} faces, the first on line {line}, cross themselves: what they cover is not clear"
+        ));
+    }
 }
 
 /// The last part of the path that `item` spells.

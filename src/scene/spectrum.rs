@@ -10,8 +10,10 @@ use super::texture::is_texture;
 use super::tree::{Origin, Value};
 use super::{Spectrum, SpectrumId};
 use crate::error::Problem;
-use crate::format::refractive::{self, Index};
-use crate::format::text::{self, SpectrumTable, Unit};
+use crate::format::noise::{self, Range};
+use crate::format::refractive;
+use crate::format::text::{self, Column, SpectrumTable};
+use crate::format::unit::{Density, Kind, Meaning, Stated, Unit};
 use crate::spectral::{Channels, Curve, Outside, upsample};
 
 /// Wavelengths, in nm, far beyond any channel, between which a curve's peak is looked for.
@@ -67,6 +69,11 @@ impl Quantity {
         self != Quantity::Reflectance && !self.is_light()
     }
 
+    /// Whether it is n or k.
+    fn is_optical_constant(self) -> bool {
+        matches!(self, Quantity::Index | Quantity::CoatIndex | Quantity::Extinction)
+    }
+
     fn default_outside(self) -> Outside {
         if self.is_light() || self == Quantity::Absorption { Outside::Zero } else { Outside::Hold }
     }
@@ -115,6 +122,27 @@ impl Quantity {
         }
     }
 
+    /// What measured values of it may be but for noise; `None` where there is no bound that noise could cross.
+    fn noise(self) -> Option<Range> {
+        match self {
+            Quantity::Reflectance => Some(Range::Share),
+            Quantity::Extinction => Some(Range::Extinction),
+            Quantity::Index | Quantity::CoatIndex => None,
+            _ => Some(Range::NotNegative),
+        }
+    }
+
+    /// What units of it are.
+    fn kind(self) -> Kind {
+        match self {
+            Quantity::Radiance => Kind::Radiance,
+            Quantity::Intensity => Kind::Intensity,
+            Quantity::Irradiance => Kind::Irradiance,
+            Quantity::Absorption => Kind::Absorption,
+            _ => Kind::Number,
+        }
+    }
+
     /// The values that are allowed.
     pub fn interval(self) -> &'static str {
         match self {
@@ -150,10 +178,30 @@ enum Data {
     Table {
         nm: Vec<f64>,
         value: Vec<f64>,
-        /// The file, and the line of each value in it.
-        lines: Option<(PathBuf, Vec<usize>)>,
+        /// The file that it was read from, if any.
+        file: Option<TableFile>,
     },
     Rgb([f64; 3]),
+}
+
+/// What a file says beside the numbers of a table.
+#[derive(Debug, Clone)]
+struct TableFile {
+    path: PathBuf,
+    /// The line of each value; empty where the file has no lines.
+    lines: Vec<usize>,
+    unit: Option<Stated>,
+    notes: Vec<String>,
+}
+
+/// A table that is checked, and what it is called.
+#[derive(Clone, Copy)]
+struct Tabulated<'s, 'a> {
+    nm: &'s [f64],
+    value: &'s [f64],
+    file: Option<&'s TableFile>,
+    source: &'s Source<'a>,
+    name: &'s str,
 }
 
 /// A checked spectrum; [`Spectra::take`] makes it part of the scene.
@@ -184,6 +232,7 @@ impl<'a> Spectra<'a> {
     /// Decodes `[spectra]`. `channels` decide what a table leaves uncovered.
     pub fn new(cx: &'a Context<'a>, item: Option<Item<'a>>, channels: Option<Channels>) -> Self {
         let items = item.and_then(|item| item.named_items()).unwrap_or_default();
+        let needed = channels.as_ref().and_then(hull);
         let define = |(name, item): (&'a str, Item<'a>)| match item.node.value {
             Value::String(_) => {
                 item.error_help(
@@ -192,7 +241,7 @@ impl<'a> Spectra<'a> {
                 );
                 (name, None)
             }
-            _ => (name, source(&item)),
+            _ => (name, source(&item, needed)),
         };
         let named = items.into_iter().map(define).collect();
         Spectra { cx, named, by_name: HashMap::new(), checked: Vec::new(), scene: Vec::new(), channels }
@@ -201,7 +250,7 @@ impl<'a> Spectra<'a> {
     /// The spectrum that `item` names or spells, checked for what it is to describe.
     pub fn resolve(&mut self, item: &Item<'a>, quantity: Quantity) -> Option<Handle> {
         let Value::String(name) = &item.node.value else {
-            let source = source(item)?;
+            let source = source(item, self.channel_hull())?;
             return self.check(&source, &item.path, item, quantity);
         };
         let Some((_, definition)) = self.named.iter().find(|(known, _)| known == name) else {
@@ -229,18 +278,17 @@ impl<'a> Spectra<'a> {
     /// The complex index of refraction, n and k, in the file that `item` names.
     pub fn complex_index(&mut self, item: &Item<'a>) -> Option<(Handle, Handle)> {
         let path = item.cx.path(item.text()?);
-        let index = refractive::read(&path).map_err(|problem| report_in_file(item, *problem)).ok()?;
-        let missing = |name: &str| {
-            let help = "give both, or write `eta` and `k` instead of `nk`";
-            item.error_help(format!("{} does not give {name}", path.display()), help);
+        let index =
+            refractive::read(&path, self.channel_hull()).map_err(|problem| report_in_file(item, *problem)).ok()?;
+        let given = |name: &str, part: Option<Result<SpectrumTable, Box<Problem>>>| match part {
+            Some(table) => table.map_err(|problem| report_in_file(item, *problem)).ok(),
+            None => {
+                let help = "give both, or write `eta` and `k` instead of `nk`";
+                item.error_help(format!("{} does not give {name}", path.display()), help);
+                None
+            }
         };
-        let Index { n, k } = index;
-        if n.is_none() {
-            missing("n");
-        }
-        if k.is_none() {
-            missing("k");
-        }
+        let (n, k) = (given("n", index.n), given("k", index.k));
         let mut part = |name: &str, table: SpectrumTable, quantity: Quantity| {
             let data = table_data(table, path.clone());
             let source = Source { data, scale: 1.0, outside: None, path: item.path.clone(), at: item.at };
@@ -345,19 +393,14 @@ impl<'a> Spectra<'a> {
             self.cx.error(source.at, &source.path, message, Some(help.to_owned()));
             return None;
         }
-        let scaled = |value: f64| {
-            let text =
-                if source.scale == 1.0 { value.to_string() } else { format!("{value} x scale {}", source.scale) };
-            (value * source.scale, text)
-        };
         let curve = match &source.data {
             Data::Constant(value) => {
-                let (value, text) = scaled(*value);
-                if !quantity.allows(value) {
-                    refuse(text);
+                let scaled = value * source.scale;
+                if !quantity.allows(scaled) {
+                    refuse(scaled_words(*value, source.scale));
                     return None;
                 }
-                Curve::Constant(value)
+                Curve::Constant(scaled)
             }
             Data::Blackbody(_) if is_index => {
                 refuse("a black body".to_owned());
@@ -376,35 +419,9 @@ impl<'a> Spectra<'a> {
                 }
                 curve
             }
-            Data::Table { nm, value, lines } => {
-                if let Some(i) = value.iter().position(|v| !quantity.allows(scaled(*v).0)) {
-                    let text = format!("{} at {} nm", scaled(value[i]).1, nm[i]);
-                    match lines {
-                        None => refuse(text),
-                        Some((file, lines)) => self.cx.push(Problem {
-                            file: file.clone(),
-                            line: Some(lines[i]),
-                            key: Some(user.path.clone()),
-                            message: format!("{}, but is {text}", quantity.range()),
-                            ..Problem::default()
-                        }),
-                    }
-                    return None;
-                }
-                let outside = source.outside.unwrap_or(quantity.default_outside());
-                let instead = match (outside, quantity) {
-                    (Outside::Hold, _) => Some("its end values are held there"),
-                    (Outside::Zero, Quantity::Absorption) => Some("nothing is absorbed there"),
-                    (Outside::Zero, _) => None,
-                };
-                if let (Some(instead), None) = (instead, source.outside) {
-                    warnings.extend(self.uncovered(nm[0], nm[nm.len() - 1]).map(|gap| {
-                        let noun = quantity.noun();
-                        format!("spectrum `{name}` ({noun}) does not cover {gap}: {instead}")
-                    }));
-                }
-                let value = value.iter().map(|v| v * source.scale).collect();
-                Curve::Linear { nm: nm.clone(), value, outside }
+            Data::Table { nm, value, file } => {
+                let table = Tabulated { nm, value, file: file.as_ref(), source, name };
+                self.tabulated(&table, user, quantity, &refuse, &mut warnings)?
             }
             Data::Rgb(rgb) => {
                 let colour = rgb.map(|v| v * source.scale);
@@ -422,6 +439,144 @@ impl<'a> Spectra<'a> {
         };
         self.checked.push(Checked { name: name.to_owned(), curve, warnings, taken: None });
         Some(self.checked.len() - 1)
+    }
+
+    /// The curve of a table: in the unit of `quantity`, scaled, without noise.
+    fn tabulated(
+        &self,
+        table: &Tabulated<'_, 'a>,
+        user: &Item<'a>,
+        quantity: Quantity,
+        refuse: &dyn Fn(String),
+        warnings: &mut Vec<String>,
+    ) -> Option<Curve> {
+        let Tabulated { nm, file, source, name, .. } = *table;
+        let mut unscaled = table.value.to_vec();
+        let mut kept = 0..nm.len();
+        if let Some(file) = file {
+            warnings.extend(file.notes.iter().map(|note| format!("{} {note}", file.path.display())));
+            self.convert(table, &mut unscaled, quantity, user, warnings)?;
+            if quantity.is_optical_constant() {
+                kept = self.sound(file, nm, &unscaled, quantity, warnings);
+            }
+        }
+        let nm = &nm[kept.clone()];
+        let mut value: Vec<f64> = unscaled[kept.clone()].iter().map(|v| v * source.scale).collect();
+        let mut wrong = None;
+        if let (Some(file), Some(range)) = (file, quantity.noise()) {
+            match noise::clip(&mut value, range, |v| v) {
+                Ok(None) => {}
+                Ok(Some(clipped)) => warnings.push(format!("{} holds {}", file.path.display(), clipped.words(range))),
+                Err(i) => wrong = Some(i),
+            }
+        }
+        if let Some(i) = wrong.or_else(|| value.iter().position(|v| !quantity.allows(*v))) {
+            let text = format!("{} at {} nm", scaled_words(unscaled[kept.start + i], source.scale), nm[i]);
+            match file.map(|file| (file, file.lines.get(kept.start + i))) {
+                Some((file, Some(line))) => self.cx.push(Problem {
+                    file: file.path.clone(),
+                    line: Some(*line),
+                    key: Some(user.path.clone()),
+                    message: format!("{}, but is {text}", quantity.range()),
+                    ..Problem::default()
+                }),
+                _ => refuse(text),
+            }
+            return None;
+        }
+        let outside = source.outside.unwrap_or(quantity.default_outside());
+        let instead = match (outside, quantity) {
+            (Outside::Hold, _) => Some("its end values are held there"),
+            (Outside::Zero, Quantity::Absorption) => Some("nothing is absorbed there"),
+            (Outside::Zero, _) => None,
+        };
+        if let (Some(instead), None) = (instead, source.outside) {
+            warnings.extend(self.uncovered(nm[0], nm[nm.len() - 1]).map(|gap| {
+                let noun = quantity.noun();
+                format!("spectrum `{name}` ({noun}) does not cover {gap}: {instead}")
+            }));
+        }
+        let mut nm = nm.to_vec();
+        // One row that is left, and held, is a step of no height: a curve has two nodes at least.
+        if let ([only_nm], [only]) = (&nm[..], &value[..]) {
+            (nm, value) = (vec![*only_nm; 2], vec![*only; 2]);
+        }
+        Some(Curve::Linear { nm, value, outside })
+    }
+
+    /// The rows of n or k that are kept: all, or those that channels see where others are impossible, as beyond the ends of what
+    /// a formula or a fit was made for.
+    fn sound(
+        &self,
+        file: &TableFile,
+        nm: &[f64],
+        value: &[f64],
+        quantity: Quantity,
+        warnings: &mut Vec<String>,
+    ) -> std::ops::Range<usize> {
+        let seen = self.seen(nm);
+        let impossible = |v: &[f64]| v.iter().any(|v| !quantity.allows(*v));
+        if !impossible(&value[..seen.start]) && !impossible(&value[seen.end..]) {
+            return 0..nm.len();
+        }
+        warnings.push(format!(
+            "{}: values outside of {} to {} nm, beyond all channels, are left out: some are impossible",
+            file.path.display(),
+            nm[seen.start],
+            nm[seen.end - 1]
+        ));
+        seen
+    }
+
+    /// Brings values into the unit of `quantity`, by what their file says of theirs.
+    fn convert(
+        &self,
+        table: &Tabulated<'_, 'a>,
+        value: &mut [f64],
+        quantity: Quantity,
+        user: &Item<'a>,
+        warnings: &mut Vec<String>,
+    ) -> Option<()> {
+        let Some(file) = table.file else { return Some(()) };
+        let Some(Stated { meaning, text, certain }) = &file.unit else { return Some(()) };
+        let path = file.path.display();
+        let taken_as =
+            if quantity.unit().is_empty() { "as they are".to_owned() } else { format!("in {}", quantity.unit()) };
+        let measure = match meaning {
+            Meaning::Unit(measure) => measure,
+            Meaning::Logarithm => {
+                user.error_help(
+                    format!("{path} gives logarithms as its values (`{text}`)"),
+                    "write the values themselves",
+                );
+                return None;
+            }
+            Meaning::Unknown => {
+                warnings.push(format!(
+                    "{path} says `{text}` of its values, which is not understood: they are taken {taken_as}, times `scale`"
+                ));
+                return Some(());
+            }
+        };
+        match measure.to(quantity.kind()) {
+            Some(Density::Plain(1.0)) => {}
+            Some(density) => {
+                value.iter_mut().zip(table.nm).for_each(|(value, nm)| *value = density.apply(*value, *nm));
+            }
+            // A share of anything is what reflectances, tabulated beside other things, are without a unit.
+            None if measure.is_number() => {}
+            None => {
+                let message =
+                    format!("gives its values in the unit of `{text}`, which is not that of {}", quantity.noun());
+                if *certain {
+                    let help = format!("convert them to {}, or correct the header", quantity.unit());
+                    user.error_help(format!("{path} {message}"), help);
+                    return None;
+                }
+                warnings.push(format!("{path} {message}: they are taken {taken_as}"));
+            }
+        }
+        Some(())
     }
 
     /// An upsampled colour means something in the visible only: beyond, its ends are held with a warning, or as the
@@ -442,6 +597,18 @@ impl<'a> Spectra<'a> {
         }
     }
 
+    fn channel_hull(&self) -> Option<[f64; 2]> {
+        self.channels.as_ref().and_then(hull)
+    }
+
+    /// The nodes of a table that the channels see: those between their ends, and one beyond either.
+    fn seen(&self, nm: &[f64]) -> std::ops::Range<usize> {
+        let Some([first, last]) = self.channel_hull() else { return 0..nm.len() };
+        let from = nm.partition_point(|x| *x <= first).saturating_sub(1);
+        let to = (nm.partition_point(|x| *x < last) + 1).min(nm.len());
+        from.min(nm.len() - 1)..to
+    }
+
     /// The parts of the channels below `first` and above `last` nm, in words.
     pub fn uncovered(&self, first: f64, last: f64) -> Option<String> {
         let bounds = &self.channels.as_ref()?.bounds;
@@ -455,8 +622,18 @@ impl<'a> Spectra<'a> {
     }
 }
 
-/// A spectrum written as a number or a table.
-fn source<'a>(item: &Item<'a>) -> Option<Source<'a>> {
+/// A value as it is written, with what it is multiplied by.
+fn scaled_words(value: f64, scale: f64) -> String {
+    if scale == 1.0 { value.to_string() } else { format!("{value} x scale {scale}") }
+}
+
+/// From the shortest to the longest wavelength of all channels, nm.
+fn hull(channels: &Channels) -> Option<[f64; 2]> {
+    channels.bounds.iter().copied().reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
+}
+
+/// A spectrum written as a number or a table. Of an index, what the wavelengths `needed` see has to be sound.
+fn source<'a>(item: &Item<'a>, needed: Option<[f64; 2]>) -> Option<Source<'a>> {
     let Value::Table(_) = &item.node.value else {
         if !matches!(item.node.value, Value::Integer(_) | Value::Float(_)) {
             item.error_help(
@@ -487,7 +664,7 @@ fn source<'a>(item: &Item<'a>) -> Option<Source<'a>> {
     };
     let kind = kind?;
     let data = match kind.path.rsplit('.').next() {
-        Some("file") => file(&kind, fields.get("column"), fields.get("unit")),
+        Some("file") => file(&kind, fields.get("column"), fields.get("unit"), needed),
         Some("constant") => kind.number().map(Data::Constant),
         Some("blackbody") => kind.positive().map(Data::Blackbody),
         Some("samples") => samples(&kind),
@@ -506,15 +683,27 @@ fn source<'a>(item: &Item<'a>) -> Option<Source<'a>> {
     Some(Source { data, scale: scale?, outside, path: kind.path, at: kind.at })
 }
 
-fn file(item: &Item, column: Option<Item>, unit: Option<Item>) -> Option<Data> {
+fn file(item: &Item, column: Option<Item>, unit: Option<Item>, needed: Option<[f64; 2]>) -> Option<Data> {
     let path = item.cx.path(item.text()?);
     let column = match &column {
-        Some(column) => Some(column.text()?),
-        None => None,
+        None => Column::Only,
+        Some(column) if matches!(column.node.value, Value::Integer(_)) => {
+            Column::Number(column.whole(1..=1_000_000)? as usize)
+        }
+        Some(column) => Column::Named(column.text()?),
     };
-    const UNITS: [(&str, Unit); 3] = [("nm", Unit::Nanometre), ("um", Unit::Micrometre), ("cm-1", Unit::Wavenumber)];
     let unit_of_x = match &unit {
-        Some(unit) => Some(unit.choice(&UNITS)?),
+        Some(item) => {
+            let written = item.text()?;
+            let unit = Unit::named(written);
+            if unit.is_none() {
+                item.error_help(
+                    format!("must be a unit of wavelength, wavenumber, frequency or energy, but is \"{written}\""),
+                    "write e.g. nm, um, angstrom, cm-1, THz or eV",
+                );
+            }
+            Some(unit?)
+        }
         None => None,
     };
     if refractive::is_yaml(&path) {
@@ -522,7 +711,7 @@ fn file(item: &Item, column: Option<Item>, unit: Option<Item>) -> Option<Data> {
             unit.error_help("goes with tables only", "remove it: these files are in um");
             return None;
         }
-        return index_file(item, path, column);
+        return index_file(item, path, column, needed);
     }
     match text::read_spectrum(&path, column, unit_of_x) {
         Ok(table) => Some(table_data(table, path)),
@@ -534,20 +723,29 @@ fn file(item: &Item, column: Option<Item>, unit: Option<Item>) -> Option<Data> {
 }
 
 /// `n` (the default) or `k` of a refractiveindex.info file.
-fn index_file(item: &Item, path: PathBuf, column: Option<&str>) -> Option<Data> {
-    let Index { n, k } = refractive::read(&path).map_err(|problem| report_in_file(item, *problem)).ok()?;
-    let (name, table) = match column {
-        None | Some("n") => ("n", n),
-        Some("k") => ("k", k),
-        Some(other) => {
-            item.error_help(format!("{} has no column \"{other}\"", path.display()), "its columns are n and k");
+fn index_file(item: &Item, path: PathBuf, column: Column, needed: Option<[f64; 2]>) -> Option<Data> {
+    let name = match column {
+        Column::Only | Column::Named("n") | Column::Number(2) => "n",
+        Column::Named("k") | Column::Number(3) => "k",
+        Column::Named(_) | Column::Number(_) => {
+            let other = match column {
+                Column::Named(name) => format!("\"{name}\""),
+                Column::Number(number) => number.to_string(),
+                Column::Only => String::new(),
+            };
+            item.error_help(format!("{} has no column {other}", path.display()), "its columns are n and k");
             return None;
         }
     };
-    if table.is_none() {
-        item.error(format!("{} does not give {name}", path.display()));
-    }
-    Some(table_data(table?, path))
+    let index = refractive::read(&path, needed).map_err(|problem| report_in_file(item, *problem)).ok()?;
+    let table = match if name == "n" { index.n } else { index.k } {
+        Some(table) => table.map_err(|problem| report_in_file(item, *problem)).ok()?,
+        None => {
+            item.error(format!("{} does not give {name}", path.display()));
+            return None;
+        }
+    };
+    Some(table_data(table, path))
 }
 
 /// The temperature that names a column: `300`, `300K`, or with words before it as in `kappa_300K`.
@@ -557,9 +755,9 @@ fn column_kelvin(name: &str) -> Option<f64> {
     number.get(start..)?.parse().ok().filter(|kelvin: &f64| kelvin.is_finite() && *kelvin > 0.0)
 }
 
-fn table_data(table: SpectrumTable, file: PathBuf) -> Data {
-    let lines = (!table.line.is_empty()).then_some((file, table.line));
-    Data::Table { nm: table.nm, value: table.value, lines }
+fn table_data(table: SpectrumTable, path: PathBuf) -> Data {
+    let SpectrumTable { nm, value, line, unit, notes } = table;
+    Data::Table { nm, value, file: Some(TableFile { path, lines: line, unit, notes }) }
 }
 
 /// A mistake in a file that `item` names: at its line there, or, if the file as a whole is wrong, at the item.
@@ -595,7 +793,7 @@ fn samples(item: &Item) -> Option<Data> {
     }
     let pairs: Vec<[f64; 2]> = pairs.into_iter().collect::<Option<_>>()?;
     let (nm, value) = pairs.into_iter().map(|[nm, value]| (nm, value)).unzip();
-    Some(Data::Table { nm, value, lines: None })
+    Some(Data::Table { nm, value, file: None })
 }
 
 fn regular(item: &Item) -> Option<Data> {
@@ -620,5 +818,5 @@ fn regular(item: &Item) -> Option<Data> {
     let value = values?;
     let last = value.len() - 1;
     let nm = (0..=last).map(|i| if i == last { to } else { from + (to - from) * (i as f64 / last as f64) }).collect();
-    Some(Data::Table { nm, value, lines: None })
+    Some(Data::Table { nm, value, file: None })
 }

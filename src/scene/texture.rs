@@ -10,12 +10,15 @@ use super::keys;
 use super::spectrum::{self, Quantity, Spectra, report_in_file};
 use super::tree::Value;
 use super::{Texture, TextureId, TextureKind};
-use crate::format::image::{self, Format, Image, Plane};
-use crate::spectral::colour::srgb_decode;
+use crate::format::image::{self, Format, Image, Plane, Rgb};
+use crate::format::noise::{self, Range};
+use crate::format::primaries::{self, White};
 use crate::spectral::upsample;
 
 /// Spectra that one texture may mix: each costs a record at every vertex.
 const MAX_ENDMEMBERS: usize = 32;
+/// What the shares of a surface may sum to by noise; they are scaled to 1.
+const MOST_ABUNDANT: f64 = 1.01;
 /// Sums beyond this are more than the last digits of f32.
 const NOTICEABLE: f64 = 1e-6;
 
@@ -157,25 +160,86 @@ fn resolve_endmembers<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<
 /// Linear sRGB in [0, 1], \[y\]\[x\]\[3\].
 fn colours(file: &Item, image: &Image, name: &str, spectra: &Spectra) -> Option<(Vec<f32>, Vec<String>)> {
     let opaque = without_alpha(file, image, name)?;
-    let plane = |wanted: &str| opaque.iter().find(|plane| plane.name == wanted);
-    let rgb = match (opaque.len(), plane("Y"), plane("R"), plane("G"), plane("B")) {
-        (1, Some(grey), ..) => [*grey; 3],
-        (3, _, Some(r), Some(g), Some(b)) => [*r, *g, *b],
-        _ => {
+    let help = "for a mixture of spectra give their names: endmembers = [\"soil\", …]";
+    let rgb = match Rgb::of(&opaque) {
+        Ok(Some(rgb)) => rgb,
+        Ok(None) => {
             let message = format!("{name} has {}, but a colour needs R, G and B, or Y", channels(&image.planes));
-            file.error_help(message, "for a mixture of spectra give their names: endmembers = [\"soil\", …]");
+            file.error_help(message, help);
+            return None;
+        }
+        Err(message) => {
+            file.error_help(format!("{name} {message}"), "save one layer, with channels R, G, B");
             return None;
         }
     };
-    for plane in rgb {
-        check_range(file, image, name, plane, |v| (0.0..=1.0).contains(&v), "a reflectance must lie in [0, 1]")?;
+    if let Some(foreign) = &image.colours.foreign {
+        file.error_help(format!("{name}: its colours are those of {foreign}"), "convert it to sRGB");
+        return None;
     }
-    let linear = |v: f32| if image.format == Format::Png { srgb_decode(v.into()) as f32 } else { v };
-    let texels = (0..rgb[0].samples.len()).flat_map(|i| rgb.map(|plane| linear(plane.samples[i]))).collect();
+    let mut warnings = Vec::new();
+    let mut planes = Vec::new();
+    for plane in rgb.planes() {
+        let samples = shares(file, image, name, plane, "a reflectance must lie in [0, 1]", &mut warnings)?;
+        planes.push(samples.iter().map(|v| image.colours.transfer.decode(*v)).collect::<Vec<f32>>());
+    }
+    let mut texels: Vec<f32> = (0..planes[0].len()).flat_map(|i| [0, 1, 2].map(|c| planes[c][i])).collect();
+    if let (Some(from), Rgb::Colour(_)) = (image.colours.primaries, rgb) {
+        let Some(matrix) = from.to_srgb(White::Adapted) else {
+            file.error(format!("{name} has primaries {:?} that span no colours", from.0));
+            return None;
+        };
+        for texel in texels.as_chunks_mut::<3>().0 {
+            *texel = primaries::apply(&matrix, texel.map(f64::from)).map(|v| v as f32);
+        }
+        warnings.push(format!("texture {name} has primaries other than sRGB's: its colours are converted"));
+        match noise::clip(&mut texels, Range::Share, |v| v as f32) {
+            Ok(Some(clipped)) => {
+                warnings.push(format!("texture {name}, converted, holds {}", clipped.words(Range::Share)))
+            }
+            Ok(None) => {}
+            Err(i) => {
+                let message = format!(
+                    "{name} has primaries other than sRGB's, and a colour outside of sRGB {}",
+                    place(image, i / 3)
+                );
+                file.error_help(message, "convert it to sRGB and choose there what becomes of such colours");
+                return None;
+            }
+        }
+    }
     let gap = spectra.uncovered(f64::from(upsample::FIRST_NM), f64::from(upsample::LAST_NM));
     let held =
         |gap| format!("texture {name} (rgb) says nothing about {gap}, outside the visible: its spectra are held there");
-    Some((texels, gap.map(held).into_iter().collect()))
+    warnings.extend(gap.map(held));
+    Some((texels, warnings))
+}
+
+/// The numbers of a channel in [0, 1], without noise; `range` says so in words.
+fn shares(
+    file: &Item,
+    image: &Image,
+    name: &str,
+    plane: &Plane,
+    range: &str,
+    warnings: &mut Vec<String>,
+) -> Option<Vec<f32>> {
+    let mut samples = plane.samples.clone();
+    match noise::clip(&mut samples, Range::Share, |v| v as f32) {
+        Ok(clipped) => {
+            let words = |clipped: noise::Clipped| {
+                format!("texture {name}, channel {}, holds {}", plane.name, clipped.words(Range::Share))
+            };
+            let warning = clipped.map(words);
+            warnings.extend(warning.filter(|warning| !warnings.contains(warning)));
+            Some(samples)
+        }
+        Err(i) => {
+            let (channel, value) = (&plane.name, plane.samples[i]);
+            file.error(format!("{name}: {range}, but channel {channel} is {value} {}", place(image, i)));
+            None
+        }
+    }
 }
 
 /// Shares of `count` spectra, \[y\]\[x\]\[count\]; they sum to 1 at most.
@@ -191,13 +255,16 @@ fn abundances(
         endmembers.error_help(message, "name one for each channel, in this order");
         return None;
     }
-    for plane in &image.planes {
-        check_range(file, image, name, plane, |v| (0.0..=1.0).contains(&v), "an abundance must lie in [0, 1]")?;
+    let mut warnings = Vec::new();
+    let order = pair(endmembers, image, name, &mut warnings)?;
+    let mut planes = Vec::with_capacity(count);
+    for plane in order.iter().map(|&i| &image.planes[i]) {
+        planes.push(shares(file, image, name, plane, "an abundance must lie in [0, 1]", &mut warnings)?);
     }
-    let allowed = 1.0 + image.planes.iter().map(|plane| f64::from(plane.rounding)).sum::<f64>();
-    let (mut texels, mut rounded, mut most) = (Vec::with_capacity(image.planes[0].samples.len() * count), 0usize, 1.0);
-    for i in 0..image.planes[0].samples.len() {
-        let sum: f64 = image.planes.iter().map(|plane| f64::from(plane.samples[i])).sum();
+    let allowed = MOST_ABUNDANT + image.planes.iter().map(|plane| f64::from(plane.rounding)).sum::<f64>();
+    let (mut texels, mut rounded, mut most) = (Vec::with_capacity(planes[0].len() * count), 0usize, 1.0);
+    for i in 0..planes[0].len() {
+        let sum: f64 = planes.iter().map(|plane| f64::from(plane[i])).sum();
         if sum > allowed {
             let message = format!("{name}: the abundances {} sum to {sum}, more than 1", place(image, i));
             file.error_help(message, "scale them: a surface cannot consist of more than itself");
@@ -207,13 +274,68 @@ fn abundances(
             rounded += 1;
         }
         most = sum.max(most);
-        texels.extend(image.planes.iter().map(|plane| (f64::from(plane.samples[i]) / sum.max(1.0)) as f32));
+        texels.extend(planes.iter().map(|plane| (f64::from(plane[i]) / sum.max(1.0)) as f32));
     }
     let warning = format!(
-        "texture {name}: the abundances of {rounded} texels sum to more than 1, up to {most:.6}, by rounding; they are \
-         scaled to 1"
+        "texture {name}: the abundances of {rounded} texels sum to more than 1, up to {most:.6}, by rounding or noise; \
+         they are scaled to 1"
     );
-    Some((texels, if rounded > 0 { vec![warning] } else { Vec::new() }))
+    warnings.extend((rounded > 0).then_some(warning));
+    Some((texels, warnings))
+}
+
+/// The channel of each endmember: by name where all names match, whatever their case and the layers before them; in the order of
+/// the header where none does, which is said of an EXR, whose header sorts by name.
+fn pair(endmembers: &Item, image: &Image, name: &str, warnings: &mut Vec<String>) -> Option<Vec<usize>> {
+    let items = endmembers.array()?;
+    let names: Vec<Option<&str>> = items
+        .iter()
+        .map(|item| match &item.node.value {
+            Value::String(name) => Some(name.as_str()),
+            _ => None,
+        })
+        .collect();
+    let same = |a: &str, b: &str| a.to_lowercase() == b.to_lowercase();
+    let channels_of = |wanted: &str| -> Vec<usize> {
+        let by =
+            |named: &dyn Fn(&Plane) -> bool| (0..image.planes.len()).filter(|i| named(&image.planes[*i])).collect();
+        let whole: Vec<usize> = by(&|plane| same(&plane.name, wanted));
+        if whole.is_empty() { by(&|plane| same(plane.parts().1, wanted)) } else { whole }
+    };
+    let found: Vec<Vec<usize>> = names.iter().map(|name| name.map_or_else(Vec::new, channels_of)).collect();
+    let distinct: std::collections::BTreeSet<usize> = found.iter().flatten().copied().collect();
+    if found.iter().all(|channels| channels.len() == 1) && distinct.len() == found.len() {
+        return Some(found.concat());
+    }
+    let written = || list(items.iter().map(written));
+    if found.iter().any(|channels| !channels.is_empty()) {
+        let message = format!(
+            "only some of the endmembers {} are names of channels of {name}, which has {}",
+            written(),
+            channels(&image.planes)
+        );
+        endmembers.error_help(message, "name the spectra as the channels, each once, or none of them");
+        return None;
+    }
+    if image.format == Format::Exr && image.planes.len() > 1 {
+        let planes = list(image.planes.iter().map(|plane| plane.name.as_str()));
+        warnings.push(format!(
+            "texture {name}: none of its channels is named as an endmember, so they are paired in order: {planes} are the \
+             shares of {}",
+            written()
+        ));
+    }
+    Some((0..image.planes.len()).collect())
+}
+
+/// An endmember as the scene has it: its name, or its number.
+fn written(item: &Item) -> String {
+    match &item.node.value {
+        Value::String(name) => name.clone(),
+        Value::Float(number) => number.to_string(),
+        Value::Integer(number) => number.to_string(),
+        other => other.kind().to_owned(),
+    }
 }
 
 /// \[y\]\[x\].
@@ -223,53 +345,46 @@ fn numbers(file: &Item, number: Number, image: &Image, name: &str) -> Option<(Ve
         return None;
     }
     let opaque = without_alpha(file, image, name)?;
-    // Greys are often stored as colours.
-    let grey = opaque.iter().all(|plane| ["R", "G", "B"].contains(&plane.name.as_str()));
-    let same = opaque.windows(2).all(|pair| pair[0].samples == pair[1].samples);
-    let plane = match opaque[..] {
-        [plane] => plane,
-        [plane, ..] if grey && same => plane,
+    let plane = match (&opaque[..], Rgb::of(&opaque)) {
+        ([plane], _) => *plane,
+        // Greys are often stored as colours.
+        (_, Ok(Some(Rgb::Colour([r, g, b])))) if r.samples == g.samples && g.samples == b.samples => r,
         _ => {
             let message = format!("{name} has {}, but one channel is needed", channels(&image.planes));
             file.error_help(message, "save it as a grey picture");
             return None;
         }
     };
-    match number {
-        Number::Weight => {
-            check_range(file, image, name, plane, |v| (0.0..=1.0).contains(&v), "a weight must lie in [0, 1]")?;
-        }
+    let mut warnings = Vec::new();
+    let samples = match number {
+        Number::Weight => shares(file, image, name, plane, "a weight must lie in [0, 1]", &mut warnings)?,
         Number::Temperature => {
-            let range = "a temperature must lie in [0, 1e9] K";
-            check_range(file, image, name, plane, |v| (0.0..=1e9).contains(&v), range)?;
+            let mut samples = plane.samples.clone();
+            if let Ok(Some(clipped)) = noise::clip(&mut samples, Range::NotNegative, |v| v as f32) {
+                warnings.push(format!("texture {name} holds {}", clipped.words(Range::NotNegative)));
+            }
+            if let Some(i) = samples.iter().position(|v| !(0.0..=1e9).contains(v)) {
+                let (channel, value) = (&plane.name, samples[i]);
+                let range = "a temperature must lie in [0, 1e9] K";
+                file.error(format!("{name}: {range}, but channel {channel} is {value} {}", place(image, i)));
+                return None;
+            }
+            samples
         }
-    }
-    Some((plane.samples.clone(), Vec::new()))
+    };
+    Some((samples, warnings))
 }
 
 /// The channels but an A that is 1 everywhere.
 fn without_alpha<'i>(file: &Item, image: &'i Image, name: &str) -> Option<Vec<&'i Plane>> {
-    let (alpha, others): (Vec<_>, Vec<_>) = image.planes.iter().partition(|plane| plane.name == "A");
-    let see_through = alpha.first().and_then(|plane| plane.samples.iter().position(|a| *a != 1.0));
+    let (alpha, others): (Vec<_>, Vec<_>) = image.planes.iter().partition(|plane| image.is_alpha(plane));
+    let see_through = alpha.iter().find_map(|plane| plane.samples.iter().position(|a| *a != 1.0));
     if let (Some(i), false) = (see_through, others.is_empty()) {
         let message = format!("{name} is transparent {}, which a texture cannot be", place(image, i));
         file.error_help(message, "save it without its alpha channel, or `blend` two materials");
         return None;
     }
     Some(if others.is_empty() { alpha } else { others })
-}
-
-fn check_range(
-    file: &Item,
-    image: &Image,
-    name: &str,
-    plane: &Plane,
-    allowed: impl Fn(f32) -> bool,
-    range: &str,
-) -> Option<()> {
-    let Some(i) = plane.samples.iter().position(|v| !allowed(*v)) else { return Some(()) };
-    file.error(format!("{name}: {range}, but channel {} is {} {}", plane.name, plane.samples[i], place(image, i)));
-    None
 }
 
 fn place(image: &Image, i: usize) -> String {

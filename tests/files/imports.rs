@@ -6,7 +6,8 @@ use std::path::Path;
 
 use proptest::prelude::*;
 use serde_json::Value;
-use spectile::format::text::{SpectrumTable, Unit, read_spectrum};
+use spectile::format::text::{SpectrumTable, read_spectrum};
+use spectile::format::unit::Unit;
 use spectile::format::{envi, library, modtran, response, text};
 use spectile::spectral::Curve;
 use spectile::{Error, scene};
@@ -51,7 +52,7 @@ fn files() -> tempfile::TempDir {
 }
 
 fn read(folder: &Path, name: &str, column: Option<&str>, unit: Option<Unit>) -> SpectrumTable {
-    read_spectrum(&folder.join(name), column, unit).unwrap_or_else(|problem| panic!("{problem}"))
+    read_spectrum(&folder.join(name), column.into(), unit).unwrap_or_else(|problem| panic!("{problem}"))
 }
 
 #[test]
@@ -64,7 +65,7 @@ fn every_kind_of_file_is_told_apart() {
     for name in ["um.csv", "cm.csv"] {
         assert_eq!(read(name, None, None), (vec![400.0, 500.0], vec![0.5, 0.75]), "{name}");
     }
-    assert_eq!(read("bare.csv", None, Some(Unit::Micrometre)).0, [400.0, 500.0]);
+    assert_eq!(read("bare.csv", None, Some(Unit::MICROMETRE)).0, [400.0, 500.0]);
     assert_eq!(read("lamp.spd", None, None), (vec![400.0, 500.0], vec![1.0, 2.0]));
     assert_eq!(read("concrete.spectrum.txt", None, None).0, [420.0, 900.0, 2500.0, 14_011.2]);
     assert_eq!(read("splib07a_Quartz_GDS31_ASDFRa_AREF.txt", None, None).0, [350.0, 352.0, 353.0]);
@@ -182,12 +183,12 @@ fn survives(bytes: &[u8]) {
     words(library::parse_ecostress(bytes, Path::new("a.txt")).map(|_| ()));
     words(library::read_usgs(bytes, Path::new("/no such folder/a.txt")).map(|_| ()));
     for column in [None, Some("TOTAL RAD"), Some("x")] {
-        words(modtran::parse(bytes, Path::new("tape7"), column).map(|_| ()));
+        words(modtran::parse(bytes, Path::new("tape7"), column.into()).map(|_| ()));
     }
     words(response::parse_responses(bytes, Path::new("a.csv")).map(|_| ()));
     if let Ok(header) = envi::parse(bytes, Path::new("a.hdr")) {
         for name in [None, Some("first")] {
-            let library = library::parse_envi(&header, Path::new("a.hdr"), bytes, Path::new("a.sli"), name);
+            let library = library::parse_envi(&header, Path::new("a.hdr"), bytes, Path::new("a.sli"), name.into());
             words(library.map(|_| ()));
         }
     }

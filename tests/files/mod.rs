@@ -5,5 +5,7 @@ mod export;
 mod imports;
 mod outputs;
 mod python;
+mod refractive;
 mod sensor;
+mod spoilt;
 mod store;

@@ -47,8 +47,8 @@ fn every_sensor_of_the_data_pack_works_as_it_is() {
     let thermal = Channels::equal(2400.0, 15_100.0, 1270);
     for (file, channels, bands, warned) in [
         ("rsr_sentinel2a_msi.csv", &reflective, 13, ""),
-        ("rsr_landsat8_oli_tirs.csv", &reflective, 9, "slightly negative"),
-        ("rsr_landsat8_oli_tirs.csv", &thermal, 2, "slightly negative"),
+        ("rsr_landsat8_oli_tirs.csv", &reflective, 9, "negative values"),
+        ("rsr_landsat8_oli_tirs.csv", &thermal, 2, "negative values"),
         ("rsr_terra_aster.csv", &reflective, 10, ""),
         ("rsr_terra_modis_1-16.csv", &reflective, 16, ""),
         ("camera_nikon_5100_npl.csv", &reflective, 3, ""),

@@ -2,6 +2,7 @@
 
 mod architecture;
 mod bench;
+mod cases;
 mod cli;
 mod converge;
 mod documents;

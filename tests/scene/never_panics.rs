@@ -73,8 +73,8 @@ proptest! {
         let table = format!("DATA:\n  - type: {kind}\n    data: |\n{}", rows.replace('\n', "\n      "));
         for content in [bytes.as_slice(), rows.as_bytes(), formula.as_bytes(), table.as_bytes()] {
             for name in ["t.csv", "t.yml"] {
-                if let Ok(index) = spectile::format::refractive::parse(content, Path::new(name)) {
-                    for table in [index.n, index.k].into_iter().flatten() {
+                if let Ok(index) = spectile::format::refractive::parse(content, Path::new(name), None) {
+                    for table in [index.n, index.k].into_iter().flatten().flatten() {
                         prop_assert!(table.nm.is_sorted() && table.nm.len() == table.value.len() && table.nm.len() >= 2);
                         prop_assert!(table.value.iter().all(|v| v.is_finite()) && table.line.len() == table.nm.len());
                     }

@@ -100,7 +100,9 @@ fn rounding_is_forgiven_and_files_are_shared() {
     let files = [("m.exr", exr((1, 1), &planes)), ("mask.png", png([1, 1], png::ColorType::Grayscale, &[51]))];
     let text = with_reflectance("{ texture = \"m.exr\", endmembers = [0.1, 0.2, 0.3] }");
     let scene = load(&text, &files).unwrap();
-    assert!(scene.warnings.len() == 1 && scene.warnings[0].contains("scaled to 1"), "{:?}", scene.warnings);
+    let [order, rounded] = &scene.warnings[..] else { panic!("{:?}", scene.warnings) };
+    assert!(order.contains("paired in order: a, b, c are the shares of 0.1, 0.2, 0.3"), "{order}");
+    assert!(rounded.contains("scaled to 1"), "{rounded}");
     assert!((scene.textures[0].texels.iter().sum::<f32>() - 1.0).abs() < 1e-6);
 
     let mixed = format!(
@@ -131,7 +133,7 @@ fn wrong_textures() {
         ("bright.exr", float_exr((2, 2), &[("R", &[0.0; 4]), ("G", &[0.0, 0.0, 1.5, 0.0]), ("B", &[0.0; 4])])),
         ("nan.exr", float_exr((1, 2), &[("Y", &[0.5, f32::NAN])])),
         ("two.exr", float_exr((1, 1), &[("a", &[0.75]), ("b", &[0.75])])),
-        ("negative.exr", float_exr((1, 1), &[("a", &[-1e-3]), ("b", &[0.5])])),
+        ("negative.exr", float_exr((1, 1), &[("a", &[-0.02]), ("b", &[0.5])])),
     ];
     const KEY: &str = "materials.white.diffuse.reflectance";
     for (reflectance, key, words) in [
@@ -152,7 +154,7 @@ fn wrong_textures() {
         ("{ texture = \"two.exr\", endmembers = [] }", ".endmembers", &["1 to 32"]),
         ("{ texture = \"two.exr\", endmembers = [0.1, 1.2] }", ".endmembers.1", &["[0, 1]", "1.2"]),
         ("{ texture = \"two.exr\", endmembers = [0.1, \"gravel\"] }", ".endmembers.1", &["no spectrum is named"]),
-        ("{ texture = \"negative.exr\", endmembers = [0.1, 0.2] }", ".texture", &["[0, 1]", "channel a is -0.001"]),
+        ("{ texture = \"negative.exr\", endmembers = [0.1, 0.2] }", ".texture", &["[0, 1]", "channel a is -0.02"]),
         ("{ endmembers = [0.1] }", ".texture", &["missing"]),
         ("{ texture = \"grey.png\", scale = 2 }", ".scale", &["unknown key"]),
     ] {

@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{Map, checked_size, spectral, whole, with_help};
+use super::{Bands, Map, checked_size, spectral, whole, with_help};
 use crate::error::Problem;
 use crate::format::envi::{header_path, parse};
-use crate::format::text::nanometres;
+use crate::format::unit;
 
 /// The header of the data file at `path`, if it is one of ENVI's.
 pub fn header_of(path: &Path) -> Option<PathBuf> {
@@ -31,24 +31,40 @@ pub fn read(path: &Path, data: Option<&Path>) -> Result<Map, Box<Problem>> {
         })?,
     };
     let size = checked_size(path, header.samples as u64, header.lines as u64)?;
-    let unit = header.get("wavelength units").ok_or_else(|| whole(path, "lacks `wavelength units`".to_owned()))?;
-    if nanometres(unit).is_none() {
-        // Radiance would be per wavenumber too.
-        return Err(header.problem("wavelength units", &format!("must be nm, um, mm or m, but is {unit}")));
-    }
+    let Some(axis) = header.axis else {
+        return Err(whole(path, "lacks `wavelength units`".to_owned()));
+    };
     let nm = header.wavelength_nm.as_ref().ok_or_else(|| whole(path, "lacks `wavelength`".to_owned()))?;
+    let mut warnings: Vec<String> = header.notes.clone();
+    let density = match header.get("data units").map(str::trim).filter(|text| !text.is_empty()) {
+        Some(text) => super::radiance_of(path, text, unit::parse(text), axis, &mut warnings)?,
+        None => super::radiance_unsaid(path, axis)?,
+    };
     let bytes = bytes(&data_path)?;
     let data = header.data(&bytes, &data_path)?;
-    let mut planes = vec![Vec::with_capacity(header.samples * header.lines); header.bands];
-    for (band, plane) in planes.iter_mut().enumerate() {
+    let good: Vec<usize> = (0..header.bands).filter(|band| header.is_good(*band)).collect();
+    if good.is_empty() {
+        return Err(header.problem("bbl", "calls every band bad"));
+    }
+    if good.len() < header.bands {
+        warnings.push(format!(
+            "has {} bands that its `bbl` calls bad: they are left out, and bridged by their neighbours",
+            header.bands - good.len()
+        ));
+    }
+    let mut planes = vec![Vec::with_capacity(header.samples * header.lines); good.len()];
+    for (&band, plane) in good.iter().zip(&mut planes) {
         for (line, sample) in (0..header.lines).flat_map(|line| (0..header.samples).map(move |sample| (line, sample))) {
             let Some(value) = data.value(sample, line, band) else {
                 let message = format!("has no value at column {sample}, row {line} of band {}", band + 1);
                 return Err(with_help(&data_path, message, "fill the gaps: light comes from every direction"));
             };
-            plane.push(value as f32);
+            plane.push(density.apply(value, nm[band]) as f32);
         }
     }
+    let of_good = |all: &Vec<[f64; 2]>| good.iter().map(|band| all[*band]).collect();
+    let bands = Bands { nm: good.iter().map(|band| nm[*band]).collect(), spans: header.spans_nm.as_ref().map(of_good) };
     let planes: Vec<&[f32]> = planes.iter().map(Vec::as_slice).collect();
-    Ok(Map { size, content: spectral(path, nm, &planes)?, warnings: Vec::new() })
+    let content = spectral(path, &bands, &planes, &mut warnings)?;
+    Ok(Map { size, content, warnings })
 }

@@ -6,9 +6,10 @@ use std::path::Path;
 use exr::meta::MetaData;
 use exr::meta::attribute::{AttributeValue, Text};
 
-use super::{Content, Map, checked_size, spectral, with_help};
+use super::{Bands, Content, Map, checked_size, spectral, to_srgb, with_help};
 use crate::error::Problem;
-use crate::format::image;
+use crate::format::image::{self, Plane, Rgb};
+use crate::format::unit::{self, Density, Unit};
 
 /// The file at `path` as spectra where it has emissive spectral channels, else as R, G and B.
 pub fn read_map(path: &Path) -> Result<Map, Box<Problem>> {
@@ -21,20 +22,51 @@ pub fn read_map(path: &Path) -> Result<Map, Box<Problem>> {
     if !bands.is_empty() {
         // The layout's own label; its authors store W m-2 sr-1 nm-1 under it, as everybody does.
         const KNOWN: [&str; 3] = ["W.m^-2.sr^-1", "W.m^-2.sr^-1.nm^-1", "W m^-2 sr^-1 nm^-1"];
+        let mut bands = bands;
+        let mut converted: Vec<Vec<f32>> = Vec::new();
         if let Some(units) = units(path).filter(|units| !KNOWN.contains(&units.as_str())) {
-            warnings.push(format!("gives its unit as \"{units}\": its values are taken as W m-2 sr-1 nm-1"));
+            match super::radiance_of(path, &units, unit::parse(&units), Unit::NANOMETRE, &mut warnings)? {
+                Density::Plain(1.0) => {}
+                density => {
+                    let convert = |(nm, plane): &(f64, &[f32])| {
+                        plane.iter().map(|v| density.apply(f64::from(*v), *nm) as f32).collect::<Vec<f32>>()
+                    };
+                    converted.extend(bands.iter().map(convert));
+                    bands.iter_mut().zip(&converted).for_each(|(band, plane)| band.1 = plane);
+                }
+            }
         }
         let (nm, planes): (Vec<f64>, Vec<&[f32]>) = bands.into_iter().unzip();
-        return Ok(Map { size, content: spectral(path, &nm, &planes)?, warnings });
+        let content = spectral(path, &Bands { nm, spans: None }, &planes, &mut warnings)?;
+        return Ok(Map { size, content, warnings });
     }
-    let plane = |wanted: &str| planes.iter().find(|plane| plane.name == wanted).map(|plane| &plane.samples);
-    let (Some(r), Some(g), Some(b)) = (plane("R"), plane("G"), plane("B")) else {
+    // Whether a picture is transparent matters to nobody who looks at the sky.
+    let planes: Vec<&Plane> =
+        planes.iter().filter(|plane| !matches!(plane.parts().1.to_lowercase().as_str(), "a" | "alpha")).collect();
+    let found =
+        Rgb::of(&planes).map_err(|message| with_help(path, message, "save one layer, with channels R, G, B"))?;
+    let Some(found) = found else {
         let names: Vec<&str> = planes.iter().take(8).map(|plane| plane.name.as_str()).collect();
         let more = if planes.len() > 8 { ", …" } else { "" };
         let message = format!("has the channels {}{more}: neither R, G, B nor spectral radiance", names.join(", "));
         return Err(with_help(path, message, "name channels R, G, B, or by wavelength as in S0.550,0nm"));
     };
-    let rgb = r.iter().zip(g).zip(b).flat_map(|((r, g), b)| [*r, *g, *b]).collect();
+    if let Rgb::Colour(of) = found
+        && planes.len() > 3
+    {
+        warnings.push(format!(
+            "has {} channels, of which {}, {} and {} are used",
+            planes.len(),
+            of[0].name,
+            of[1].name,
+            of[2].name
+        ));
+    }
+    let [r, g, b] = found.planes().map(|plane| &plane.samples);
+    let mut rgb: Vec<f32> = r.iter().zip(g).zip(b).flat_map(|((r, g), b)| [*r, *g, *b]).collect();
+    if let (Some(primaries), Rgb::Colour(_)) = (picture.colours.primaries, found) {
+        to_srgb(path, &mut rgb, size[0], primaries, &mut warnings)?;
+    }
     Ok(Map { size, content: Content::Rgb(rgb), warnings })
 }
 

@@ -7,8 +7,9 @@ use std::path::Path;
 use image::ImageDecoder;
 use image::codecs::hdr::HdrDecoder;
 
-use super::{Content, Map, checked_size, whole};
+use super::{Content, Map, checked_size, to_srgb, whole};
 use crate::error::Problem;
+use crate::format::primaries::Primaries;
 
 /// The picture at `path`, with the exposure and colour correction of its header undone.
 pub fn read(path: &Path) -> Result<Map, Box<Problem>> {
@@ -17,6 +18,21 @@ pub fn read(path: &Path) -> Result<Map, Box<Problem>> {
     // Writers differ in the first line only: #?RADIANCE, #?RGBE.
     let decoder = HdrDecoder::new_nonstrict(BufReader::new(file)).map_err(|e| broken(&e))?;
     let meta = decoder.metadata();
+    let mut primaries = None;
+    for (key, value) in &meta.custom_attributes {
+        let numbers: Option<Vec<f64>> = value.split_whitespace().map(|word| word.parse().ok()).collect();
+        match (key.trim(), numbers.as_deref()) {
+            ("EXPOSURE", Some([_])) | ("COLORCORR", Some([_, _, _])) => {}
+            ("PRIMARIES", Some(&[rx, ry, gx, gy, bx, by, wx, wy])) => {
+                primaries = Some(Primaries([[rx, ry], [gx, gy], [bx, by], [wx, wy]]));
+            }
+            // The decoder passes over what it cannot parse.
+            (key @ ("EXPOSURE" | "COLORCORR" | "PRIMARIES"), _) => {
+                return Err(whole(path, format!("has a header line {key}={value} that holds other than its numbers")));
+            }
+            _ => {}
+        }
+    }
     let size = checked_size(path, meta.width.into(), meta.height.into())?;
     let mut rgb = vec![0f32; 3 * meta.width as usize * meta.height as usize];
     decoder.read_image(bytemuck::cast_slice_mut(&mut rgb)).map_err(|e| broken(&e))?;
@@ -31,6 +47,9 @@ pub fn read(path: &Path) -> Result<Map, Box<Problem>> {
         }
         rgb.chunks_exact_mut(3).for_each(|texel| texel.iter_mut().zip(factors).for_each(|(v, f)| *v /= f));
         warnings.push(format!("has an exposure and colour correction of {factors:?}, which are undone"));
+    }
+    if let Some(primaries) = primaries.filter(|primaries| !primaries.are_srgb()) {
+        to_srgb(path, &mut rgb, size[0], primaries, &mut warnings)?;
     }
     Ok(Map { size, content: Content::Rgb(rgb), warnings })
 }

@@ -101,5 +101,8 @@ grid = "d.zarr"
 "#],
     notes: "The array fills the bounding box of the object that the medium is in, in the object's own coordinates, so \
             that `transform` carries it along: its first number is at the least x, y and z, and the last index runs \
-            along x. A voxel has one value throughout. The grids of one medium have one shape.",
+            along x. A voxel has one value throughout. The grids of one medium have one shape.\n\nDimensions called z, \
+            y and x may have any order, and coordinates that descend turn an array round; uneven ones are an error. \
+            `units` of a temperature are K, or °C, which is converted; a density has none. Negative values down to -1 % \
+            of the peak become 0. The last two are told of. [Environment maps](#environment-maps) says what of Zarr is read.",
 };

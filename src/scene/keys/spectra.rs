@@ -45,14 +45,17 @@ pub static SPECTRUM: Section = Section {
             "column",
             Text,
             "the only one",
-            "Which column of the file, by the name that its header gives it; which spectrum of a library; `\"n\"` or \
-             `\"k\"` of a refractiveindex.info file, of which `\"n\"` is the default. With `file` only.",
-        ),
+            "Which column of the file, by the name that its header gives it or by its number (1 is that of the \
+             wavelengths); which spectrum of a library, by name or number; `\"n\"` or `\"k\"` of a refractiveindex.info \
+             file, of which `\"n\"` is the default. With `file` only.",
+        )
+        .or("whole number"),
         Key::optional(
             "unit",
-            Choice(&["nm", "um", "cm-1"]),
+            Text,
             "as the header says, else nm",
-            "The unit of a CSV's first column. With `file` only, and not with files that say it by themselves.",
+            "The unit of the first column of text in columns: nm, um, angstrom, cm-1, THz, eV and others, see [Files of \
+             spectra](#files-of-spectra). With `file` only, and not with files that say it by themselves.",
         ),
         Key::default("scale", Number, "1.0", "Multiplies all values. With any source.").range("[0, ∞)"),
         Key::optional(

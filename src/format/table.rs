@@ -1,0 +1,644 @@
+//! Tables of numbers in text, as people, spreadsheets, instruments and Fortran write them: what separates cells, which line
+//! names the columns, what a decimal comma is, and which lines are about something else. What can be read in two ways is refused.
+
+use std::path::Path;
+
+use csv::{ReaderBuilder, StringRecord, Trim};
+
+use super::unit::{self, Unit};
+use crate::error::Problem;
+
+type Read<T> = Result<T, Box<Problem>>;
+
+/// A table in a text file.
+#[derive(Debug)]
+pub struct Table<'p> {
+    pub path: &'p Path,
+    /// Of every column; empty where the file names none.
+    pub names: Vec<String>,
+    /// The line of the names, 1-based; that of the first row where there are none.
+    pub line: usize,
+    pub rows: Vec<Row>,
+    /// What was left out or mended, in words that go on after the file's name.
+    pub notes: Vec<String>,
+    decimal: Decimal,
+}
+
+/// A line of a table.
+#[derive(Debug)]
+pub struct Row {
+    /// 1-based.
+    pub line: usize,
+    pub cells: StringRecord,
+}
+
+/// The names of columns, and the row that has them.
+struct Header {
+    names: Vec<String>,
+    row: usize,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Decimal {
+    Point,
+    Comma,
+}
+
+/// What lies between cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Separator {
+    Char(u8),
+    Space,
+}
+
+/// Cells that say that there is no number.
+const NOT_GIVEN: [&str; 12] =
+    ["", "#n/a", "#na", "n/a", "na", "#null!", "#div/0!", "#value!", "#ref!", "#name?", "#num!", "--"];
+
+fn wrong(path: &Path, line: Option<usize>, message: String, help: &str) -> Box<Problem> {
+    let help = (!help.is_empty()).then(|| help.to_owned());
+    Box::new(Problem { file: path.to_owned(), line, message, help, ..Problem::default() })
+}
+
+/// The text of a file: UTF-8, UTF-16 by its mark or its zeros, otherwise Latin-1. Every kind of line end becomes `\n`.
+pub fn text(bytes: &[u8], path: &Path) -> Read<String> {
+    let utf16 = |bytes: &[u8], word: fn([u8; 2]) -> u16| {
+        let words: Vec<u16> = bytes.as_chunks::<2>().0.iter().map(|&pair| word(pair)).collect();
+        String::from_utf16_lossy(&words)
+    };
+    let text = match bytes {
+        [0xff, 0xfe, 0, 0, ..] | [0, 0, 0xfe, 0xff, ..] => {
+            return Err(wrong(path, None, "is UTF-32 text".to_owned(), "save it as UTF-8"));
+        }
+        [0xff, 0xfe, rest @ ..] => utf16(rest, u16::from_le_bytes),
+        [0xfe, 0xff, rest @ ..] => utf16(rest, u16::from_be_bytes),
+        [a, 0, b, 0, ..] if *a != 0 && *b != 0 => utf16(bytes, u16::from_le_bytes),
+        [0, a, 0, b, ..] if *a != 0 && *b != 0 => utf16(bytes, u16::from_be_bytes),
+        _ => match std::str::from_utf8(bytes) {
+            Ok(text) => text.to_owned(),
+            // Names of units such as µm and Å are the same in Latin-1 and what Windows makes of it.
+            Err(_) => bytes.iter().map(|&byte| char::from(byte)).collect(),
+        },
+    };
+    let text = text.trim_start_matches('\u{feff}');
+    Ok(if text.contains('\r') { text.replace("\r\n", "\n").replace('\r', "\n") } else { text.to_owned() })
+}
+
+/// Whether `line` is about the table and no part of it.
+fn is_comment(line: &str) -> bool {
+    let starts = |mark: &str| {
+        line.starts_with(mark) && !NOT_GIVEN.iter().any(|cell| !cell.is_empty() && lower_starts(line, cell))
+    };
+    starts("#") || line.starts_with('%') || line.starts_with('!') || line.starts_with("//")
+}
+
+fn lower_starts(line: &str, cell: &str) -> bool {
+    line.get(..cell.len()).is_some_and(|start| start.eq_ignore_ascii_case(cell))
+}
+
+/// `line` up to a comment: from a `#` on that a blank follows, or, after numbers, any that begins no cell such as `#N/A`.
+fn without_comment(line: &str) -> &str {
+    let numbers = line.trim_start().starts_with(|c: char| c.is_ascii_digit() || matches!(c, '.' | '-' | '+'));
+    for (i, _) in line.match_indices('#') {
+        let rest = &line[i..];
+        let quoted = line[..i].matches('"').count() % 2 == 1;
+        let is_cell = NOT_GIVEN.iter().any(|cell| cell.starts_with('#') && lower_starts(rest, cell));
+        if !quoted && !is_cell && (numbers || rest[1..].starts_with([' ', '\t']) || rest.len() == 1) {
+            return line[..i].trim_end();
+        }
+    }
+    line
+}
+
+/// A number, also with Fortran's exponents (`1.0D+02`, `1.0-101`), a minus sign of print, or percent.
+fn parse_number(cell: &str, decimal: Decimal) -> Option<f64> {
+    let plain = |text: &str| text.parse::<f64>().ok();
+    if decimal == Decimal::Point
+        && let Some(value) = plain(cell)
+    {
+        return Some(value);
+    }
+    let mut text = cell.replace('\u{2212}', "-");
+    if decimal == Decimal::Comma {
+        if text.contains('.') {
+            return None;
+        }
+        text = text.replace(',', ".");
+    }
+    if let Some(percent) = text.strip_suffix('%') {
+        return plain(percent.trim_end()).map(|value| value / 100.0);
+    }
+    if let Some(value) = plain(&text) {
+        return Some(value);
+    }
+    let digits = |text: &str| text.starts_with(|c: char| c.is_ascii_digit() || matches!(c, '.' | '+' | '-'));
+    if !digits(&text) {
+        return None;
+    }
+    if let Some(value) = plain(&text.replace(['d', 'D'], "e")) {
+        return Some(value);
+    }
+    // An exponent of three digits leaves no room for its letter.
+    let sign = text.char_indices().skip(1).filter(|(_, c)| matches!(c, '+' | '-')).map(|(i, _)| i).last()?;
+    let (mantissa, exponent) = text.split_at(sign);
+    if mantissa.contains(['e', 'E']) || exponent.len() != 4 {
+        return None;
+    }
+    plain(&format!("{mantissa}e{exponent}"))
+}
+
+/// Splits the lines of `text`; a record may go on over a line end within quotes.
+fn records(lines: &[(usize, &str)], separator: Separator) -> Vec<Row> {
+    let Separator::Char(delimiter) = separator else {
+        return lines
+            .iter()
+            .map(|(line, text)| Row { line: *line, cells: text.split_whitespace().map(unquoted).collect() })
+            .collect();
+    };
+    let mut joined = String::with_capacity(lines.iter().map(|(_, text)| text.len() + 1).sum());
+    for (_, text) in lines {
+        joined.push_str(text);
+        joined.push('\n');
+    }
+    let mut reader = ReaderBuilder::new()
+        .delimiter(delimiter)
+        .has_headers(false)
+        .flexible(true)
+        .trim(Trim::All)
+        .quoting(joined.contains('"'))
+        .from_reader(joined.as_bytes());
+    let mut rows = Vec::with_capacity(lines.len());
+    let mut record = StringRecord::new();
+    // Reading from memory text that is UTF-8 cannot fail.
+    while let Ok(true) = reader.read_record(&mut record) {
+        let index = record.position().map_or(0, |position| position.line() as usize).saturating_sub(1);
+        let line = lines.get(index).map_or(0, |(line, _)| *line);
+        rows.push(Row { line, cells: std::mem::take(&mut record) });
+    }
+    rows
+}
+
+fn unquoted(cell: &str) -> &str {
+    cell.trim_matches('"')
+}
+
+/// How many cells most rows have, the earlier number where two are as frequent.
+fn usual_count(rows: &[Row]) -> usize {
+    let mut counts: Vec<(usize, usize)> = Vec::new();
+    for row in rows {
+        match counts.iter_mut().find(|(cells, _)| *cells == row.cells.len()) {
+            Some((_, times)) => *times += 1,
+            None => counts.push((row.cells.len(), 1)),
+        }
+    }
+    let most = counts.iter().map(|(_, times)| *times).max().unwrap_or(0);
+    counts.iter().find(|(_, times)| *times == most).map_or(0, |(cells, _)| *cells)
+}
+
+/// Reads the table in `bytes`. A file named `.spd` has blanks between its cells.
+pub fn read<'p>(bytes: &[u8], path: &'p Path) -> Read<Table<'p>> {
+    let text = text(bytes, path)?;
+    parse(&text, 1, path)
+}
+
+/// Like [`read`], of text whose first line has the number `first_line` in the file.
+pub fn parse<'p>(text: &str, first_line: usize, path: &'p Path) -> Read<Table<'p>> {
+    let mut comments: Vec<(usize, &str)> = Vec::new();
+    let mut lines: Vec<(usize, &str)> = Vec::new();
+    let mut declared = None;
+    for (number, line) in (first_line..).zip(text.split('\n')) {
+        let line = line.trim_matches([' ', '\u{0}', '\u{1a}']);
+        if line.trim().is_empty() {
+            continue;
+        }
+        if lines.is_empty()
+            && declared.is_none()
+            && let Some(separator) = line.trim_matches('"').strip_prefix("sep=").and_then(|rest| rest.chars().next())
+            && separator.is_ascii()
+        {
+            declared = Some(Separator::Char(separator as u8));
+        } else if is_comment(line.trim_start()) {
+            comments.push((number, line.trim_start()));
+        } else {
+            lines.push((number, without_comment(line)));
+        }
+    }
+    if lines.is_empty() {
+        return Err(wrong(path, None, "holds no data".to_owned(), "write lines of `nm,value`"));
+    }
+    let is_spd = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("spd"));
+    let separator = match declared {
+        Some(separator) => separator,
+        None if is_spd => Separator::Space,
+        None => separator_of(&lines),
+    };
+    let mut rows = records(&lines, separator);
+    let decimal = decimal_of(&rows, separator, path)?;
+    drop_empty(&mut rows);
+    if rows.is_empty() {
+        return Err(wrong(path, None, "holds no data".to_owned(), "write lines of `nm,value`"));
+    }
+    let mut table = Table { path, names: Vec::new(), line: rows[0].line, rows, notes: Vec::new(), decimal };
+    table.find_header(separator, &comments)?;
+    Ok(table)
+}
+
+/// What separates the cells of most lines, looking at those with numbers first: names may hold anything.
+fn separator_of(lines: &[(usize, &str)]) -> Separator {
+    let numeric = |line: &str| line.starts_with(|c: char| c.is_ascii_digit() || matches!(c, '.' | '-' | '+' | '"'));
+    let mut sample: Vec<&str> = lines.iter().map(|(_, line)| *line).filter(|line| numeric(line)).take(200).collect();
+    if sample.is_empty() {
+        sample = lines.iter().map(|(_, line)| *line).take(200).collect();
+    }
+    let with = |c: char| sample.iter().filter(|line| line.trim_end().contains(c)).count();
+    let found = [';', '\t', ',', '|'].into_iter().find(|c| 2 * with(*c) > sample.len());
+    match found {
+        // Blanks between numbers with decimal commas: no comma stands before a blank.
+        Some(',') if sample.iter().all(|line| is_spaced_decimals(line)) => Separator::Space,
+        Some(c) => Separator::Char(c as u8),
+        None => Separator::Space,
+    }
+}
+
+/// Whether a line is several numbers with one decimal comma at most each, and blanks between them.
+fn is_spaced_decimals(line: &str) -> bool {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    words.len() > 1
+        && words.iter().all(|word| !word.starts_with(',') && !word.ends_with(',') && word.matches(',').count() <= 1)
+}
+
+/// Whether commas are decimal: only where something else separates cells, and only if no number has a point.
+fn decimal_of(rows: &[Row], separator: Separator, path: &Path) -> Read<Decimal> {
+    if separator == Separator::Char(b',') {
+        return Ok(Decimal::Point);
+    }
+    let number = |cell: &&str| {
+        cell.contains(',')
+            && cell.chars().all(|c| c.is_ascii_digit() || matches!(c, ',' | '.' | '+' | '-' | 'e' | 'E' | '%'))
+    };
+    let with_comma = || rows.iter().flat_map(|row| row.cells.iter().filter(number).map(move |cell| (row.line, cell)));
+    let Some((first, example)) = with_comma().next() else { return Ok(Decimal::Point) };
+    let has_points = rows
+        .iter()
+        .flat_map(|row| row.cells.iter())
+        .any(|cell| cell.contains('.') && cell.parse::<f64>().is_ok() || number(&cell) && cell.contains('.'));
+    let grouped = |cell: &str| {
+        let (before, after) = cell.split_once(',').unwrap_or((cell, ""));
+        let before = before.trim_start_matches(['-', '+']);
+        (1..=3).contains(&before.len()) && !before.starts_with('0') && after.len() == 3
+    };
+    let several = with_comma().any(|(_, cell)| cell.matches(',').count() > 1);
+    let ambiguous = separator != Separator::Char(b';') && with_comma().all(|(_, cell)| grouped(cell));
+    if has_points || several || ambiguous {
+        let message = format!("`{example}` may have a decimal comma or a comma between thousands");
+        return Err(wrong(path, Some(first), message, "write decimal points, and no commas within numbers"));
+    }
+    Ok(Decimal::Comma)
+}
+
+/// Drops rows without any content, and columns at the end that have none.
+fn drop_empty(rows: &mut Vec<Row>) {
+    rows.retain(|row| row.cells.iter().any(|cell| !cell.is_empty()));
+    let filled = |row: &Row| (0..row.cells.len()).rev().find(|i| !row.cells[*i].is_empty()).map_or(0, |i| i + 1);
+    let most = rows.iter().map(filled).max().unwrap_or(0);
+    for row in rows.iter_mut().filter(|row| row.cells.len() > most) {
+        row.cells.truncate(most);
+    }
+}
+
+impl Table<'_> {
+    pub fn problem(&self, line: Option<usize>, message: String, help: &str) -> Box<Problem> {
+        wrong(self.path, line, message, help)
+    }
+
+    /// Columns of the table.
+    pub fn columns(&self) -> usize {
+        if self.names.is_empty() { self.rows.first().map_or(0, |row| row.cells.len()) } else { self.names.len() }
+    }
+
+    /// The number in a cell; `None` where there is none, in a table of more than two columns.
+    pub fn number(&self, row: &Row, column: usize) -> Read<Option<f64>> {
+        let cell = row.cells.get(column).unwrap_or("");
+        match parse_number(cell, self.decimal).filter(|value| value.is_finite()) {
+            Some(value) => Ok(Some(value)),
+            None if self.is_missing(cell) => Ok(None),
+            None => Err(self.problem(Some(row.line), format!("`{}` is not a finite number", shown(cell)), "")),
+        }
+    }
+
+    fn is_missing(&self, cell: &str) -> bool {
+        let lower = cell.to_lowercase();
+        // Of two columns an empty one is more likely a mistake than a value that was not taken.
+        NOT_GIVEN.contains(&lower.as_str()) && (!cell.is_empty() || self.columns() > 2)
+    }
+
+    /// Refuses rows that have more or fewer cells than the table.
+    pub fn check_row(&self, row: &Row) -> Read<()> {
+        let (has, expected) = (row.cells.len(), self.columns());
+        if has == expected {
+            return Ok(());
+        }
+        let message = format!("has {has} cells where {expected} are expected");
+        let help = if has == 2 * expected && row.cells.iter().all(|cell| cell.parse::<f64>().is_ok()) {
+            "write decimal points, or semicolons between cells, if the commas are decimal; else give every line the same \
+             number of cells"
+        } else {
+            "give every line the same number of cells"
+        };
+        Err(self.problem(Some(row.line), message, help))
+    }
+
+    fn is_number(&self, cell: &str) -> bool {
+        parse_number(cell, self.decimal).is_some()
+    }
+
+    /// Takes the names of columns, and whatever stands before them, out of the rows.
+    fn find_header(&mut self, separator: Separator, comments: &[(usize, &str)]) -> Read<()> {
+        let usual = usual_count(&self.rows);
+        let start = self.first_row(usual)?;
+        let width = self.rows.get(start).map_or(usual, |row| row.cells.len());
+        let header = (self.header_of_cells(start, width))
+            .or_else(|| self.header_of_words(start, width).filter(|_| separator == Separator::Space));
+        let preamble = header.as_ref().map_or(start, |header| header.row);
+        let mut names = Vec::new();
+        if let Some(header) = header {
+            (names, self.line) = (header.names, self.rows[header.row].line);
+        } else if let Some((line, found)) = self.header_in_comment(separator, width, start, comments) {
+            let axis = &found[0];
+            if !matches!(Unit::stated(axis), Ok(None | Some(Unit::NANOMETRE))) || unit::is_in_air(axis) {
+                let shown = shown(axis);
+                self.notes.push(format!("names its columns in the comment on line {line}, the first one `{shown}`"));
+            }
+            (names, self.line) = (found, line);
+        } else if start > 0 {
+            self.refuse_names_of_other_columns(start - 1, width)?;
+        }
+        self.look_at_preamble(preamble)?;
+        self.warn_of_units_in_comments(&names, start, comments);
+        if names.is_empty() {
+            self.line = self.rows.get(start).map_or(self.line, |row| row.line);
+        }
+        self.names = names;
+        self.rows.drain(..start);
+        Ok(())
+    }
+
+    /// The place of the first row of numbers, of which most have `usual` cells; that of a long table of responses begins with a
+    /// name.
+    fn first_row(&self, usual: usize) -> Read<usize> {
+        let is_long =
+            |row: &Row| row.cells.len() == 3 && row.cells.get(0).is_some_and(|c| c.eq_ignore_ascii_case("band"));
+        if let Some(header) = self.rows.iter().position(is_long) {
+            return Ok(header + 1);
+        }
+        let begins = |row: &Row| row.cells.get(0).is_some_and(|cell| self.is_number(cell));
+        let whole = |row: &Row| begins(row) && row.cells.len() == usual;
+        self.rows.iter().position(whole).or_else(|| self.rows.iter().position(begins)).ok_or_else(|| {
+            let row = &self.rows[self.rows.len().min(2) - 1];
+            let cell = shown(row.cells.get(0).unwrap_or(""));
+            let message = format!("`{cell}` is not a finite number, and no line begins with one");
+            self.problem(Some(row.line), message, "write lines of `nm,value`")
+        })
+    }
+
+    /// Names with a cell each, right before the row `start`; a line of units may stand between.
+    fn header_of_cells(&self, start: usize, width: usize) -> Option<Header> {
+        let head = self.rows[..start].iter().rposition(|row| row.cells.len() != width).map_or(0, |i| i + 1);
+        if head == start {
+            return None;
+        }
+        let cells = |row: usize| self.rows[row].cells.iter().map(str::to_owned).collect::<Vec<_>>();
+        let units = (head + 1..start).find(|&row| self.is_line_of_units(row));
+        let row = units.unwrap_or(start) - 1;
+        let mut names = cells(row);
+        for (name, unit) in names.iter_mut().zip(units.map(cells).unwrap_or_default()) {
+            let bare = unit.trim_matches(['(', ')', '[', ']', ' ']);
+            if !bare.is_empty() && *bare != *name {
+                *name = format!("{name} ({bare})");
+            }
+        }
+        Some(Header { names, row })
+    }
+
+    /// Names between blanks, which hold blanks themselves, so that they seem to be more than there are columns.
+    fn header_of_words(&self, start: usize, width: usize) -> Option<Header> {
+        let row = start.checked_sub(1)?;
+        let words: Vec<&str> = self.rows[row].cells.iter().collect();
+        Some(Header { names: join_names(&words, width)?, row })
+    }
+
+    /// A line before the numbers that names columns, but not these.
+    fn refuse_names_of_other_columns(&self, row: usize, width: usize) -> Read<()> {
+        let row = &self.rows[row];
+        let names_something = row.cells.len() > 1 || Unit::stated(row.cells.get(0).unwrap_or("")) != Ok(None);
+        if !names_something {
+            return Ok(());
+        }
+        let message = format!("has {} cells where the numbers below have {width}", row.cells.len());
+        let help = "give the header a name for every column, and begin lines about something else with `# `";
+        Err(self.problem(Some(row.line), message, help))
+    }
+
+    /// Whether every cell of a row is empty or a unit, the first that of a spectral axis.
+    fn is_line_of_units(&self, row: usize) -> bool {
+        let bare = |cell: &str| cell.trim_matches(['(', ')', '[', ']', ' ']).to_owned();
+        let mut cells = self.rows[row].cells.iter().map(bare);
+        cells.next().is_some_and(|cell| Unit::named(&cell).is_some())
+            && self.rows[row].cells.iter().skip(1).all(|cell| {
+                let inner = bare(cell);
+                inner.is_empty() || inner != cell || unit::parse(&inner).is_some() || inner.len() <= 6
+            })
+    }
+
+    /// numpy.savetxt writes the names of columns as a comment right before the numbers.
+    fn header_in_comment(
+        &self,
+        separator: Separator,
+        width: usize,
+        start: usize,
+        comments: &[(usize, &str)],
+    ) -> Option<(usize, Vec<String>)> {
+        let first = self.rows.get(start)?.line;
+        let (line, text) = comments.iter().rev().find(|(line, _)| *line < first)?;
+        let text = text.trim_start_matches(['#', '%', '!', '/', ' ']);
+        let row = records(&[(*line, text)], separator).pop()?;
+        let words: Vec<&str> = row.cells.iter().collect();
+        let names = if words.len() == width {
+            words.iter().map(|word| (*word).to_owned()).collect()
+        } else if separator == Separator::Space {
+            join_names(&words, width)?
+        } else {
+            return None;
+        };
+        let is_axis = |name: &str| {
+            let lower = name.to_lowercase();
+            ["wave", "wl", "lambda", "\u{3bb}", "lam", "freq", "energy"].iter().any(|word| lower.starts_with(word))
+        };
+        let says_something = Unit::stated(&names[0]) != Ok(None) || is_axis(&names[0]);
+        says_something.then_some((*line, names))
+    }
+
+    /// Lines before the header are about something else; one that speaks of units or factors is not left out in silence.
+    fn look_at_preamble(&mut self, end: usize) -> Read<()> {
+        for row in &self.rows[..end] {
+            let whole = row.cells.iter().collect::<Vec<_>>().join(" ");
+            let key = whole.split([':', '=']).next().unwrap_or("").to_lowercase();
+            let has_value =
+                row.cells.iter().flat_map(|cell| cell.split([':', '=', ' '])).any(|word| self.is_number(word));
+            let scales = ["scale", "factor", "gain", "offset", "multipl"].iter().any(|word| key.contains(word));
+            let of_units = key.contains("unit") && Unit::stated(&whole) != Ok(None);
+            if (scales && has_value) || of_units {
+                let message = format!("says `{}`, which is not applied", shown(&whole));
+                let help = "apply it, put units into the header (`wavelength (um)`), and begin the line with `# `";
+                return Err(self.problem(Some(row.line), message, help));
+            }
+        }
+        if let [first, ..] = &self.rows[..end] {
+            let last = self.rows[end - 1].line;
+            let lines = if first.line == last {
+                format!("line {last} before the table is")
+            } else {
+                format!("lines {} to {last} before the table are", first.line)
+            };
+            self.notes
+                .push(format!("{lines} left out: `{}`", shown(&first.cells.iter().collect::<Vec<_>>().join(" "))));
+        }
+        Ok(())
+    }
+
+    /// A comment that speaks of another unit than nm, where nothing else says the unit.
+    fn warn_of_units_in_comments(&mut self, names: &[String], start: usize, comments: &[(usize, &str)]) {
+        if names.first().is_some_and(|name| Unit::stated(name) != Ok(None)) {
+            return;
+        }
+        let first = self.rows.get(start).map_or(usize::MAX, |row| row.line);
+        for (line, text) in comments.iter().filter(|(line, _)| *line < first) {
+            let about_axis = text.to_lowercase();
+            let about_axis =
+                ["wave", "lambda", "first column", "column 1", "wl"].iter().any(|word| about_axis.contains(word));
+            if about_axis
+                && let Ok(Some(unit)) = Unit::stated(text.trim_start_matches(['#', '%', '!', '/', ' ']))
+                && unit != Unit::NANOMETRE
+            {
+                self.notes.push(format!(
+                    "has the comment `{}` on line {line}, but no header says a unit: its wavelengths are taken as nm (say \
+                     `unit = …` in the scene)",
+                    shown(text)
+                ));
+                return;
+            }
+        }
+    }
+}
+
+/// Names that hold blanks, where columns are separated by blanks: those in brackets belong to the word before, and of two
+/// columns the first is the first word or what is up to the bracket.
+fn join_names(words: &[&str], width: usize) -> Option<Vec<String>> {
+    let mut names: Vec<String> = Vec::new();
+    let mut depth = 0i32;
+    for word in words {
+        let opens = word.matches(['(', '[']).count() as i32 - word.matches([')', ']']).count() as i32;
+        match names.last_mut() {
+            Some(last) if depth > 0 || word.starts_with(['(', '[']) => {
+                last.push(' ');
+                last.push_str(word);
+            }
+            _ => names.push((*word).to_owned()),
+        }
+        depth += opens;
+    }
+    (names.len() == width).then_some(names)
+}
+
+/// The beginning of what a file says, fit for a message.
+pub fn shown(text: &str) -> String {
+    const MOST: usize = 60;
+    let mut cut: String = text.chars().take(MOST).collect();
+    if text.chars().count() > MOST {
+        cut.push('…');
+    }
+    cut.escape_debug().to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn numbers(text: &[u8]) -> Vec<Vec<Option<f64>>> {
+        let table = read(text, Path::new("t.csv")).unwrap_or_else(|problem| panic!("{problem}"));
+        let row = |row: &Row| (0..table.columns()).map(|i| table.number(row, i).unwrap()).collect();
+        table.rows.iter().map(row).collect()
+    }
+
+    #[test]
+    fn whatever_separates_and_ends_lines() {
+        let expected = vec![vec![Some(400.5), Some(1.25)], vec![Some(700.0), Some(-2.0)]];
+        let utf16 = |text: &str, big: bool| -> Vec<u8> {
+            let mark = if big { "" } else { "\u{feff}" };
+            format!("{mark}{text}")
+                .encode_utf16()
+                .flat_map(|word| if big { word.to_be_bytes() } else { word.to_le_bytes() })
+                .collect()
+        };
+        for text in [
+            &b"nm,value\r400.5,1.25\r700,-2\r"[..],
+            b"nm,value\r\n400.5,1.25\r\n\r\n700,-2\r\n,\r\n,,\r\n",
+            b"sep=;\nnm;value\n400,5;1,25\n700;-2\n",
+            b"nm;value\n400,5;1,25\n700,0;-2,0\n",
+            b"nm\tvalue\n400,5\t1,25\n700\t-2,0\n",
+            b"400,5 1,25\n700,0 -2,0\n",
+            b"nm,value,\n400.5,1.25,\n700,-2,\n",
+            b"\"Wavelength, nm\",\"Value, none\"\n400.5,1.25\n700,-2\n",
+            b"Instrument: X\nDate: 2026-01-01\nnm,value\n400.5,1.25\n700,-2\n",
+            b"Wavelength,Radiance\n(nm),(W)\n400.5,1.25\n700,-2\n",
+            b"nm,value\n4.005D+02,1.25d+0\n7.0D2,-2\n",
+            b"% about\n! about\n// about\nnm,value\n400.5,1.25\n700,\xe2\x88\x922\n",
+            b"nm\tRed; left\n400.5\t1.25\n700\t-2\n",
+            b"nm,value\n400.5,125%\n700,-200%\n",
+            b"wavelength (nm)   reflectance (no unit)\n 400.5  1.25\n 700  -2\n",
+            &utf16("nm,value\n400.5,1.25\n700,-2\n", false),
+            &utf16("nm,value\n400.5,1.25\n700,-2\n", true),
+        ] {
+            assert_eq!(numbers(text), expected, "{}", String::from_utf8_lossy(text));
+        }
+        assert_eq!(numbers(b"nm,v\n400,1.0-101\n500,2.5+100\n")[1][1], Some(2.5e100));
+        assert_eq!(
+            numbers(b"nm,v,w\n400,#N/A,1\n500,n/a,2\n"),
+            [[Some(400.0), None, Some(1.0)], [Some(500.0), None, Some(2.0)]]
+        );
+        let table = read(b"nm,Sample #1,Sample #2 # of two\n400,1,2 # first\n700,1,2\n", Path::new("t.csv")).unwrap();
+        assert_eq!(table.names, ["nm", "Sample #1", "Sample #2"]);
+    }
+
+    #[test]
+    fn headers_are_found_where_they_stand() {
+        for (text, names) in [
+            ("# wavelength_um,radiance\n0.4,1\n0.5,1\n", &["wavelength_um", "radiance"][..]),
+            ("# made in 2020, by X\n400,1\n500,1\n", &[]),
+            ("# wavelength [um] radiance\n0.4 1\n0.5 1\n", &["wavelength [um]", "radiance"]),
+            ("Long name,second\nnm,W\nof a lamp,\n400,1\n500,2\n", &["Long name (nm)", "second (W)"]),
+            ("400,1\n500,1\n", &[]),
+            ("band,nm,response\nred,400,1\n", &["band", "nm", "response"]),
+        ] {
+            let table = read(text.as_bytes(), Path::new("t.csv")).unwrap_or_else(|problem| panic!("{text}: {problem}"));
+            assert_eq!(table.names, names, "{text}");
+        }
+    }
+
+    #[test]
+    fn what_can_be_read_in_two_ways_is_refused() {
+        for (text, line, words) in [
+            ("nm\tv\n1,000\t2,000\n1,100\t2,100\n", 2, "decimal comma or a comma between thousands"),
+            ("nm;v\n1,5;2.5\n2,5;3.5\n", 2, "decimal comma"),
+            ("Scale factor: 100\nnm,v\n400,1\n500,1\n", 1, "not applied"),
+            ("X Units: um\nwl,v\n400,1\n500,1\n", 1, "not applied"),
+            ("nm,v,w,x\n400,1\n500,1\n", 1, "4 cells where the numbers below have 2"),
+        ] {
+            let problem = read(text.as_bytes(), Path::new("t.csv")).unwrap_err();
+            assert!(problem.message.contains(words) && problem.line == Some(line), "{text}: {problem}");
+        }
+        let table = read(b"nm,v\n400,0,1,0\n700,0,1,0\n", Path::new("t.csv"));
+        let problem = table.and_then(|table| table.check_row(&table.rows[0])).unwrap_err();
+        assert!(problem.to_string().contains("2") && problem.line.is_some(), "{problem}");
+    }
+}
