@@ -30,7 +30,7 @@ pub fn make(scene: &Path, folder: &Path) -> io::Result<()> {
     println!("{}: the sun's light travels along {}", folder.display(), -sky.sun);
     let steps = |from: u32, to: u32, step: usize| (from..=to).step_by(step).map(f64::from).collect::<Vec<_>>();
     sky.write_map(&folder.join("sky_visible.img"), [256, 128], &steps(380, 780, 10))?;
-    sky.write_map(&folder.join("sky_infrared.img"), [64, 48], &steps(1500, 5500, 10))?;
+    sky.write_map(&folder.join("sky_infrared.img"), [96, 48], &steps(1500, 5500, 10))?;
     sky.write_sun(&folder.join("sun.csv"))
 }
 

@@ -22,7 +22,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("render", &["device", "gpu", "cube", "preview", "scene", "spectral"]),
     ("slurm", &["cube"]),
     ("report", &["render", "device", "gpu", "cube", "scene", "format"]),
-    ("stress", &["report", "render", "device", "gpu", "cube", "scene", "spectral"]),
+    ("stress", &["report", "render", "device", "gpu", "cube", "scene", "format", "spectral"]),
     (
         "cli",
         &[

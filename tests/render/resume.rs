@@ -70,13 +70,15 @@ fn only_the_same_render_is_gone_on_with() {
     place.success(&["render", "scene.toml", "-o", "first.zarr", "--spp", "2", "--resume", "--quiet"]);
     place.success(&["render", "scene.toml", "-o", "straight.zarr", "--spp", "2", "--quiet"]);
     assert!(arrays(&place.cube("first.zarr")) == arrays(&place.cube("straight.zarr")));
-    let metadata = place.path().join("cube.zarr/zarr.json");
-    let other =
-        fs::read_to_string(&metadata).expect("read").replace("\"spectile_version\": \"", "\"spectile_version\": \"9");
-    let ours = fs::read(&metadata).expect("read");
+    // What a cube was begun by: where its own record is damaged, as its metadata says.
+    let [record, metadata] = [".spectile/cube.json", "zarr.json"].map(|name| place.path().join("cube.zarr").join(name));
+    let ours = [&record, &metadata].map(|file| fs::read_to_string(file).expect("read"));
+    fs::write(&record, "{}").expect("written");
+    let other = ours[1].replace("\"spectile_version\": \"", "\"spectile_version\": \"9");
     fs::write(&metadata, other).expect("written");
     assert!(refusal(&[], 2).contains("version: it was begun by Spectile 9"));
-    fs::write(&metadata, ours).expect("written");
+    fs::write(&record, &ours[0]).expect("written");
+    fs::write(&metadata, &ours[1]).expect("written");
     assert!(arrays(&place.cube("cube.zarr")) == before, "nothing was changed");
     place.success(&["render", "scene.toml", "-o", "cube.zarr", "--spp", "2", "--resume", "--quiet"]);
 }

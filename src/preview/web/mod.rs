@@ -9,7 +9,7 @@ mod guard;
 mod image;
 mod page;
 
-use std::io::ErrorKind;
+use std::io::{ErrorKind, Write};
 use std::net::SocketAddr;
 use std::pin::pin;
 use std::sync::Arc;
@@ -196,7 +196,7 @@ async fn accept(listener: TcpListener, router: Router, mut ended: watch::Receive
             continue;
         };
         let Ok(place) = Arc::clone(&free).try_acquire_owned() else {
-            refuse(&stream);
+            refuse(stream);
             continue;
         };
         let router = router.clone().layer(axum::Extension(Peer(peer.ip())));
@@ -207,9 +207,11 @@ async fn accept(listener: TcpListener, router: Router, mut ended: watch::Receive
     }
 }
 
-fn refuse(stream: &TcpStream) {
-    // Whoever does not get this sees that the connection is closed.
-    let _ = stream.try_write(b"HTTP/1.1 503 Service Unavailable\r\nconnection: close\r\ncontent-length: 0\r\n\r\n");
+fn refuse(stream: TcpStream) {
+    // As the socket of the system: tokio does not know yet that a new one can be written to. Whoever does not get this sees that the
+    // connection is closed.
+    let Ok(mut stream) = stream.into_std() else { return };
+    let _ = stream.write(b"HTTP/1.1 503 Service Unavailable\r\nconnection: close\r\ncontent-length: 0\r\n\r\n");
 }
 
 /// Serves a connection until either side has had enough.
