@@ -4,7 +4,7 @@
 pub struct Table(csv::Writer<Vec<u8>>);
 
 impl Table {
-    pub fn new(head: &[&str]) -> Table {
+    pub fn new<T: AsRef<str>>(head: impl IntoIterator<Item = T>) -> Table {
         let mut table = Table(csv::Writer::from_writer(Vec::new()));
         table.row(head);
         table
@@ -29,7 +29,7 @@ mod tests {
 
     #[test]
     fn cells_are_quoted_where_they_must_be() {
-        let mut table = Table::new(&["name", "n"]);
+        let mut table = Table::new(["name", "n"]);
         for name in ["box", "a=1, b=2", "the \"red\" one", "two\nlines", ""] {
             table.row([name, "1e-30"]);
         }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use super::unit::{Stated, Unit};
+use super::unit::{self, Stated, Unit};
 use crate::error::Problem;
 
 /// How the values of an image follow each other.
@@ -210,6 +210,14 @@ impl Header {
     /// Whether `bbl` calls a band (a sample, in a library) good, or says nothing.
     pub fn is_good(&self, band: usize) -> bool {
         self.good.get(band).is_none_or(|good| *good)
+    }
+
+    /// What to say of the bands that `bbl` calls bad, if there are any.
+    pub fn bad_bands(&self) -> Option<String> {
+        let bad = self.good.iter().filter(|good| !**good).count();
+        (bad > 0).then(|| {
+            format!("has {bad} bands that its `bbl` calls bad: they are left out, and bridged by their neighbours")
+        })
     }
 
     /// `data units`, where it is understood.
@@ -481,8 +489,8 @@ impl Header {
             return Err(self.problem("wavelength", &message));
         };
         let unit = self.axis.unwrap_or_else(|| {
-            // Wavelengths of reflected light below 100 are micrometres, as every instrument's are.
-            let unit = if values.iter().all(|v| *v < 100.0) { Unit::MICROMETRE } else { Unit::NANOMETRE };
+            let unit =
+                if values.iter().all(|v| *v < unit::MICROMETRES_BELOW) { Unit::MICROMETRE } else { Unit::NANOMETRE };
             let name = if unit == Unit::MICROMETRE { "um" } else { "nm" };
             self.notes.push(format!("does not say in what its wavelengths are: they are taken as {name}"));
             unit

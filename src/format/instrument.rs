@@ -236,9 +236,7 @@ fn spdx(bytes: &[u8], path: &Path, column: Column) -> Read<SpectrumTable> {
                         let Some(value) = content.trim().parse::<f64>().ok().filter(|v| v.is_finite()) else {
                             return wrong(path, line, format!("`{}` is not a finite number", shown(&content)), "");
                         };
-                        found.nm.push(nm);
-                        found.value.push(value);
-                        found.line.push(line.unwrap_or(1));
+                        found.push(nm, value, line.unwrap_or(1));
                     }
                     _ => {}
                 }
@@ -389,9 +387,7 @@ fn svc(bytes: &[u8], path: &Path, column: Column) -> Read<SpectrumTable> {
         let Some(numbers) = numbers.filter(|numbers| numbers.len() == 4 && numbers[0] > 0.0) else {
             return wrong(path, Some(number), "is not a wavelength and three numbers", "");
         };
-        found.nm.push(numbers[0]);
-        found.value.push(if index == 2 { numbers[3] / 100.0 } else { numbers[1 + index] });
-        found.line.push(number);
+        found.push(numbers[0], if index == 2 { numbers[3] / 100.0 } else { numbers[1 + index] }, number);
     }
     if index < 2 {
         // Counts are of one detector at one exposure; radiance is in 1e-10 W cm-2 sr-1 nm-1.
@@ -475,9 +471,7 @@ fn spectral_evolution(bytes: &[u8], path: &Path, column: Column) -> Read<Spectru
             if nm <= 0.0 {
                 return wrong(path, Some(row.line), format!("the wavelength must be greater than 0, but is {nm}"), "");
             }
-            found.nm.push(nm);
-            found.value.push(value);
-            found.line.push(row.line);
+            found.push(nm, value, row.line);
         }
     }
     ascending(found, path, "")
@@ -492,9 +486,7 @@ pub fn rttov(bytes: &[u8], path: &Path) -> Read<SpectrumTable> {
             line.split_whitespace().map(|word| word.parse().ok().filter(|v: &f64| v.is_finite())).collect();
         match numbers.as_deref() {
             Some(&[wavenumber, response]) if wavenumber > 0.0 => {
-                found.nm.push(Unit::WAVENUMBER.to_nm(wavenumber));
-                found.value.push(response);
-                found.line.push(number);
+                found.push(Unit::WAVENUMBER.to_nm(wavenumber), response, number);
             }
             Some([]) => {}
             _ if found.nm.len() < 2 => {

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::envi;
-use super::text::{Column as Wanted, SpectrumTable, ascending, named, read};
+use super::text::{Column as Wanted, SpectrumTable, ascending, named, only_one, read};
 use super::unit::Unit;
 use crate::error::Problem;
 
@@ -76,26 +76,17 @@ pub fn parse_envi(
         },
         Wanted::Named(wanted) => {
             let found: Vec<usize> = (0..names.len()).filter(|i| names[*i] == wanted).collect();
-            match found[..] {
-                [index] => index,
-                [] => {
-                    let message = format!("has no spectrum \"{wanted}\"");
-                    return wrong(data_path, None, message, &format!("its spectra are {}", list(&names)));
-                }
-                [first, second, ..] => {
-                    let message = format!("has several spectra \"{wanted}\"");
-                    let help = format!("pick one by its number: `column = {}` or {}", first + 1, second + 1);
-                    return wrong(data_path, None, message, &help);
-                }
+            match only_one(&found, ["spectrum", "spectra"], &format!("\"{wanted}\""), || list(&names)) {
+                Ok(index) => index,
+                Err((message, help)) => return wrong(data_path, None, message, &help),
             }
         }
     };
     let data = header.data(data, data_path)?;
     let mut table = SpectrumTable { unit: header.unit(), notes: header.notes.clone(), ..SpectrumTable::default() };
-    let (mut bad, mut missing) = (0usize, 0usize);
+    let mut missing = 0usize;
     for (i, nm) in nm.into_iter().enumerate() {
         if !header.is_good(i) {
-            bad += 1;
             continue;
         }
         let Some(value) = data.value(i, index, 0) else {
@@ -108,11 +99,7 @@ pub fn parse_envi(
         table.nm.push(nm);
         table.value.push(value);
     }
-    if bad > 0 {
-        table.notes.push(format!(
-            "has {bad} bands that its `bbl` calls bad: they are left out, and bridged by their neighbours"
-        ));
-    }
+    table.notes.extend(header.bad_bands());
     if missing > 0 {
         table.notes.push(format!("has {missing} bands without a value: they are bridged by their neighbours"));
     }
@@ -156,9 +143,7 @@ pub fn parse_ecostress(bytes: &[u8], path: &Path) -> Read<SpectrumTable> {
             let (x, y) = if y_first { (b, a) } else { (a, b) };
             pairs += 1;
             if x > 0.0 {
-                table.nm.push(unit.to_nm(x));
-                table.value.push(if percent { y / 100.0 } else { y });
-                table.line.push(number);
+                table.push(unit.to_nm(x), if percent { y / 100.0 } else { y }, number);
             }
             continue;
         }
@@ -298,9 +283,7 @@ fn pair_usgs(spectrum: &Column, wavelengths: &Column, path: &Path, of: &Path) ->
         if x <= 0.0 {
             return wrong(of, Some(i + 2), format!("the wavelength must be greater than 0, but is {x}"), "");
         }
-        table.nm.push(unit.to_nm(x));
-        table.value.push(value);
-        table.line.push(i + 2);
+        table.push(unit.to_nm(x), value, i + 2);
     }
     ascending(table, path, "")
 }

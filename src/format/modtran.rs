@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::text::{Column as Wanted, SpectrumTable, ascending, named};
+use super::text::{Column as Wanted, SpectrumTable, ascending, named, only_one};
 use crate::error::Problem;
 
 /// Whether the file is such a table: by its name, or by its header.
@@ -76,18 +76,8 @@ pub fn parse(bytes: &[u8], path: &Path, wanted: Wanted) -> Result<SpectrumTable,
         Wanted::Number(number) => number.to_string(),
         Wanted::Only => String::new(),
     };
-    let index = match found[..] {
-        [index] => index,
-        [] => {
-            let message = format!("has no column {name}");
-            return Err(wrong(Some(header_line), message, &format!("its columns are {}", choices())));
-        }
-        [first, second, ..] => {
-            let message = format!("has several columns {name}");
-            let help = format!("pick one by its number: `column = {}` or {}", first + 1, second + 1);
-            return Err(wrong(Some(header_line), message, &help));
-        }
-    };
+    let index = only_one(&found, ["column", "columns"], &name, choices)
+        .map_err(|(message, help)| wrong(Some(header_line), message, &help))?;
     let has_no_unit = ["TRANS", "DEPTH", "LOG", "BBODY"].iter().any(|word| columns[index].name.contains(word));
 
     let mut table = SpectrumTable::default();
@@ -112,9 +102,7 @@ pub fn parse(bytes: &[u8], path: &Path, wanted: Wanted) -> Result<SpectrumTable,
         };
         let Some(cell) = cell else { continue };
         let (value, nm) = (number_in(cell)?, 1e7 / wavenumber);
-        table.nm.push(nm);
-        table.value.push(if has_no_unit { value } else { value * 1e11 / (nm * nm) });
-        table.line.push(number);
+        table.push(nm, if has_no_unit { value } else { value * 1e11 / (nm * nm) }, number);
     }
     ascending(table, path, &format!(" of {}", columns[index].name))
 }

@@ -67,10 +67,9 @@ pub fn spectrum(channels: &Channels, radiance: &[f32], errors: Option<&[f32]>, t
             if error.is_finite() { [value - error, value + error] } else { [value; 2] }
         })
         .collect();
-    let [from, to] = [0, 1].map(|end| channels.bounds.iter().map(move |b| b[end]));
-    let ends = from.fold(f64::INFINITY, f64::min)..to.fold(f64::NEG_INFINITY, f64::max);
+    let [from, to] = channels.hull().expect("a cube has channels");
     let radiances = Axis::from_zero("spectral radiance", "W m⁻² sr⁻¹ nm⁻¹", bands.iter().flatten().copied());
-    let mut plot = Plot::new(title, Axis::linear(AXES[0], ends), radiances);
+    let mut plot = Plot::new(title, Axis::linear(AXES[0], from..to), radiances);
     for (k, [low, high]) in bands.into_iter().enumerate().filter(|(_, [low, high])| low < high) {
         let [from, to] = channels.bounds[k];
         plot.boxes.push(([from, low], [to, high]));

@@ -66,39 +66,21 @@ pub fn parse_responses(bytes: &[u8], path: &Path) -> Result<Responses, Box<Probl
             return Err(wrong(Some(row.line), format!("the wavelength must be greater than 0, but is {x}"), ""));
         }
         let nm = if in_air { unit::vacuum_nm(unit.to_nm(x)) } else { unit.to_nm(x) };
-        let mut push = |index: usize, value: f64| {
-            let table: &mut SpectrumTable = &mut tables[index].1;
-            table.nm.push(nm);
-            table.value.push(value);
-            table.line.push(row.line);
-        };
         if !is_long {
             for column in 1..count {
                 if let Some(value) = table.number(row, column)? {
-                    push(column - 1, value);
+                    tables[column - 1].1.push(nm, value, row.line);
                 }
             }
             continue;
         }
         let Some(value) = table.number(row, 2)? else { continue };
         let band = row.cells.get(0).unwrap_or("");
-        match tables.iter().position(|(name, _)| name == band) {
-            Some(known) => {
-                let table = &mut tables[known].1;
-                table.nm.push(nm);
-                table.value.push(value);
-                table.line.push(row.line);
-            }
-            None => {
-                let table = SpectrumTable {
-                    nm: vec![nm],
-                    value: vec![value],
-                    line: vec![row.line],
-                    ..SpectrumTable::default()
-                };
-                tables.push((band.to_owned(), table));
-            }
-        }
+        let index = tables.iter().position(|(name, _)| name == band).unwrap_or_else(|| {
+            tables.push((band.to_owned(), SpectrumTable::default()));
+            tables.len() - 1
+        });
+        tables[index].1.push(nm, value, row.line);
     }
     if tables.is_empty() {
         return Err(wrong(None, "holds no responses".into(), ""));

@@ -23,6 +23,15 @@ pub struct SpectrumTable {
     pub notes: Vec<String>,
 }
 
+impl SpectrumTable {
+    /// Adds a value, and the line it stands on.
+    pub(super) fn push(&mut self, nm: f64, value: f64, line: usize) {
+        self.nm.push(nm);
+        self.value.push(value);
+        self.line.push(line);
+    }
+}
+
 /// Which spectrum of a file is wanted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Column<'a> {
@@ -187,7 +196,7 @@ impl Axis {
         let is_guessed = unit.is_none() && stated == Ok(None);
         let unit = match unit {
             Some(unit) => unit,
-            None => Unit::from_header(name(column)).map_err(|other| {
+            None => stated.map(|unit| unit.unwrap_or(Unit::NANOMETRE)).map_err(|other| {
                 let message = format!("gives its first column as {other}, from which no wavelength follows");
                 let help =
                     "name wavelength and unit in the header: nm, um, angstrom, cm-1, THz, eV; or write `unit = \"nm\"`";
@@ -260,9 +269,7 @@ impl Axis {
             let nm = self.nm(table, row.line, x)?;
             for (column, found) in wanted.iter().zip(&mut found) {
                 if let Some(value) = table.number(row, *column)? {
-                    found.nm.push(nm);
-                    found.value.push(value);
-                    found.line.push(row.line);
+                    found.push(nm, value, row.line);
                 }
             }
         }
@@ -283,9 +290,8 @@ impl Axis {
 
     /// What to say of wavelengths in nm that nobody has there.
     fn looks_like_micrometres(&self, nm: &[f64]) -> Option<String> {
-        const SHORTEST: f64 = 100.0;
         let longest = nm.iter().copied().fold(0.0, f64::max);
-        (self.is_guessed && longest < SHORTEST).then(|| {
+        (self.is_guessed && longest < unit::MICROMETRES_BELOW).then(|| {
             format!(
                 "does not say in what its wavelengths are: up to {longest}, they are taken as nm (if they are micrometres, \
                  write `unit = \"um\"`)"
@@ -318,19 +324,9 @@ fn position(table: &Table, wanted: &str) -> Result<usize, Box<Problem>> {
     if found.is_empty() {
         found = all(&bare);
     }
-    match found[..] {
-        [one] => Ok(one),
-        [] => {
-            let names = table.names.iter().skip(1).cloned().collect::<Vec<_>>().join(", ");
-            let message = format!("has no column \"{wanted}\"");
-            Err(table.problem(Some(table.line), message, &format!("its columns are {names}")))
-        }
-        [first, second, ..] => {
-            let message = format!("has several columns \"{wanted}\"");
-            let help = format!("pick one by its number: `column = {}` or {}", first + 1, second + 1);
-            Err(table.problem(Some(table.line), message, &help))
-        }
-    }
+    let names = || table.names.iter().skip(1).cloned().collect::<Vec<_>>().join(", ");
+    only_one(&found, ["column", "columns"], &format!("\"{wanted}\""), names)
+        .map_err(|(message, help)| table.problem(Some(table.line), message, &help))
 }
 
 /// One of the tables that a download of refractiveindex.info has one under the other: `wl` in um, and n or k.
@@ -431,6 +427,24 @@ pub(super) fn ascending(mut table: SpectrumTable, path: &Path, of: &str) -> Resu
         }
     }
     Ok(table)
+}
+
+/// The place of the spectrum that is `wanted`, where those in `found` are called so; otherwise what is wrong, and what to do. `noun`:
+/// what the file calls a spectrum, one and several; `choices`: all that there are.
+pub(super) fn only_one(
+    found: &[usize],
+    [one, several]: [&str; 2],
+    wanted: &str,
+    choices: impl FnOnce() -> String,
+) -> Result<usize, (String, String)> {
+    match found {
+        [index] => Ok(*index),
+        [] => Err((format!("has no {one} {wanted}"), format!("its {several} are {}", choices()))),
+        [first, second, ..] => {
+            let help = format!("pick one by its number: `column = {}` or {}", first + 1, second + 1);
+            Err((format!("has several {several} {wanted}"), help))
+        }
+    }
 }
 
 /// A name in a message, in quotes.

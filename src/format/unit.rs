@@ -5,6 +5,9 @@
 const LIGHT_SPEED: f64 = 299_792_458.0;
 const PLANCK_EV: f64 = 6.626_070_15e-34 / 1.602_176_634e-19;
 
+/// Wavelengths all below this are those of nobody's optics in nm, and of everybody's in um.
+pub const MICROMETRES_BELOW: f64 = 100.0;
+
 /// Dimensions that units are made of. Counts of things (photons, molecules) are dimensions, so that they never cancel against
 /// anything else.
 const DIMENSIONS: usize = 9;

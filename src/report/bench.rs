@@ -99,7 +99,7 @@ pub const CSV_HEADER: &str = "part,scene,evaluator,kernels,channels,pool,paths_p
 
 impl Report {
     pub fn csv(&self) -> String {
-        let mut table = Table::new(&CSV_HEADER.split(',').collect::<Vec<_>>());
+        let mut table = Table::new(CSV_HEADER.split(','));
         for row in &self.rows {
             let [slowest, fastest] = row.rates.range();
             let micro = |s: f64| format!("{:.5}", 1e6 * s);

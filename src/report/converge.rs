@@ -112,7 +112,7 @@ pub const CSV_HEADER: &str = "curve,channels,samples_per_pixel,seconds,group_nm,
 impl Report {
     /// One row a curve, epoch and group of channels.
     pub fn csv(&self) -> String {
-        let mut table = Table::new(&CSV_HEADER.split(',').collect::<Vec<_>>());
+        let mut table = Table::new(CSV_HEADER.split(','));
         for curve in &self.curves {
             for (group, members) in curve.groups() {
                 for p in &curve.points {

@@ -4,7 +4,8 @@ use super::decode::{Fields, Item};
 use super::keys;
 use super::spectrum::report_in_file;
 use crate::format::response::{self, Responses};
-use crate::spectral::{Channels, Response};
+use crate::format::unit;
+use crate::spectral::{self, Channels, Response};
 
 /// The most channels a cube may have; far beyond the 5,000 that are meant to be used.
 const MAX_CHANNELS: u32 = 65_536;
@@ -13,8 +14,6 @@ const MAX_NM: f64 = 1e6;
 /// nm; the range that Spectile is made and tested for.
 const SHORTEST: f64 = 380.0;
 const LONGEST: f64 = 20_000.0;
-/// Wavelengths below this are those of nobody's optics in nm, and of everybody's in um.
-const MICROMETRES: f64 = 100.0;
 const WAVELENGTHS: &str = "greater than 0 and at most 1000000 (nm)";
 
 pub fn decode(item: &Item) -> Option<Channels> {
@@ -54,9 +53,9 @@ fn warn_of_far_channels(kind: &Item, channels: &Channels) {
         None => channels.bounds[*k][0] < SHORTEST || channels.bounds[*k][1] > LONGEST,
     };
     let found: Vec<[f64; 2]> = (0..channels.len()).filter(far).map(|k| channels.bounds[k]).collect();
-    let Some(hull) = found.iter().copied().reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]) else { return };
+    let Some(hull) = spectral::hull(found.iter().copied()) else { return };
     let all = channels.bounds.iter().flatten().copied();
-    let hint = if all.fold(0.0, f64::max) < MICROMETRES {
+    let hint = if all.fold(0.0, f64::max) < unit::MICROMETRES_BELOW {
         "; the numbers look like micrometres, of which one is 1000 nm"
     } else {
         ""

@@ -6,7 +6,7 @@ use glam::DVec3;
 use super::{
     Bsdf, Environment, Light, Material, Mesh, Object, Projection, Scene, Shape, Sides, Temperature, Texels, TextureId,
 };
-use crate::spectral::{Curve, Outside};
+use crate::spectral::{self, Curve, Outside};
 
 /// A source, and whether it sends anything at all in a channel.
 struct Source {
@@ -33,8 +33,8 @@ pub fn warnings(scene: &Scene) -> Vec<String> {
 /// The wavelengths from the first to the last of some channels, in words.
 fn hull(scene: &Scene, of: impl Fn(usize) -> bool) -> String {
     let bounds = scene.channels.bounds.iter().enumerate().filter(|(k, _)| of(*k)).map(|(_, bounds)| *bounds);
-    let all = bounds.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).unwrap_or_default();
-    format!("{} and {} nm", all[0], all[1])
+    let [first, last] = spectral::hull(bounds).unwrap_or_default();
+    format!("{first} and {last} nm")
 }
 
 fn sources(scene: &Scene) -> Vec<Source> {

@@ -14,7 +14,7 @@ use crate::format::noise::{self, Range};
 use crate::format::refractive;
 use crate::format::text::{self, Column, SpectrumTable};
 use crate::format::unit::{Density, Kind, Meaning, Stated, Unit};
-use crate::spectral::{Channels, Curve, Outside, upsample};
+use crate::spectral::{Channels, Curve, Outside, hull, upsample};
 
 /// Wavelengths, in nm, far beyond any channel, between which a curve's peak is looked for.
 const SHORTEST: f64 = 1e-3;
@@ -232,7 +232,7 @@ impl<'a> Spectra<'a> {
     /// Decodes `[spectra]`. `channels` decide what a table leaves uncovered.
     pub fn new(cx: &'a Context<'a>, item: Option<Item<'a>>, channels: Option<Channels>) -> Self {
         let items = item.and_then(|item| item.named_items()).unwrap_or_default();
-        let needed = channels.as_ref().and_then(hull);
+        let needed = channels.as_ref().and_then(Channels::hull);
         let define = |(name, item): (&'a str, Item<'a>)| match item.node.value {
             Value::String(_) => {
                 item.error_help(
@@ -598,7 +598,7 @@ impl<'a> Spectra<'a> {
     }
 
     fn channel_hull(&self) -> Option<[f64; 2]> {
-        self.channels.as_ref().and_then(hull)
+        self.channels.as_ref().and_then(Channels::hull)
     }
 
     /// The nodes of a table that the channels see: those between their ends, and one beyond either.
@@ -612,12 +612,9 @@ impl<'a> Spectra<'a> {
     /// The parts of the channels below `first` and above `last` nm, in words.
     pub fn uncovered(&self, first: f64, last: f64) -> Option<String> {
         let bounds = &self.channels.as_ref()?.bounds;
-        let hull = |parts: &mut dyn Iterator<Item = [f64; 2]>| {
-            parts.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).map(|[a, b]| format!("{a}-{b} nm"))
-        };
-        let below = hull(&mut bounds.iter().filter(|b| b[0] < first).map(|b| [b[0], b[1].min(first)]));
-        let above = hull(&mut bounds.iter().filter(|b| b[1] > last).map(|b| [b[0].max(last), b[1]]));
-        let gaps: Vec<String> = [below, above].into_iter().flatten().collect();
+        let below = hull(bounds.iter().filter(|b| b[0] < first).map(|b| [b[0], b[1].min(first)]));
+        let above = hull(bounds.iter().filter(|b| b[1] > last).map(|b| [b[0].max(last), b[1]]));
+        let gaps: Vec<String> = [below, above].into_iter().flatten().map(|[a, b]| format!("{a}-{b} nm")).collect();
         (!gaps.is_empty()).then(|| gaps.join(" and "))
     }
 }
@@ -625,11 +622,6 @@ impl<'a> Spectra<'a> {
 /// A value as it is written, with what it is multiplied by.
 fn scaled_words(value: f64, scale: f64) -> String {
     if scale == 1.0 { value.to_string() } else { format!("{value} x scale {scale}") }
-}
-
-/// From the shortest to the longest wavelength of all channels, nm.
-fn hull(channels: &Channels) -> Option<[f64; 2]> {
-    channels.bounds.iter().copied().reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
 }
 
 /// A spectrum written as a number or a table. Of an index, what the wavelengths `needed` see has to be sound.

@@ -126,6 +126,11 @@ impl From<Response> for Nodes {
     }
 }
 
+/// From the shortest to the longest wavelength of some intervals, nm; `None` if there are none.
+pub fn hull(bounds: impl Iterator<Item = [f64; 2]>) -> Option<[f64; 2]> {
+    bounds.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
+}
+
 impl Channels {
     /// The number of channels, K.
     pub fn len(&self) -> usize {
@@ -134,6 +139,11 @@ impl Channels {
 
     pub fn is_empty(&self) -> bool {
         self.bounds.is_empty()
+    }
+
+    /// From the shortest to the longest wavelength of all channels, nm; `None` if there are none.
+    pub fn hull(&self) -> Option<[f64; 2]> {
+        hull(self.bounds.iter().copied())
     }
 
     /// Centre of channel `k` in nm: the middle of its interval, or the centroid of its response.

@@ -15,5 +15,5 @@ pub mod tone;
 pub mod upsample;
 pub mod warp;
 
-pub use channels::{Channels, Response};
+pub use channels::{Channels, Response, hull};
 pub use curve::{Curve, Outside};

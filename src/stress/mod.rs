@@ -138,7 +138,7 @@ pub fn facts(case: &Case, outcome: &Outcome) -> Value {
 
 /// The report as CSV: one row a check.
 pub fn csv(outcomes: &[(Case, Outcome)]) -> String {
-    let mut table = Table::new(&STRESS_CSV_HEADER.split(',').collect::<Vec<_>>());
+    let mut table = Table::new(STRESS_CSV_HEADER.split(','));
     for (case, outcome) in outcomes {
         for c in &outcome.checks {
             let numbers = [c.expected, c.got, c.got - c.expected, c.bound, c.standard_error];

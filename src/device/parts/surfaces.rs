@@ -620,8 +620,7 @@ pub(super) fn texture_records(texture: &Texture) -> u32 {
 
 /// The wavelength in µm, linear in every channel.
 pub(super) fn wavelength(scene: &Scene) -> Needed {
-    let bounds = scene.channels.bounds.iter().flatten();
-    let [low, high] = bounds.fold([f64::INFINITY, 0.0f64], |[low, high], &nm| [low.min(nm), high.max(nm)]);
+    let [low, high] = scene.channels.hull().expect("a scene has channels");
     let curve = Curve::Linear { nm: vec![low, high], value: vec![low * 1e-3, high * 1e-3], outside: Outside::Hold };
     Needed::Exact("wavelength".into(), curve)
 }

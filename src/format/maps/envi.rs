@@ -46,12 +46,7 @@ pub fn read(path: &Path, data: Option<&Path>) -> Result<Map, Box<Problem>> {
     if good.is_empty() {
         return Err(header.problem("bbl", "calls every band bad"));
     }
-    if good.len() < header.bands {
-        warnings.push(format!(
-            "has {} bands that its `bbl` calls bad: they are left out, and bridged by their neighbours",
-            header.bands - good.len()
-        ));
-    }
+    warnings.extend(header.bad_bands());
     let mut planes = vec![Vec::with_capacity(header.samples * header.lines); good.len()];
     for (&band, plane) in good.iter().zip(&mut planes) {
         for (line, sample) in (0..header.lines).flat_map(|line| (0..header.samples).map(move |sample| (line, sample))) {
