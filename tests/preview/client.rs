@@ -5,6 +5,7 @@ use std::net::{SocketAddr, TcpStream};
 use std::path::Path;
 use std::process::{Child, Stdio};
 use std::sync::Arc;
+use std::time::Duration;
 
 use serde_json::Value;
 use spectile::cube::Cube;
@@ -161,9 +162,15 @@ impl Running {
         get(self.address, "/api/status").json()
     }
 
-    /// Waits until the status is `such`.
+    /// Waits until the status is `such`; the server answers 200 requests a second, so asks less often.
     pub fn until(&self, such: impl Fn(&Value) -> bool) -> Value {
-        wait_for("another status", || Some(self.status()).filter(&such))
+        wait_for("another status", || {
+            let status = Some(self.status()).filter(&such);
+            if status.is_none() {
+                std::thread::sleep(Duration::from_millis(20));
+            }
+            status
+        })
     }
 
     pub fn control(&self, what: &str) -> u16 {
