@@ -13,11 +13,13 @@ that said that this machine lacks what they need. Needs nothing but Python 3.9.
 import argparse
 import atexit
 import collections
+import contextlib
 import json
 import os
 import pathlib
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -128,6 +130,32 @@ def told(test):
     return f"{test.seconds:7.1f} s  {', '.join(parts)}".rstrip()
 
 
+class Process(subprocess.Popen):
+    """A program of tests, and whatever it starts: a render that its test did not live to end is ended with it."""
+
+    all, lock = set(), threading.Lock()
+
+    def __init__(self, command, **options):
+        with Process.lock:
+            super().__init__(command, cwd=ROOT, stdin=subprocess.DEVNULL, start_new_session=True, **options)
+            Process.all.add(self)
+
+    def end(self):
+        with Process.lock:
+            Process.all.discard(self)
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self.pid, signal.SIGKILL)
+
+    @staticmethod
+    def end_all(number, _frame):
+        for process in list(Process.all):
+            process.end()
+        # The threads that wait for them are not waited for.
+        if tempfile.tempdir:
+            shutil.rmtree(tempfile.tempdir, ignore_errors=True)
+        os._exit(128 + number)
+
+
 def run_by_name(job, output, report):
     """Runs the tests of a job in one process, and in another what that one took with it when it died."""
     left = collections.OrderedDict((test.name, test) for test in job.tests)
@@ -137,10 +165,8 @@ def run_by_name(job, output, report):
         if full:
             environment["SPECTILE_FULL"] = "1"
         errors = tempfile.TemporaryFile("w+", errors="replace")
-        process = subprocess.Popen(
-            command, cwd=ROOT, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=errors, env=environment
-        )
-        hung = threading.Timer(PATIENCE_S, process.kill)
+        process = Process(command, stdout=subprocess.PIPE, stderr=errors, env=environment)
+        hung = threading.Timer(PATIENCE_S, process.end)
         hung.start()
         # With one thread a name comes when its test begins, and its result when it ends.
         current, began, text = None, time.monotonic(), ""
@@ -158,6 +184,7 @@ def run_by_name(job, output, report):
                 current = None
         process.wait()
         hung.cancel()
+        process.end()
         errors.seek(0)
         output.append(errors.read())
         if not left:
@@ -173,10 +200,9 @@ def run_by_name(job, output, report):
 def run_alone(job, output, report):
     [test] = job.tests
     began = time.monotonic()
-    process = subprocess.run(
-        [job.executable], cwd=ROOT, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
-    )
-    output.append(process.stdout.decode(errors="replace"))
+    process = Process([job.executable], stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    output.append(process.communicate()[0].decode(errors="replace"))
+    process.end()
     test.seconds, test.result = time.monotonic() - began, "ok" if process.returncode == 0 else "failed"
     finish(test, report)
 
@@ -256,6 +282,8 @@ def main():
         tempfile.tempdir = os.environ["TMPDIR"] = tempfile.mkdtemp(prefix="spectile-tests-", dir=memory)
         atexit.register(shutil.rmtree, tempfile.tempdir, ignore_errors=True)
 
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, Process.end_all)
     began = time.monotonic()
     programs = build()
     built = time.monotonic()

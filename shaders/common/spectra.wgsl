@@ -45,13 +45,7 @@ fn spectrum_value(spectrum: u32, quad: u32, s: SpectralSample) -> vec4<f32> {
     if (spectrum < SPECTRA) {
         return table_value(spectrum, quad, s);
     }
-    let k = spectrum - SPECTRA;
-    return vec4<f32>(
-        knot_value(k, 4u * quad, s.mu),
-        knot_value(k, 4u * quad + 1u, s.mu),
-        knot_value(k, 4u * quad + 2u, s.mu),
-        knot_value(k, 4u * quad + 3u, s.mu),
-    );
+    return between_knots(spectrum - SPECTRA, quad, s.mu);
 }
 #else
 fn spectrum_value(spectrum: u32, quad: u32, s: SpectralSample) -> vec4<f32> {

@@ -13,7 +13,7 @@ use crate::device::example::with_everything;
 use crate::files::shown;
 use crate::gpu::adapter::{Gpu, Selection};
 use crate::render::interrupt::Interrupt;
-use crate::report::bench::{Frames, Part, Report, Row};
+use crate::report::bench::{Frames, Report, Row, Section};
 use crate::report::throughput::{Trial, frames, measure};
 use crate::report::{Circumstances, make_folder, write};
 use crate::scene::{self, Evaluator, Scene};
@@ -86,7 +86,7 @@ const SIDE: u32 = 512;
 
 /// Something to measure by turns: evaluators of a scene, or its kernels.
 struct Step<'a> {
-    part: Part,
+    part: Section,
     file: &'a Path,
     channels: u32,
     pool: Option<u32>,
@@ -118,8 +118,8 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     for step in steps(args, &files) {
         let name = name_of(step.file);
         let what = match (step.part, step.pool) {
-            (Part::Pool, Some(pool)) => format!("{name}, {} channels, {pool} paths at a time", step.channels),
-            (Part::LeftOut, _) => format!("{name}, its own kernels and all of them"),
+            (Section::Pool, Some(pool)) => format!("{name}, {} channels, {pool} paths at a time", step.channels),
+            (Section::LeftOut, _) => format!("{name}, its own kernels and all of them"),
             _ => format!("{name}, {} channels", step.channels),
         };
         interrupt.check()?;
@@ -163,9 +163,9 @@ fn load(file: &Path, side: u32, channels: u32) -> Result<Scene> {
 /// What is measured, in an order that has something of every scene early.
 fn steps<'a>(args: &Args, files: &'a [PathBuf]) -> Vec<Step<'a>> {
     let each = |part, channels, pool| files.iter().map(move |file| Step { part, file, channels, pool });
-    let by_channels = args.channels.iter().flat_map(|&channels| each(Part::Channels, channels, None));
-    let by_pool = args.pools.iter().flat_map(|&pool| each(Part::Pool, CHANNELS, Some(pool)));
-    by_channels.chain(each(Part::LeftOut, CHANNELS, None)).chain(by_pool).collect()
+    let by_channels = args.channels.iter().flat_map(|&channels| each(Section::Channels, channels, None));
+    let by_pool = args.pools.iter().flat_map(|&pool| each(Section::Pool, CHANNELS, Some(pool)));
+    by_channels.chain(each(Section::LeftOut, CHANNELS, None)).chain(by_pool).collect()
 }
 
 fn measure_step(
@@ -183,7 +183,7 @@ fn measure_step(
         (evaluator, everything, scene)
     };
     let ways: Vec<_> = match step.part {
-        Part::LeftOut => [false, true].map(|everything| with(Evaluator::DpeptPixel, everything)).into(),
+        Section::LeftOut => [false, true].map(|everything| with(Evaluator::DpeptPixel, everything)).into(),
         _ => args.evaluators.iter().map(|&evaluator| with(evaluator, false)).collect(),
     };
     let (mut trials, mut measured) = (Vec::new(), Vec::new());

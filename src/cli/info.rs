@@ -55,7 +55,7 @@ pub struct Args {
 }
 
 /// Epochs below which an error estimate is only rough: it is itself one from so few values.
-const ROUGH_BELOW: u32 = 8;
+pub(super) const ROUGH_BELOW: u32 = 8;
 
 pub fn run(args: &Args, output: &Output) -> Result<()> {
     if args.watch {

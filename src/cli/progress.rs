@@ -7,6 +7,7 @@ use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::{Value, json};
 
 use super::Output;
+use super::info::ROUGH_BELOW;
 use super::output::say;
 use crate::cube::{Cube, Existing, Progress, reduction};
 use crate::files::{format_bytes, shown};
@@ -16,8 +17,6 @@ use crate::render::plan;
 use crate::render::schedule::{Event, PREVIEW_PIXELS, Summary};
 use crate::{Error, Result};
 
-/// Epochs below which an error estimate is only rough: it is itself one from so few values.
-const ROUGH_BELOW: u32 = 8;
 /// Without a bar: lines about an epoch come at most this often, and some line at least this often.
 const LINE_EVERY: Duration = Duration::from_secs(1);
 const LINE_AT_LEAST_EVERY: Duration = Duration::from_secs(10);

@@ -1,7 +1,7 @@
 //! The journal of a tile: what its files must be, one fixed-size record for every commit.
 //!
 //! A record, little-endian: magic, tile, K, samples per pixel, index of the last epoch merged, suffix of the files aside,
-//! five 128-bit checksums (one per [`Part`], zero for one that the cube has not), per channel Σ M2 and Σ mean² for the error estimate, and the
+//! five 128-bit checksums (one per [`TileArray`], zero for one that the cube has not), per channel Σ M2 and Σ mean² for the error estimate, and the
 //! checksum of all that. Checksums are XXH3 (Y. Collet, xxHash), which finds damage and is no protection against intent.
 
 use std::fs::{self, File, OpenOptions};
@@ -10,11 +10,11 @@ use std::path::PathBuf;
 
 use super::checksums;
 use super::faults::step;
-use super::store::{Cube, Part};
+use super::store::{Cube, TileArray};
 use crate::{Error, Result, files};
 
 const MAGIC: [u8; 8] = *b"SPTJRNL1";
-const HEAD_BYTES: usize = 32 + 16 * Part::ALL.len();
+const HEAD_BYTES: usize = 32 + 16 * TileArray::ALL.len();
 /// A journal that is this long is written anew with its last record only, so that it stays small beside its tile.
 const MAX_RECORDS: u64 = 16;
 /// The most that a journal takes.
@@ -31,8 +31,8 @@ pub(super) struct Record {
     pub epoch: u32,
     /// The name that the files had aside; no two commits have the same.
     pub suffix: u64,
-    /// Of the tile's files, in the order of [`Part::ALL`].
-    pub checksums: [u128; Part::ALL.len()],
+    /// Of the tile's files, in the order of [`TileArray::ALL`].
+    pub checksums: [u128; TileArray::ALL.len()],
     /// Per channel: Σ over pixels of Welford's M2 = Σ (epoch mean - mean)² over the epochs so far.
     pub spread: Vec<f64>,
     /// Per channel: Σ over pixels of mean².

@@ -52,7 +52,7 @@ pub fn merge_bytes(header: &super::Header) -> u64 {
 
 /// One pass over the pixels of a unit, in the order of the file: the new chunk streams out, and all that is derived from it is
 /// gathered.
-pub(super) struct Fold<'a> {
+pub(super) struct UnitPass<'a> {
     grid: Grid,
     rect: Rect,
     channels: usize,
@@ -69,10 +69,10 @@ pub(super) struct Fold<'a> {
     pub overview: Vec<f32>,
 }
 
-impl<'a> Fold<'a> {
+impl<'a> UnitPass<'a> {
     pub fn new(grid: Grid, rect: Rect, channels: usize, projection: &'a Projection) -> Self {
         let [blocks_x, blocks_y] = grid.tile_blocks().map(|n| n as usize);
-        Fold {
+        UnitPass {
             grid,
             rect,
             channels,

@@ -451,7 +451,7 @@ fn structure_attributes(attributes: &mut Map<String, Value>) {
 
 /// Whether the files of an array are read and written as they are.
 pub(super) fn is_raw(name: &str) -> bool {
-    super::store::Part::ALL.iter().any(|part| part.name() == name)
+    super::store::TileArray::ALL.iter().any(|part| part.name() == name)
 }
 
 /// Whether the files of an array hold the same in both descriptions.

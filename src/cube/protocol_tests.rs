@@ -11,7 +11,7 @@ use std::process::{Command, ExitStatus};
 
 use super::faults::injected::{DIE, FULL, LOG};
 use super::journal::Journal;
-use super::store::Part;
+use super::store::TileArray;
 use super::*;
 use crate::cube_files::{Files, files};
 use crate::spectral::Channels;
@@ -267,7 +267,7 @@ fn power_may_be_cut_between_any_two_steps() {
         } else if last("file in place").is_some() && last("folder synced").is_none() {
             for tile in 0..TILES {
                 let suffix = Journal::of(&cube, tile).last().expect("read").expect("a record").suffix;
-                for part in Part::ALL {
+                for part in TileArray::ALL {
                     let (target, aside) = (cube.part_path(part, tile), cube.aside_path(part, tile, suffix));
                     let old = bench.base().join(target.strip_prefix(&path).expect("inside"));
                     if !aside.exists() && chance.below(2) == 0 {
@@ -293,7 +293,7 @@ fn damaged_files_are_found_and_made_anew() {
     let mut chance = Chance(7);
     let cube = Cube::open(&bench.base()).expect("a cube");
     let of_tile = |tile: u32| {
-        let parts = Part::ALL.map(|part| cube.part_path(part, tile));
+        let parts = TileArray::ALL.map(|part| cube.part_path(part, tile));
         parts.into_iter().chain([cube.journal_folder().join(tile.to_string())])
     };
     for file in (0..TILES).flat_map(of_tile) {

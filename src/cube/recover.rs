@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 use super::checksums;
 use super::faults::step;
 use super::journal::{Journal, Record};
-use super::merge::Fold;
-use super::store::{Cube, Part};
+use super::merge::UnitPass;
+use super::store::{Cube, TileArray};
 use super::writer::{sync_folders, take_place};
 use crate::{Error, Result, files};
 
@@ -150,20 +150,20 @@ pub(super) fn checksum_of(path: &Path) -> Option<u128> {
 }
 
 /// Makes derived files of a tile from its radiance.
-fn rebuild(cube: &Cube, record: &Record, parts: &[Part], folders: &mut BTreeSet<PathBuf>) -> Result<()> {
+fn rebuild(cube: &Cube, record: &Record, parts: &[TileArray], folders: &mut BTreeSet<PathBuf>) -> Result<()> {
     let (grid, tile) = (cube.grid(), record.tile);
     let chunk =
-        cube.chunk(tile)?.ok_or_else(|| Error::storage(&cube.part_path(Part::Radiance, tile), "has vanished"))?;
-    let mut fold = Fold::new(grid, grid.rect(tile), cube.channels().len(), cube.projection());
-    fold.run(None, chunk.values(), cube.layout(), 1.0, &mut std::io::sink())
+        cube.chunk(tile)?.ok_or_else(|| Error::storage(&cube.part_path(TileArray::Radiance, tile), "has vanished"))?;
+    let mut pass = UnitPass::new(grid, grid.rect(tile), cube.channels().len(), cube.projection());
+    pass.run(None, chunk.values(), cube.layout(), 1.0, &mut std::io::sink())
         .map_err(|error| Error::storage(cube.path(), error))?;
     for &part in parts {
         let samples = record.samples.to_le_bytes();
         let bytes: &[u8] = match part {
-            Part::Radiance | Part::StandardError => continue,
-            Part::Samples => &samples,
-            Part::Preview => bytemuck::cast_slice(&fold.preview),
-            Part::Overview => bytemuck::cast_slice(&fold.overview),
+            TileArray::Radiance | TileArray::StandardError => continue,
+            TileArray::Samples => &samples,
+            TileArray::Preview => bytemuck::cast_slice(&pass.preview),
+            TileArray::Overview => bytemuck::cast_slice(&pass.overview),
         };
         if checksums::of(bytes) != record.checksums[part as usize] {
             let what = format!("`{}` of tile {tile}, made anew, is not what it was", part.name());

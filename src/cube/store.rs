@@ -27,7 +27,7 @@ pub(super) const JOURNALS: &str = "journal";
 
 /// The arrays that each tile has a file of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Part {
+pub(super) enum TileArray {
     Radiance,
     Samples,
     Preview,
@@ -36,22 +36,23 @@ pub(super) enum Part {
     StandardError,
 }
 
-impl Part {
+impl TileArray {
     /// In the order in which they are written and take their places.
-    pub const ALL: [Part; 5] = [Part::Radiance, Part::Samples, Part::Preview, Part::Overview, Part::StandardError];
+    pub const ALL: [TileArray; 5] =
+        [TileArray::Radiance, TileArray::Samples, TileArray::Preview, TileArray::Overview, TileArray::StandardError];
 
     /// Whether it can be made from the radiance anew.
     pub fn is_derived(self) -> bool {
-        !matches!(self, Part::Radiance | Part::StandardError)
+        !matches!(self, TileArray::Radiance | TileArray::StandardError)
     }
 
     pub fn name(self) -> &'static str {
         match self {
-            Part::Radiance => "radiance",
-            Part::Samples => "samples",
-            Part::Preview => "preview",
-            Part::Overview => "overview",
-            Part::StandardError => "standard_error",
+            TileArray::Radiance => "radiance",
+            TileArray::Samples => "samples",
+            TileArray::Preview => "preview",
+            TileArray::Overview => "overview",
+            TileArray::StandardError => "standard_error",
         }
     }
 }
@@ -192,8 +193,8 @@ impl Cube {
     /// Samples per pixel merged into a tile so far.
     pub fn samples(&self, tile: u32) -> Result<u32> {
         let mut bytes = Vec::new();
-        if let Some(mut file) = self.open_part(Part::Samples, tile)? {
-            let path = self.part_path(Part::Samples, tile);
+        if let Some(mut file) = self.open_part(TileArray::Samples, tile)? {
+            let path = self.part_path(TileArray::Samples, tile);
             file.read_to_end(&mut bytes).map_err(|error| Error::storage(&path, error))?;
             let bytes = bytes.try_into().map_err(|_| Error::storage(&path, "is damaged: not 4 bytes long"))?;
             return Ok(u32::from_le_bytes(bytes));
@@ -203,7 +204,7 @@ impl Cube {
 
     /// The file of a tile in one of the arrays, as the last commit left it; `None` before the tile's first unit. One that is
     /// gone although the tile is known to have been rendered is an error.
-    pub(super) fn open_part(&self, part: Part, tile: u32) -> Result<Option<File>> {
+    pub(super) fn open_part(&self, part: TileArray, tile: u32) -> Result<Option<File>> {
         let path = self.part_path(part, tile);
         let open = |path: &Path| match File::open(path) {
             Ok(file) => Ok(Some(file)),
@@ -214,12 +215,12 @@ impl Cube {
             return Ok(Some(file));
         }
         let journal = Journal::of(self, tile);
-        let is_orphan = || self.origin == Origin::Copy && self.part_path(Part::Radiance, tile).exists();
+        let is_orphan = || self.origin == Origin::Copy && self.part_path(TileArray::Radiance, tile).exists();
         let witness = match part {
-            Part::Samples if journal.last()?.is_some() => "its journal",
-            Part::Samples if is_orphan() => "`radiance`",
-            Part::Samples => return Ok(None),
-            _ if self.open_part(Part::Samples, tile)?.is_none() => return Ok(None),
+            TileArray::Samples if journal.last()?.is_some() => "its journal",
+            TileArray::Samples if is_orphan() => "`radiance`",
+            TileArray::Samples => return Ok(None),
+            _ if self.open_part(TileArray::Samples, tile)?.is_none() => return Ok(None),
             _ => "`samples`",
         };
         // The files of a commit take their places one after the other, and whoever did that may have been killed: the rest
@@ -264,19 +265,19 @@ impl Cube {
 
     /// The radiance of a tile, mapped into memory; `None` before its first unit.
     pub fn chunk(&self, tile: u32) -> Result<Option<Chunk>> {
-        self.chunk_of(Part::Radiance, tile)
+        self.chunk_of(TileArray::Radiance, tile)
     }
 
     /// The standard errors of a tile, mapped into memory like [`Cube::chunk`]: NaN below two epochs. `None` before its
     /// first unit, and in cubes without them.
     pub fn error_chunk(&self, tile: u32) -> Result<Option<Chunk>> {
         match self.header.has_uncertainty() {
-            true => self.chunk_of(Part::StandardError, tile),
+            true => self.chunk_of(TileArray::StandardError, tile),
             false => Ok(None),
         }
     }
 
-    fn chunk_of(&self, part: Part, tile: u32) -> Result<Option<Chunk>> {
+    fn chunk_of(&self, part: TileArray, tile: u32) -> Result<Option<Chunk>> {
         let Some(file) = self.open_part(part, tile)? else { return Ok(None) };
         self.map(&file, &self.part_path(part, tile), tile).map(Some)
     }
@@ -296,22 +297,22 @@ impl Cube {
     }
 
     /// The parts that each tile of this cube has.
-    pub(super) fn parts(&self) -> &'static [Part] {
-        if self.header.has_uncertainty() { &Part::ALL } else { &Part::ALL[..4] }
+    pub(super) fn parts(&self) -> &'static [TileArray] {
+        if self.header.has_uncertainty() { &TileArray::ALL } else { &TileArray::ALL[..4] }
     }
 
     /// The K channels of the pixel in column `x` and row `y` from the top left, in one contiguous read; `None` before
     /// the first unit of its tile.
     pub fn spectrum(&self, x: u32, y: u32) -> Result<Option<Vec<f32>>> {
         self.check_pixel(x, y)?;
-        self.look().spectrum(x, y)
+        self.state().spectrum(x, y)
     }
 
     /// The standard errors of the pixel's channels, as [`Cube::spectrum`] gives their values; `None` also in cubes without
     /// them. NaN below two epochs.
     pub fn standard_error(&self, x: u32, y: u32) -> Result<Option<Vec<f32>>> {
         self.check_pixel(x, y)?;
-        self.look().standard_error(x, y)
+        self.state().standard_error(x, y)
     }
 
     fn check_pixel(&self, x: u32, y: u32) -> Result<()> {
@@ -380,18 +381,20 @@ impl Cube {
     }
 
     /// The file of a tile in one of the arrays.
-    pub(super) fn part_path(&self, part: Part, tile: u32) -> PathBuf {
+    pub(super) fn part_path(&self, part: TileArray, tile: u32) -> PathBuf {
         let [column, row] = self.grid().position(tile);
         let name = part.name();
         self.path.join(match part {
-            Part::Radiance | Part::Overview | Part::StandardError => format!("{name}/c/0/{row}/{column}"),
-            Part::Samples => format!("{name}/c/{row}/{column}"),
-            Part::Preview => format!("{name}/c/{row}/{column}/0"),
+            TileArray::Radiance | TileArray::Overview | TileArray::StandardError => {
+                format!("{name}/c/0/{row}/{column}")
+            }
+            TileArray::Samples => format!("{name}/c/{row}/{column}"),
+            TileArray::Preview => format!("{name}/c/{row}/{column}/0"),
         })
     }
 
     /// Where a file of a tile lies before it takes its place, under the suffix of its commit.
-    pub(super) fn aside_path(&self, part: Part, tile: u32, suffix: u64) -> PathBuf {
+    pub(super) fn aside_path(&self, part: TileArray, tile: u32, suffix: u64) -> PathBuf {
         self.aside_folder().join(format!("{tile}.{suffix:016x}.{}", part.name()))
     }
 }

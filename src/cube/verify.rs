@@ -9,7 +9,7 @@ use super::journal::{Journal, Record};
 use super::lock::TileLock;
 use super::recover::checksum_of;
 use super::restore;
-use super::store::{Cube, Origin, PRIVATE, Part};
+use super::store::{Cube, Origin, PRIVATE, TileArray};
 use crate::{Error, Result};
 
 /// What [`Cube::verify`] found.
@@ -83,7 +83,7 @@ impl Cube {
     }
 
     /// What is wrong with a file of a tile, if `last` is its journal's last record.
-    fn wrong(&self, part: Part, tile: u32, last: &Option<Record>) -> Option<String> {
+    fn wrong(&self, part: TileArray, tile: u32, last: &Option<Record>) -> Option<String> {
         let path = self.part_path(part, tile);
         let name = || path.strip_prefix(self.path()).unwrap_or(&path).display().to_string();
         let Some(record) = last else {

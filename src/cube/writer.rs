@@ -15,11 +15,11 @@ use super::estimate::Totals;
 use super::faults::step;
 use super::journal::{Journal, Record};
 use super::lock::TileLock;
-use super::look::Window;
 use super::map::Chunk;
-use super::merge::{Fold, check_portion, write_standard_errors};
+use super::merge::{UnitPass, check_portion, write_standard_errors};
 use super::metadata::{Header, Layout};
-use super::store::{Cube, Part};
+use super::state::Window;
+use super::store::{Cube, TileArray};
 use super::{recover, restore};
 use crate::spectral::tone::Picture;
 use crate::{Error, Result, files};
@@ -141,26 +141,26 @@ impl Writer {
     /// The error estimate of every channel over the tiles of this writer, units not committed yet included; see
     /// [`Cube::error_estimate`].
     pub fn error_estimate(&self) -> Vec<f64> {
-        self.state().totals.error_estimate()
+        self.lock().totals.error_estimate()
     }
 
     /// Whether every value merged so far is zero.
     pub fn is_dark(&self) -> bool {
-        self.state().totals.is_dark()
+        self.lock().totals.is_dark()
     }
 
     /// The preview with every unit merged so far; means of `factor` x `factor` pixels.
     pub fn preview(&self, factor: u32) -> Result<Picture> {
-        self.look().colour(self.cube.grid().whole(), factor).map(Window::into_picture)
+        self.state().colour(self.cube.grid().whole(), factor).map(Window::into_picture)
     }
 
     /// The suffix under which the files of a tile lie aside, if any do.
     pub(super) fn pending(&self, tile: u32) -> Option<u64> {
-        let state = self.state();
+        let state = self.lock();
         state.open.get(&tile).or_else(|| state.committing.get(&tile)).map(|pending| pending.record.suffix)
     }
 
-    fn state(&self) -> MutexGuard<'_, State> {
+    fn lock(&self) -> MutexGuard<'_, State> {
         // Every change of the state is one assignment or insertion, so a thread that died has left it whole.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -208,12 +208,12 @@ impl Writer {
         let samples = samples_after(n_before, n_unit, cube.header().epoch)?;
         let aside = Aside::new(cube, tile);
         let record = aside.write(base.as_ref(), samples, n_unit, unit)?;
-        let mapped = |part: Part| {
+        let mapped = |part: TileArray| {
             let path = aside.path(part);
             cube.mapped(&path, tile)?.ok_or_else(|| Error::storage(&path, "has vanished"))
         };
-        let chunk = mapped(Part::Radiance)?;
-        let errors = cube.header().has_uncertainty().then(|| mapped(Part::StandardError)).transpose()?;
+        let chunk = mapped(TileArray::Radiance)?;
+        let errors = cube.header().has_uncertainty().then(|| mapped(TileArray::StandardError)).transpose()?;
         self.insert(aside, base, record, chunk, errors);
         Ok(())
     }
@@ -225,14 +225,14 @@ impl Writer {
             let room = bytes < BATCH_BYTES && state.open.len() < BATCH_TILES;
             !(room || state.open.contains_key(&tile) || state.failed.is_some() || state.closed)
         };
-        let state = self.changed.wait_while(self.state(), full).unwrap_or_else(PoisonError::into_inner);
+        let state = self.changed.wait_while(self.lock(), full).unwrap_or_else(PoisonError::into_inner);
         state.check()?;
         if let Some(pending) = state.open.get(&tile).or_else(|| state.committing.get(&tile)) {
             return Ok(Some(Base::Pending(Arc::clone(pending))));
         }
         drop(state);
         let Some(record) = Journal::of(&self.cube, tile).last()? else { return Ok(None) };
-        let sound = |part: Part| {
+        let sound = |part: TileArray| {
             let path = self.cube.part_path(part, tile);
             let damaged = |what: &str| Error::storage(&path, format!("{what}; --resume puts it in order"));
             let chunk = self.cube.mapped(&path, tile)?;
@@ -242,14 +242,14 @@ impl Writer {
             }
             Ok(chunk)
         };
-        let chunk = sound(Part::Radiance)?;
-        let errors = self.cube.header().has_uncertainty().then(|| sound(Part::StandardError)).transpose()?;
+        let chunk = sound(TileArray::Radiance)?;
+        let errors = self.cube.header().has_uncertainty().then(|| sound(TileArray::StandardError)).transpose()?;
         Ok(Some(Base::Committed(Box::new(Committed { record, chunk, errors }))))
     }
 
     fn insert(&self, aside: Aside, base: Option<Base>, record: Record, chunk: Chunk, errors: Option<Chunk>) {
         let tile = record.tile;
-        let mut state = self.state();
+        let mut state = self.lock();
         let replaced = state.open.remove(&tile);
         // Whether the base was, or is being, committed decides what stands in the journal before this record.
         let previous = match (&base, &replaced) {
@@ -271,7 +271,7 @@ impl Writer {
     /// returns it too.
     pub fn commit_regularly(&self) -> Result<()> {
         loop {
-            let mut state = self.state();
+            let mut state = self.lock();
             loop {
                 if state.closed {
                     return Ok(());
@@ -290,20 +290,20 @@ impl Writer {
 
     /// Ends [`Writer::commit_regularly`], without a last commit.
     pub fn close(&self) {
-        self.state().closed = true;
+        self.lock().closed = true;
         self.changed.notify_all();
     }
 
     /// Commits everything merged so far.
     pub fn flush(&self) -> Result<()> {
         let _committing = self.committing.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut state = self.state();
+        let mut state = self.lock();
         state.check()?;
         let batch = std::mem::take(&mut state.open);
         state.committing = batch.clone();
         drop(state);
         let result = if batch.is_empty() { Ok(()) } else { self.commit(&batch) };
-        let mut state = self.state();
+        let mut state = self.lock();
         state.committing.clear();
         state.last_commit = Some(Instant::now());
         if let Err(Error::Storage { path, what }) = &result {
@@ -359,7 +359,7 @@ impl Writer {
 impl Drop for Writer {
     fn drop(&mut self) {
         // Left only by a render that ended with an error.
-        let left = std::mem::take(&mut self.state().open);
+        let left = std::mem::take(&mut self.lock().open);
         left.iter().for_each(|(&tile, pending)| remove_aside(&self.cube, tile, pending.record.suffix));
     }
 }
@@ -413,7 +413,7 @@ impl<'a> Aside<'a> {
         Aside { cube, tile, suffix: files::random_number(), kept: false }
     }
 
-    fn path(&self, part: Part) -> PathBuf {
+    fn path(&self, part: TileArray) -> PathBuf {
         self.cube.aside_path(part, self.tile, self.suffix)
     }
 
@@ -424,21 +424,21 @@ impl<'a> Aside<'a> {
     /// Writes the tile's new files and says what they are.
     fn write(&self, base: Option<&Base>, samples: u32, n_unit: u32, unit: &[f32]) -> Result<Record> {
         let (cube, tile) = (self.cube, self.tile);
-        let mut fold = Fold::new(cube.grid(), cube.grid().rect(tile), cube.channels().len(), cube.projection());
+        let mut pass = UnitPass::new(cube.grid(), cube.grid().rect(tile), cube.channels().len(), cube.projection());
         let weight = f64::from(n_unit) / f64::from(samples);
         let radiance =
-            self.file(Part::Radiance, |file| fold.run(base.map(Base::chunk), unit, Layout::Rows, weight, file))?;
-        if let Some(k) = fold.square.iter().position(|v| !v.is_finite()) {
+            self.file(TileArray::Radiance, |file| pass.run(base.map(Base::chunk), unit, Layout::Rows, weight, file))?;
+        if let Some(k) = pass.square.iter().position(|v| !v.is_finite()) {
             let what = format!("a unit of tile {tile} holds a value in channel {k} that is not finite");
             return Err(Error::Internal(what));
         }
-        let (spread, square) = fold.sums(base.map(Base::record), cube.header().epoch);
-        let samples_sum = self.file(Part::Samples, |file| file.write_all(&samples.to_le_bytes()))?;
-        let preview = self.file(Part::Preview, |file| file.write_all(bytemuck::cast_slice(&fold.preview)))?;
-        let overview = self.file(Part::Overview, |file| file.write_all(bytemuck::cast_slice(&fold.overview)))?;
+        let (spread, square) = pass.sums(base.map(Base::record), cube.header().epoch);
+        let samples_sum = self.file(TileArray::Samples, |file| file.write_all(&samples.to_le_bytes()))?;
+        let preview = self.file(TileArray::Preview, |file| file.write_all(bytemuck::cast_slice(&pass.preview)))?;
+        let overview = self.file(TileArray::Overview, |file| file.write_all(bytemuck::cast_slice(&pass.overview)))?;
         let errors = match cube.header().has_uncertainty() {
             false => 0,
-            true => self.file(Part::StandardError, |file| {
+            true => self.file(TileArray::StandardError, |file| {
                 let (grid, epochs) = (cube.grid(), samples / cube.header().epoch);
                 let old = base.and_then(|base| Some((base.chunk(), base.errors()?)));
                 write_standard_errors(grid, grid.rect(tile), cube.channels().len(), epochs, old, unit, file)
@@ -455,7 +455,7 @@ impl<'a> Aside<'a> {
         })
     }
 
-    fn file(&self, part: Part, write: impl FnOnce(&mut Summing<File>) -> std::io::Result<()>) -> Result<u128> {
+    fn file(&self, part: TileArray, write: impl FnOnce(&mut Summing<File>) -> std::io::Result<()>) -> Result<u128> {
         let path = self.path(part);
         let write = || {
             let mut file = Summing::new(File::create_new(&path)?);

@@ -7,9 +7,10 @@ use glam::{DVec3, Vec3A};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
+use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::cwbvh::CwBvh;
-use obvhs::cwbvh::builder::build_cwbvh;
 use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
+use obvhs::ploc::PlocBuilder;
 use obvhs::{Boundable, BvhBuildParams};
 
 use crate::device::words::{HAS_COORDINATES, HAS_NORMALS, NONE, Primitive};
@@ -227,6 +228,13 @@ impl Boundable for Primitive {
 /// Deeper trees are built anew: the traversal's stack grows with the depth.
 const MAX_DEPTH: usize = 30;
 
+/// How much boxes grow for the time of their clustering, of their longest side. Those of a tessellated wall have no thickness, and any
+/// two are together as large as any other two: a box of 130 x 130 quads a wall had 97 nodes opened a diffuse ray, with this 4.6. What
+/// is not flat has 1 % more to 7 % fewer (statues, conference room, aircraft).
+const PADDING: f32 = 0.01;
+/// So few are as well off without, and keep the order that they always had.
+const PADDED_FROM: usize = 100;
+
 /// Clustering takes quadratic time, and recursion as deep, over boxes that are the same: it merges one pair a round.
 const MAX_COINCIDENT: usize = 256;
 
@@ -236,13 +244,49 @@ fn build_nodes(primitives: &[Primitive]) -> (Vec<[u32; 20]>, Vec<u32>, u32) {
         return (vec![[0; 20]], Vec::new(), 1);
     }
     let clustered = (most_coincident(primitives) <= MAX_COINCIDENT)
-        .then(|| build_cwbvh(primitives, BvhBuildParams::medium_build(), &mut std::time::Duration::default()))
+        .then(|| clustered(primitives))
         // Nested boxes become chains instead of trees.
         .filter(|bvh| depth(bvh) <= MAX_DEPTH);
     let bvh = clustered.unwrap_or_else(|| bvh2_to_cwbvh(&balanced(primitives), 3, true, false));
     let nodes = bvh.nodes.iter().map(|node| bytemuck::cast(*node)).collect();
     let depth = depth(&bvh) as u32;
     (nodes, bvh.primitive_indices, depth)
+}
+
+/// A box that is clustered for another.
+struct Padded(Aabb);
+
+impl Boundable for Padded {
+    fn aabb(&self) -> Aabb {
+        self.0
+    }
+}
+
+/// As obvhs's `build_cwbvh`, but for what happens to the boxes meanwhile.
+fn clustered(primitives: &[Primitive]) -> CwBvh {
+    let settings = BvhBuildParams::medium_build();
+    let padding = if primitives.len() < PADDED_FROM { 0.0 } else { PADDING };
+    let padded = |primitive: &Primitive| {
+        let Aabb { min, max } = primitive.aabb();
+        let margin = Vec3A::splat(padding * (max - min).max_element());
+        Padded(Aabb { min: min - margin, max: max + margin })
+    };
+    let boxes: Vec<Padded> = primitives.iter().map(padded).collect();
+    let mut tree = PlocBuilder::with_capacity(boxes.len()).build(
+        settings.ploc_search_distance,
+        &boxes,
+        (0..boxes.len() as u32).collect(),
+        settings.sort_precision,
+        settings.search_depth_threshold,
+    );
+    ReinsertionOptimizer::default().run(&mut tree, settings.reinsertion_batch_ratio, None);
+    for node in tree.nodes.iter_mut().filter(|node| node.is_leaf()) {
+        let own = node.first_index as usize..(node.first_index + node.prim_count) as usize;
+        let own = tree.primitive_indices[own].iter().map(|&i| primitives[i as usize].aabb());
+        node.set_aabb(own.fold(Aabb::INVALID, |all, one| all.union(&one)));
+    }
+    tree.refit_all();
+    bvh2_to_cwbvh(&tree, settings.max_prims_per_leaf.clamp(1, 3), true, false)
 }
 
 /// The largest number of primitives that share one bounding box (by hashes: a collision may only overstate it).
@@ -301,7 +345,12 @@ fn balanced(primitives: &[Primitive]) -> Bvh2 {
 
 #[cfg(test)]
 mod tests {
+    use glam::UVec2;
+    use obvhs::ray::Ray;
+    use obvhs::traverse;
+
     use super::*;
+    use crate::device::rng::hash;
 
     fn triangle(a: [f32; 3], b: [f32; 3], c: [f32; 3]) -> Primitive {
         Primitive { a, b, c, ..Primitive::default() }
@@ -338,5 +387,51 @@ mod tests {
             assert!(depth(&bvh) <= MAX_DEPTH);
         }
         assert_eq!(build_nodes(&[]).0, vec![[0; 20]]);
+    }
+
+    /// A room whose walls are cut into 60 x 60 quads each: a ray from anywhere in it opens few nodes on its way to a wall.
+    #[test]
+    fn tessellated_walls_are_found_in_few_nodes() {
+        const QUADS: usize = 60;
+        let mut walls = Vec::new();
+        for (axis, at) in (0..3).flat_map(|axis| [(axis, -1.0), (axis, 1.0)]) {
+            let corner = |i: usize, j: usize| {
+                let [u, v] = [i, j].map(|n| 2.0 * n as f32 / QUADS as f32 - 1.0);
+                let mut point = [at; 3];
+                (point[(axis + 1) % 3], point[(axis + 2) % 3]) = (u, v);
+                point
+            };
+            for (i, j) in (0..QUADS).flat_map(|i| (0..QUADS).map(move |j| (i, j))) {
+                let [a, b, c, d] = [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
+                walls.extend([triangle(a, b, c), triangle(a, c, d)]);
+            }
+        }
+        let (nodes, primitive_indices, _) = build_nodes(&walls);
+        let nodes = nodes.into_iter().map(bytemuck::cast).collect();
+        let bvh = CwBvh { nodes, primitive_indices, ..CwBvh::default() };
+        const RAYS: u32 = 2_000;
+        let mut opened = 0;
+        for i in 0..RAYS {
+            let number = |j: u32| hash(8 * i + j) as f32 / 2_147_483_648.0 - 1.0;
+            let origin = 0.999 * Vec3A::new(number(0), number(1), number(2));
+            let direction = Vec3A::new(number(3), number(4), number(5)).normalize();
+            let walls = (direction.signum() - origin) / direction;
+            let ray = Ray::new(origin, direction, 0.0, walls.min_element());
+            let mut state = bvh.new_traversal(direction);
+            let mut node;
+            traverse!(
+                bvh,
+                node,
+                state,
+                {
+                    opened += 1;
+                    node.intersect_ray(&ray, state.oct_inv4)
+                },
+                {}
+            );
+        }
+        let mean = f64::from(opened) / f64::from(RAYS);
+        println!("{mean} nodes a ray");
+        assert!(mean < 6.0, "{mean} nodes a ray");
     }
 }

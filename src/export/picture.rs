@@ -88,7 +88,7 @@ impl<'a> Rows<'a> {
     fn read(&mut self, rect: Rect) -> Result<()> {
         let Rows { view, shown, reader, weights, temperature, values, .. } = self;
         if **shown == Shown::Preview {
-            *values = view.cube().look().colour(rect, 1)?.values;
+            *values = view.cube().state().colour(rect, 1)?.values;
             return Ok(());
         }
         let planes = shown.planes();

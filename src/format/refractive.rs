@@ -12,11 +12,11 @@ use crate::error::Problem;
 /// n and k over wavelength in nm, as far as a file gives them; each may be wrong by itself. k > 0 absorbs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Index {
-    pub n: Option<Part>,
-    pub k: Option<Part>,
+    pub n: Option<Found>,
+    pub k: Option<Found>,
 }
 
-type Part = Result<SpectrumTable, Box<Problem>>;
+type Found = Result<SpectrumTable, Box<Problem>>;
 
 /// Largest relative error of a dispersion formula's table between its nodes: well below the f32 of a device.
 const TABLE_ERROR: f64 = 1e-8;

@@ -135,7 +135,7 @@ impl Given {
         let missing = |which: &str| {
             Error::NoDevice(format!(
                 "Slurm gave this job {which}, but Vulkan shows no such GPU here: install its Vulkan driver on this node, or \
-                 render on CPUs (submit with --gpus-per-task 0)"
+                 render on CPUs (submit with --gpus-per-task 0 or --allow-software)"
             ))
         };
         match self {

@@ -10,20 +10,20 @@ use std::time::Duration;
 use crossbeam_channel::{Receiver, Sender, unbounded};
 
 use super::status::Status;
-use crate::cube::{Look, Seen};
+use crate::cube::{CubeState, Seen};
 
 /// Most points of the error curve. More are thinned out by half, from every second on.
 const MOST_POINTS: usize = 1000;
 
 /// Gives access to a cube for as long as there is one.
 pub trait Source: Send + Sync {
-    /// Calls `look` with the cube as it is at this moment; false where there is none any more.
-    fn look(&self, look: &mut dyn FnMut(Look<'_>)) -> bool;
+    /// Calls `read` with the cube as it is at this moment; false where there is none any more.
+    fn with_state(&self, read: &mut dyn FnMut(CubeState<'_>)) -> bool;
 }
 
 impl Source for crate::cube::Cube {
-    fn look(&self, look: &mut dyn FnMut(Look<'_>)) -> bool {
-        look(self.look());
+    fn with_state(&self, read: &mut dyn FnMut(CubeState<'_>)) -> bool {
+        read(self.state());
         true
     }
 }

@@ -142,7 +142,7 @@ impl Stream {
         for tile in ranges.into_iter().flatten() {
             let rect = grid.rect(tile);
             // A tile that cannot be read now comes with its next unit.
-            let Some(Ok(window)) = look(snapshot, |look| look.colour(rect, 1)) else { continue };
+            let Some(Ok(window)) = with_state(snapshot, |state| state.colour(rect, 1)) else { continue };
             let Window { size: [width, height], values, .. } = window;
             connection.client.send(PacketUpdateImage {
                 image_name: &self.name,
@@ -179,11 +179,11 @@ fn connect(address: &str) -> std::io::Result<TcpStream> {
 }
 
 fn grid(snapshot: &Snapshot) -> Option<Grid> {
-    look(snapshot, |look| look.cube().grid())
+    with_state(snapshot, |state| state.cube().grid())
 }
 
-fn look<T>(snapshot: &Snapshot, read: impl FnOnce(crate::cube::Look<'_>) -> T) -> Option<T> {
+fn with_state<T>(snapshot: &Snapshot, read: impl FnOnce(crate::cube::CubeState<'_>) -> T) -> Option<T> {
     let (mut read, mut result) = (Some(read), None);
-    snapshot.source.as_ref()?.look(&mut |look| result = read.take().map(|read| read(look)));
+    snapshot.source.as_ref()?.with_state(&mut |state| result = read.take().map(|read| read(state)));
     result
 }

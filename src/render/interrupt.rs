@@ -49,7 +49,7 @@ impl Interrupt {
     }
 
     /// Has a message when somebody has asked how far the work is.
-    pub fn asked(&self) -> &Receiver<()> {
+    pub fn inquiries(&self) -> &Receiver<()> {
         &self.asked
     }
 
@@ -100,7 +100,7 @@ mod tests {
             (0..3).for_each(|_| interrupt.report());
             // Waiting for the end takes nothing away.
             interrupt.sleep(Duration::from_millis(1)).expect("no end");
-            assert_eq!(interrupt.asked().try_iter().count(), 1);
+            assert_eq!(interrupt.inquiries().try_iter().count(), 1);
         }
     }
 }

@@ -10,7 +10,7 @@ use crossbeam_channel::{Sender, unbounded};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use crate::cube::{Look, Writer, epoch_samples, merge_means, samples_before};
+use crate::cube::{CubeState, Writer, epoch_samples, merge_means, samples_before};
 use crate::device::prepared::Prepared;
 use crate::device::words::Counters;
 use crate::files::format_bytes;
@@ -48,10 +48,10 @@ pub struct Pool {
 
 /// The cube of a render, for whoever watches: no longer than the render needs it.
 impl Source for Weak<Pool> {
-    fn look(&self, look: &mut dyn FnMut(Look<'_>)) -> bool {
+    fn with_state(&self, read: &mut dyn FnMut(CubeState<'_>)) -> bool {
         let pool = self.upgrade();
         let cube = pool.as_ref().and_then(|pool| pool.cube.get());
-        cube.map(|cube| look(cube.look())).is_some()
+        cube.map(|cube| read(cube.state())).is_some()
     }
 }
 

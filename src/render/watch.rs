@@ -43,7 +43,7 @@ impl Requests {
     pub fn new(interrupt: &Interrupt, controls: Option<&Receiver<Control>>) -> Requests {
         Requests {
             end: interrupt.end().clone(),
-            asked: interrupt.asked().clone(),
+            asked: interrupt.inquiries().clone(),
             controls: controls.cloned().unwrap_or_else(never),
         }
     }

@@ -27,7 +27,7 @@ const MANY_CHANNELS: u64 = 100_000;
 
 /// What a row belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Part {
+pub enum Section {
     /// Against the number of channels.
     Channels,
     /// Against the number of paths at a time.
@@ -36,12 +36,12 @@ pub enum Part {
     LeftOut,
 }
 
-impl Part {
+impl Section {
     fn name(self) -> &'static str {
         match self {
-            Part::Channels => "channels",
-            Part::Pool => "pool",
-            Part::LeftOut => "left out",
+            Section::Channels => "channels",
+            Section::Pool => "pool",
+            Section::LeftOut => "left out",
         }
     }
 }
@@ -49,7 +49,7 @@ impl Part {
 /// One measurement.
 #[derive(Debug, Clone)]
 pub struct Row {
-    pub part: Part,
+    pub part: Section,
     pub scene: String,
     pub evaluator: Evaluator,
     /// Whether the kernels are those of a scene that has everything.
@@ -88,7 +88,7 @@ pub struct Report {
 }
 
 impl Row {
-    fn is(&self, part: Part, scene: &str, evaluator: Evaluator) -> bool {
+    fn is(&self, part: Section, scene: &str, evaluator: Evaluator) -> bool {
         self.part == part && self.scene == scene && self.evaluator == evaluator
     }
 }
@@ -150,12 +150,12 @@ impl Report {
         let pt: BTreeMap<(&str, usize), f64> = self
             .rows
             .iter()
-            .filter(|row| row.part == Part::Channels && row.evaluator == Evaluator::Pt)
+            .filter(|row| row.part == Section::Channels && row.evaluator == Evaluator::Pt)
             .map(|row| ((row.scene.as_str(), row.channels), row.rates.median()))
             .collect();
         let of = |evaluator: Evaluator| {
             let mut logs: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
-            for row in self.rows.iter().filter(|row| row.part == Part::Channels && row.evaluator == evaluator) {
+            for row in self.rows.iter().filter(|row| row.part == Section::Channels && row.evaluator == evaluator) {
                 if let Some(pt) = pt.get(&(row.scene.as_str(), row.channels)) {
                     logs.entry(row.channels).or_default().push((row.rates.median() / pt).ln());
                 }
@@ -204,13 +204,13 @@ impl Report {
     fn pairs(&self) -> impl Iterator<Item = (&Row, &Row, f64)> {
         self.rows.iter().filter(|row| row.everything).filter_map(|all| {
             let own =
-                self.rows.iter().find(|own| own.is(Part::LeftOut, &all.scene, all.evaluator) && !own.everything)?;
+                self.rows.iter().find(|own| own.is(Section::LeftOut, &all.scene, all.evaluator) && !own.everything)?;
             Some((own, all, own.rates.median() / all.rates.median()))
         })
     }
 
     /// Lines of `y` over `x` for each evaluator, of the rows of one part and scene.
-    fn lines(&self, part: Part, scene: &str, x: fn(&Row) -> f64, y: fn(&Row) -> f64) -> Vec<Line> {
+    fn lines(&self, part: Section, scene: &str, x: fn(&Row) -> f64, y: fn(&Row) -> f64) -> Vec<Line> {
         let line = |evaluator: Evaluator| Line {
             name: evaluator.name().into(),
             points: self.rows.iter().filter(|row| row.is(part, scene, evaluator)).map(|row| (x(row), y(row))).collect(),
@@ -238,13 +238,13 @@ impl Report {
         }
         page.heading("Paths per second against channels (Fig. 8)");
         for scene in self.scenes() {
-            let lines = self.lines(Part::Channels, &scene, |row| row.channels as f64, |row| row.rates.median());
+            let lines = self.lines(Section::Channels, &scene, |row| row.channels as f64, |row| row.rates.median());
             if lines.is_empty() {
                 continue;
             }
             let chart = log_log(&scene, "channels", "paths/s", &lines)?;
             page.figure(&chart, "Pools as each evaluator chooses them, and as fits.");
-            self.table(&mut page, Part::Channels, &scene);
+            self.table(&mut page, Section::Channels, &scene);
         }
         page.heading("Speed-up over the conventional path tracer (Fig. 9)");
         let guide = |points: &[(f64, f64)]| {
@@ -262,12 +262,12 @@ impl Report {
         page.figure(&chart, "Geometric means over the scenes.");
         page.heading("Paths per second against the pool");
         for scene in self.scenes() {
-            let lines = self.lines(Part::Pool, &scene, |row| f64::from(row.pool), |row| row.rates.median());
+            let lines = self.lines(Section::Pool, &scene, |row| f64::from(row.pool), |row| row.rates.median());
             if lines.is_empty() {
                 continue;
             }
             page.figure(&log_log(&scene, "paths of a wave", "paths/s", &lines)?, "The same channels for all.");
-            self.table(&mut page, Part::Pool, &scene);
+            self.table(&mut page, Section::Pool, &scene);
         }
         self.linearity(&mut page)?;
         self.memory(&mut page)?;
@@ -275,7 +275,7 @@ impl Report {
         Ok(page.finish())
     }
 
-    fn table(&self, page: &mut Page, part: Part, scene: &str) {
+    fn table(&self, page: &mut Page, part: Section, scene: &str) {
         let head = [
             "evaluator",
             "channels",
@@ -308,7 +308,7 @@ impl Report {
         let mut rows = Vec::new();
         for scene in self.scenes() {
             let of: Vec<&Row> =
-                self.rows.iter().filter(|row| row.is(Part::Channels, &scene, Evaluator::DpeptPixel)).collect();
+                self.rows.iter().filter(|row| row.is(Section::Channels, &scene, Evaluator::DpeptPixel)).collect();
             rows.extend(of.windows(2).map(|pair| {
                 let times = pair[0].rates.median() / pair[1].rates.median();
                 let evaluate = pair[1].rates.evaluate_s / pair[0].rates.evaluate_s;
@@ -358,14 +358,14 @@ impl Report {
     fn memory(&self, page: &mut Page) -> Result<()> {
         page.heading("Memory (Fig. 4 and 7)");
         let Some(scene) = self.scenes().into_iter().next() else { return Ok(()) };
-        let lines = self.lines(Part::Channels, &scene, |row| row.channels as f64, |row| row.path_bytes as f64);
+        let lines = self.lines(Section::Channels, &scene, |row| row.channels as f64, |row| row.path_bytes as f64);
         page.figure(
             &log_log(&format!("A path of {scene}"), "channels", "bytes", &lines)?,
             "By formula: pt 32 bytes and 16 a channel, the deferred ones 32 and their records, and 16 more for queues and heads.",
         );
         let head =
             ["scene", "evaluator", "channels", "pool", "bytes a path", "planned", "allocated", "allocated / planned"];
-        let rows = self.rows.iter().filter(|row| row.part == Part::Channels).map(|row| {
+        let rows = self.rows.iter().filter(|row| row.part == Section::Channels).map(|row| {
             let of = |bytes: u64| bytes as f64 / row.planned_bytes as f64;
             vec![
                 row.scene.clone(),
@@ -388,7 +388,7 @@ impl Report {
         let mut rows = Vec::new();
         for scene in self.scenes() {
             for evaluator in self.evaluators() {
-                let Some(row) = self.rows.iter().find(|row| row.is(Part::Channels, &scene, evaluator)) else {
+                let Some(row) = self.rows.iter().find(|row| row.is(Section::Channels, &scene, evaluator)) else {
                     continue;
                 };
                 let fixed = row.path_bytes - row.channel_bytes * row.channels.next_multiple_of(4) as u64;
@@ -447,7 +447,7 @@ fn rate(rates: &Rates) -> String {
 mod tests {
     use super::*;
 
-    fn row(part: Part, evaluator: Evaluator, everything: bool, channels: usize, rate: f64) -> Row {
+    fn row(part: Section, evaluator: Evaluator, everything: bool, channels: usize, rate: f64) -> Row {
         let per_channel = if evaluator == Evaluator::Pt { 16 } else { 0 };
         Row {
             part,
@@ -476,10 +476,10 @@ mod tests {
             },
             rounds: 3,
             rows: vec![
-                row(Part::Channels, pt, false, 512, 1e5),
-                row(Part::Channels, pixel, false, 512, 38e5),
-                row(Part::LeftOut, pixel, false, 128, 3e5),
-                row(Part::LeftOut, pixel, true, 128, 2e5),
+                row(Section::Channels, pt, false, 512, 1e5),
+                row(Section::Channels, pixel, false, 512, 38e5),
+                row(Section::LeftOut, pixel, false, 128, 3e5),
+                row(Section::LeftOut, pixel, true, 128, 2e5),
             ],
             frames: [(128, 0.1), (256, 0.4)]
                 .map(|(side, s)| Frames { scene: "box".into(), channels: 128, side, seconds: vec![s] })

@@ -17,7 +17,7 @@ use super::transform;
 use super::tree::Value;
 use super::{Attributes, Emission, Interior, MaterialId, MediumId, Object, Shape, Sides};
 use crate::error::Problem;
-use crate::format::obj::{self, Obj, Part};
+use crate::format::obj::{self, FaceRun, Obj};
 
 /// Decodes objects one after the other; a mesh file is read once.
 pub struct Objects<'s, 'a> {
@@ -49,7 +49,7 @@ struct Filling {
 
 /// What an object says about its material.
 #[derive(Clone, Copy)]
-enum Look {
+enum Covering {
     Of(MaterialId),
     /// None: a null boundary.
     Invisible,
@@ -72,7 +72,7 @@ impl<'s, 'a> Objects<'s, 'a> {
         let named = fields.get("material");
         // An outer `None` has no material; an inner one is a mistake.
         let look = match (&named, fields.get("interior")) {
-            (Some(named), _) => Some(self.named_material(named).map(Look::Of)),
+            (Some(named), _) => Some(self.named_material(named).map(Covering::Of)),
             (None, Some(_)) => Some(self.null_boundary(&fields)),
             (None, None) => None,
         };
@@ -86,7 +86,7 @@ impl<'s, 'a> Objects<'s, 'a> {
             }
             match look {
                 Some(look) => {
-                    if let Some(Look::Invisible) = look {
+                    if let Some(Covering::Invisible) = look {
                         self.warn_about_usemtl(&shape, &parts);
                     }
                     self.push_mesh(&fields, &shape, &parts, None, look, &common);
@@ -133,7 +133,7 @@ impl<'s, 'a> Objects<'s, 'a> {
     }
 
     /// An object that is nothing but the bound of its interior; `None` if it should be more.
-    fn null_boundary(&self, fields: &Fields<'a>) -> Option<Look> {
+    fn null_boundary(&self, fields: &Fields<'a>) -> Option<Covering> {
         let emission = fields.get("emission");
         if let Some(emission) = &emission {
             emission.error_help(
@@ -141,7 +141,7 @@ impl<'s, 'a> Objects<'s, 'a> {
                 "give the object a material, or remove `emission`; a medium with a temperature emits by itself",
             );
         }
-        emission.is_none().then_some(Look::Invisible)
+        emission.is_none().then_some(Covering::Invisible)
     }
 
     /// What `interior` says of an object whose shape, in its own space, is `local`.
@@ -160,7 +160,7 @@ impl<'s, 'a> Objects<'s, 'a> {
     }
 
     /// A null boundary leaves usemtl names alone that may have been meant.
-    fn warn_about_usemtl(&self, shape: &Item, parts: &[&Part]) {
+    fn warn_about_usemtl(&self, shape: &Item, parts: &[&FaceRun]) {
         let named = parts.iter().filter_map(|part| part.labels.material.as_deref());
         if let Some(name) = named.into_iter().find(|name| self.materials.has(name)) {
             shape.cx.warn(format!(
@@ -200,7 +200,7 @@ impl<'s, 'a> Objects<'s, 'a> {
     }
 
     /// One object for each `usemtl` name, in the order of the file.
-    fn push_by_usemtl(&mut self, fields: &Fields<'a>, shape: &Item<'a>, parts: &[&Part], common: &Common) {
+    fn push_by_usemtl(&mut self, fields: &Fields<'a>, shape: &Item<'a>, parts: &[&FaceRun], common: &Common) {
         let mut names: Vec<&str> = Vec::new();
         let mut bare = None;
         for part in parts {
@@ -227,10 +227,10 @@ impl<'s, 'a> Objects<'s, 'a> {
             );
         }
         for name in names {
-            let of_name: Vec<&Part> =
+            let of_name: Vec<&FaceRun> =
                 parts.iter().copied().filter(|part| part.labels.material.as_deref() == Some(name)).collect();
             let material = self.materials.take(name, self.spectra);
-            self.push_mesh(fields, shape, &of_name, Some(name), material.map(Look::Of), common);
+            self.push_mesh(fields, shape, &of_name, Some(name), material.map(Covering::Of), common);
         }
     }
 
@@ -238,14 +238,14 @@ impl<'s, 'a> Objects<'s, 'a> {
         &mut self,
         fields: &Fields<'a>,
         shape: &Item<'a>,
-        parts: &[&Part],
+        parts: &[&FaceRun],
         usemtl: Option<&str>,
-        look: Option<Look>,
+        look: Option<Covering>,
         common: &Common,
     ) {
         let needs = self.needs(look);
         let bare = parts.iter().find(|part| (needs.uv || needs.tangent) && part.uv.is_none());
-        if let (Some(part), Some(Look::Of(material))) = (bare, look) {
+        if let (Some(part), Some(Covering::Of(material))) = (bare, look) {
             let why = if needs.uv { "is textured" } else { "has two roughnesses" };
             let message = format!(
                 "material \"{}\" {why}, but the faces from here on have no texture coordinates (vt)",
@@ -276,9 +276,9 @@ impl<'s, 'a> Objects<'s, 'a> {
         self.push(fields, name, (Shape::Mesh(mesh), attributes), look, common);
     }
 
-    fn needs(&self, look: Option<Look>) -> Needs {
+    fn needs(&self, look: Option<Covering>) -> Needs {
         match look {
-            Some(Look::Of(material)) => self.materials.needs(material),
+            Some(Covering::Of(material)) => self.materials.needs(material),
             _ => Needs::default(),
         }
     }
@@ -289,7 +289,7 @@ impl<'s, 'a> Objects<'s, 'a> {
         fields: &Fields<'a>,
         name: String,
         (local, mut attributes): (Shape, Attributes),
-        look: Option<Look>,
+        look: Option<Covering>,
         common: &Common,
     ) {
         let Some(affine) = common.affine else { return };
@@ -328,8 +328,8 @@ impl<'s, 'a> Objects<'s, 'a> {
         }
         let (Some(look), Some(emission), Some(interior)) = (look, common.emission, common.interior) else { return };
         let material = match look {
-            Look::Of(material) => Some(material),
-            Look::Invisible => None,
+            Covering::Of(material) => Some(material),
+            Covering::Invisible => None,
         };
         let interior = interior.map(|Filling { body, medium, bounds: [low, high] }| {
             let to_unit = DAffine3::from_scale((high - low).recip()) * DAffine3::from_translation(-low);
@@ -348,10 +348,10 @@ fn no_material(fields: &Fields, message: &str) {
 }
 
 /// The parts that `group` picks, or all.
-fn pick<'m>(mesh: &'m Obj, shape: &Item, group: Option<&Item>) -> Option<Vec<&'m Part>> {
+fn pick<'m>(mesh: &'m Obj, shape: &Item, group: Option<&Item>) -> Option<Vec<&'m FaceRun>> {
     let Some(group) = group else { return Some(mesh.parts.iter().collect()) };
     let wanted = group.text()?;
-    let parts: Vec<&Part> = mesh.parts.iter().filter(|part| part.labels.in_group(wanted)).collect();
+    let parts: Vec<&FaceRun> = mesh.parts.iter().filter(|part| part.labels.in_group(wanted)).collect();
     if parts.is_empty() {
         let mut names: Vec<&str> = Vec::new();
         for label in mesh.parts.iter().flat_map(|p| [p.labels.object.as_deref(), p.labels.group.as_deref()]).flatten() {

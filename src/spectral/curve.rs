@@ -1,6 +1,11 @@
 //! A curve: a physical quantity over wavelength, as the scene gives it.
 
+use smallvec::{SmallVec, smallvec};
+
 use super::planck;
+
+/// (nm, value) of pieces of a curve: few, most of the time.
+pub type Nodes = SmallVec<[(f64, f64); 4]>;
 
 /// What a table means beyond its ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,22 +61,33 @@ impl Curve {
     /// The pieces of the curve between `from` and `to` nm as (nm, value) nodes of a piecewise linear function that
     /// starts at `from` and ends at `to`; a step is two nodes of equal nm. `None` for curves that are not piecewise
     /// linear.
-    pub fn linear_pieces(&self, from: f64, to: f64) -> Option<Vec<(f64, f64)>> {
+    pub fn linear_pieces(&self, from: f64, to: f64) -> Option<Nodes> {
         match self {
-            Curve::Constant(v) => Some(vec![(from, *v), (to, *v)]),
+            Curve::Constant(v) => Some(smallvec![(from, *v), (to, *v)]),
             Curve::Blackbody { .. } => None,
             Curve::Linear { nm: x, value: y, outside } => {
                 let (first, last) = (x[0], x[x.len() - 1]);
                 let beyond = |end: f64| if *outside == Outside::Hold { end } else { 0.0 };
+                // What is searched for once is needed a hundred thousand times: tables ask for every stratum of every channel.
+                let a = x.partition_point(|&xi| xi <= from);
+                let b = if from < to {
+                    a + x[a..].partition_point(|&xi| xi < to)
+                } else {
+                    x.partition_point(|&xi| xi < to)
+                };
+                let between = |i: usize, nm: f64| {
+                    let t = (nm - x[i - 1]) / (x[i] - x[i - 1]);
+                    y[i - 1] + t * (y[i] - y[i - 1])
+                };
                 // Value just inside the interval, at either end.
                 let start = if from < first {
                     beyond(y[0])
                 } else if from >= last {
                     beyond(y[y.len() - 1])
                 } else {
-                    self.eval(from)
+                    between(a, from)
                 };
-                let mut nodes = vec![(from, start)];
+                let mut nodes: Nodes = smallvec![(from, start)];
                 let mut push = |node: (f64, f64)| {
                     if nodes.last() != Some(&node) {
                         nodes.push(node);
@@ -80,7 +96,6 @@ impl Curve {
                 if first > from && first < to {
                     push((first, beyond(y[0])));
                 }
-                let (a, b) = (x.partition_point(|&xi| xi <= from), x.partition_point(|&xi| xi < to));
                 for i in a..b.max(a) {
                     push((x[i], y[i]));
                 }
@@ -93,8 +108,7 @@ impl Curve {
                 } else if to > last {
                     beyond(y[y.len() - 1])
                 } else {
-                    let i = x.partition_point(|&xi| xi < to);
-                    if x[i] == to || i == 0 { y[i] } else { self.eval(to) }
+                    if x[b] == to || b == 0 { y[b] } else { between(b, to) }
                 };
                 push((to, end));
                 if nodes.len() == 1 {

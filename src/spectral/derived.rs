@@ -1,5 +1,7 @@
 //! Curves computed from other curves.
 
+use smallvec::SmallVec;
+
 use super::{Channels, Curve, Outside};
 
 /// Bisections of an interval between nodes at most.
@@ -13,12 +15,13 @@ impl Curve {
             let nm = channels.bounds.first().map_or(550.0, |b| b[0]);
             return Curve::Constant(f(&curves.iter().map(|c| c.eval(nm)).collect::<Vec<_>>()));
         }
-        let at = |nm: f64| f(&curves.iter().map(|c| c.eval(nm)).collect::<Vec<_>>());
+        let at = |nm: f64| f(&curves.iter().map(|c| c.eval(nm)).collect::<SmallVec<[f64; 8]>>());
         let mut nodes: Vec<f64> = channels.bounds.iter().flatten().copied().collect();
         for curve in curves {
             if let Curve::Linear { nm, .. } = curve {
-                let within = |x: &&f64| channels.bounds.iter().any(|b| (b[0]..=b[1]).contains(*x));
-                nodes.extend(nm.iter().filter(within));
+                for [from, to] in &channels.bounds {
+                    nodes.extend(&nm[nm.partition_point(|x| x < from)..nm.partition_point(|x| x <= to)]);
+                }
             }
         }
         nodes.sort_by(f64::total_cmp);
@@ -45,8 +48,15 @@ impl Curve {
         edges.sort_by(f64::total_cmp);
         edges.dedup();
         let (mut nm, mut value) = (Vec::new(), Vec::new());
+        let mut bounds = channels.bounds.clone();
+        bounds.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        // How far the channels reach that begin here or before.
+        let (mut next, mut reach) = (0, f64::NEG_INFINITY);
         for edge in edges.windows(2) {
-            if !channels.bounds.iter().any(|b| b[0] <= edge[0] && edge[1] <= b[1]) {
+            while let Some(&[_, to]) = bounds.get(next).filter(|bounds| bounds[0] <= edge[0]) {
+                (next, reach) = (next + 1, reach.max(to));
+            }
+            if reach < edge[1] {
                 continue;
             }
             // The wavelength itself is one of the curves.

@@ -7,6 +7,7 @@ mod data;
 mod derived;
 pub mod hemisphere;
 pub mod kinks;
+pub mod knots;
 pub mod planck;
 pub mod skylight;
 pub mod table;

@@ -1,7 +1,11 @@
 //! Spectra as the device wants them: for every channel a few strata of the wavelength coordinate μ, in each of them a
 //! value and a slope; and exact knots for what no affordable number of strata resolves.
 
+use rayon::prelude::*;
+
+use super::curve::Nodes;
 use super::kinks::BentLine;
+use super::knots::Knots;
 use super::warp::Warp;
 use super::{Channels, Curve};
 
@@ -55,6 +59,12 @@ pub(super) struct Line {
     pub slope: f64,
 }
 
+impl Line {
+    fn times(self, factor: f64) -> Line {
+        Line { value: factor * self.value, slope: factor * self.slope }
+    }
+}
+
 /// The tables of a scene. Spectrum ids number the curves given to [`SpectralTables::build`] in another order: see `ids`.
 #[derive(Debug)]
 pub struct SpectralTables {
@@ -68,10 +78,8 @@ pub struct SpectralTables {
     pub kinks: u32,
     /// [stratum][spectrum][quad][value x 4, slope x 4, each kink's place x 4, each kink's bend x 4].
     pub strata: Vec<f32>,
-    /// First knot of (knotted spectrum, padded channel), with one more entry at the end.
-    pub knot_starts: Vec<u32>,
-    /// (μ in units of 2⁻³², bits of the f32 value), μ ascending within a channel.
-    pub knots: Vec<[u32; 2]>,
+    /// Those that are held in knots, by (knotted spectrum, quad of channels).
+    pub knots: Knots,
     /// Device id of each curve that was given.
     pub ids: Vec<u32>,
     /// Reached per curve: largest pointwise error relative to the channel's peak, and largest relative error of a
@@ -118,7 +126,7 @@ impl SpectralTables {
         let max_bits = SpectralTables::most_bits(wanted.len(), channels);
         let place = Place { channels, warp };
         let needed: Vec<Option<u32>> = wanted
-            .iter()
+            .par_iter()
             .map(|w| match w.exactness {
                 Exactness::Exact => place.strata_needed(w.spectrum, warp.bits(), LINE_BOUND, Exactness::Peak),
                 kind => place.strata_needed(w.spectrum, max_bits, POINTWISE_BOUND, kind),
@@ -140,13 +148,19 @@ impl SpectralTables {
             channels_padded,
             kinks: 0,
             strata: vec![0.0; (stratified.len() * channels_padded * 2) << stratum_bits],
-            knot_starts: vec![0],
-            knots: Vec::new(),
+            knots: Knots::new(knotted.len() * channels_padded / 4),
             ids,
             bounds: vec![Bounds::default(); wanted.len()],
         };
-        for (id, &i) in stratified.iter().enumerate() {
-            tables.bounds[i] = tables.fill_strata(id, &wanted[i], &place);
+        // As many at a time as there are threads, since lines are larger than what is kept of them.
+        let ids: Vec<usize> = (0..stratified.len()).collect();
+        for ids in ids.chunks(rayon::current_num_threads()) {
+            let fit = |&id: &usize| place.fit(&wanted[stratified[id]], stratum_bits);
+            let fitted: Vec<_> = ids.par_iter().map(fit).collect();
+            for (&id, (lines, bounds)) in ids.iter().zip(fitted) {
+                tables.fill_strata(id, &lines);
+                tables.bounds[stratified[id]] = bounds;
+            }
         }
         for &i in &knotted {
             tables.bounds[i] = tables.add_knots(&wanted[i], &place);
@@ -187,73 +201,37 @@ impl SpectralTables {
             channels_padded,
             kinks: kinks as u32,
             strata,
-            knot_starts: vec![0],
-            knots: Vec::new(),
+            knots: Knots::new(0),
             ids: (0..curves.len() as u32).collect(),
             bounds: bounds.collect(),
         })
     }
 
-    fn fill_strata(&mut self, id: usize, wanted: &Wanted, place: &Place) -> Bounds {
+    /// `lines`: \[channel\]\[stratum\].
+    fn fill_strata(&mut self, id: usize, lines: &[Vec<Line>]) {
         let quads = self.channels_padded / 4;
-        let finer = self.stratum_bits - place.warp.bits();
-        let mut bounds = Bounds::default();
-        for k in 0..place.channels.len() {
-            let curve = wanted.spectrum.of(k);
-            let lines = place.fit_channel(curve, k, self.stratum_bits);
-            bounds = bounds.max(place.channel_bounds(curve, k, &lines, self.stratum_bits, wanted.exactness));
+        for (k, lines) in lines.iter().enumerate() {
             for (stratum, line) in lines.iter().enumerate() {
-                let weight = if wanted.weighted { place.warp.weight(k, stratum >> finer) } else { 1.0 };
                 let at = (((stratum * self.stratified + id) * quads + k / 4) * 2) * 4 + k % 4;
-                self.strata[at] = (weight * line.value) as f32;
-                self.strata[at + 4] = (weight * line.slope) as f32;
+                (self.strata[at], self.strata[at + 4]) = (line.value as f32, line.slope as f32);
             }
         }
-        bounds
     }
 
     fn add_knots(&mut self, wanted: &Wanted, place: &Place) -> Bounds {
-        let (channels, warp) = (place.channels, place.warp);
         let mut bounds = Bounds::default();
-        for k in 0..self.channels_padded {
-            if k < channels.len() {
-                let ([from, to], curve) = (channels.bounds[k], wanted.spectrum.of(k));
-                let exact = curve.mean(from, to);
-                // (μ, value), μ in units of the device, and the integral over wavelength of what lies between.
-                let (mut knots, mut area) = (Vec::<(f64, f64)>::new(), 0.0);
-                for stratum in 0..1usize << warp.bits() {
-                    let [a, b] = [stratum, stratum + 1].map(|j| warp.edge(k, j, warp.bits()));
-                    let weight = warp.weight(k, stratum);
-                    let nodes = curve.linear_pieces(a, b).unwrap_or_else(|| smooth_nodes(curve, a, b));
-                    let mu = |nm: f64| (stratum as f64 + (nm - a) / (b - a)) / f64::from(1u32 << warp.bits());
-                    let first = knots.len();
-                    let factor = if wanted.weighted { weight } else { 1.0 };
-                    knots.extend(nodes.iter().map(|(nm, value)| (fixed_point(mu(*nm)), factor * value)));
-                    // A line much narrower than the channel changes its width a little when its ends are rounded.
-                    let pieces = knots[first..].windows(2).map(|w| (w[1].0 - w[0].0) * 0.5 * (w[0].1 + w[1].1));
-                    area += pieces.sum::<f64>() * if wanted.weighted { 1.0 } else { weight };
+        for quad in 0..self.channels_padded / 4 {
+            let channels = [0, 1, 2, 3].map(|k| match 4 * quad + k {
+                k if k < place.channels.len() => {
+                    let (nodes, of_channel) = place.knots(wanted, k);
+                    bounds = bounds.max(of_channel);
+                    nodes
                 }
-                knots.dedup();
-                let correction = if area > 0.0 { exact / (area / FIXED_ONE) } else { 1.0 };
-                let small = (correction - 1.0).abs() <= POINTWISE_BOUND;
-                let scale = if small { correction } else { 1.0 };
-                self.knots.extend(knots.iter().map(|&(mu, value)| [mu as u32, ((value * scale) as f32).to_bits()]));
-                bounds.pointwise = bounds.pointwise.max((scale - 1.0).abs());
-                if exact != 0.0 {
-                    bounds.mean = bounds.mean.max((scale / correction - 1.0).abs());
-                }
-            } else {
-                self.knots.extend([[0, 0], [u32::MAX, 0]]);
-            }
-            self.knot_starts.push(self.knots.len() as u32);
+                _ => vec![(0.0, 0.0), (FIXED_ONE - 1.0, 0.0)],
+            });
+            self.knots.push(channels.each_ref().map(Vec::as_slice));
         }
         bounds
-    }
-
-    /// Steps of a binary search that finds the segment in any channel's knots; 0 without knots.
-    pub fn knot_steps(&self) -> u32 {
-        let segments = self.knot_starts.windows(2).map(|w| w[1] - w[0] - 1).max().unwrap_or(0);
-        segments.next_power_of_two().max(1).ilog2()
     }
 
     pub fn has_knots(&self) -> bool {
@@ -287,38 +265,92 @@ impl Place<'_> {
         // What satisfied the channels so far is where the next channel starts.
         (0..self.channels.len()).try_fold(self.warp.bits(), |least, k| {
             let curve = spectrum.of(k);
-            let keeps_bound = |bits: &u32| {
-                let lines = self.fit_channel(curve, k, *bits);
-                self.channel_bounds(curve, k, &lines, *bits, kind).pointwise <= bound
+            let [from, to] = self.channels.bounds[k];
+            let peak = curve.max(from, to);
+            let keeps_bound = |stratum: usize, bits: u32| {
+                let (a, b) = (self.warp.edge(k, stratum, bits), self.warp.edge(k, stratum + 1, bits));
+                fit_within(curve, [a, b], peak, kind).1 <= bound
             };
-            (least..=max_bits).find(keeps_bound)
+            (least..=max_bits).find(|&bits| (0..1usize << bits).all(|stratum| keeps_bound(stratum, bits)))
         })
     }
 
-    fn fit_channel(&self, curve: &Curve, k: usize, bits: u32) -> Vec<Line> {
-        let edge = |j: usize| self.warp.edge(k, j, bits);
-        (0..1usize << bits).map(|j| fit(curve, edge(j), edge(j + 1))).collect()
+    /// What [`Knots`] has of one channel, and how far its mean is off.
+    fn knots(&self, wanted: &Wanted, k: usize) -> (Vec<(f64, f64)>, Bounds) {
+        let ([from, to], curve, warp) = (self.channels.bounds[k], wanted.spectrum.of(k), self.warp);
+        let exact = curve.mean(from, to);
+        // (μ in units of the device, value), and the integral over wavelength of what lies between.
+        let (mut knots, mut area) = (Vec::<(f64, f64)>::new(), 0.0);
+        for stratum in 0..1usize << warp.bits() {
+            let [a, b] = [stratum, stratum + 1].map(|j| warp.edge(k, j, warp.bits()));
+            let weight = warp.weight(k, stratum);
+            let nodes = curve.linear_pieces(a, b).map_or_else(|| smooth_nodes(curve, a, b), Nodes::into_vec);
+            let mu = |nm: f64| (stratum as f64 + (nm - a) / (b - a)) / f64::from(1u32 << warp.bits());
+            let first = knots.len();
+            let factor = if wanted.weighted { weight } else { 1.0 };
+            knots.extend(nodes.iter().map(|(nm, value)| (fixed_point(mu(*nm)), factor * value)));
+            // A line much narrower than the channel changes its width a little when its ends are rounded.
+            let pieces = knots[first..].windows(2).map(|w| (w[1].0 - w[0].0) * 0.5 * (w[0].1 + w[1].1));
+            area += pieces.sum::<f64>() * if wanted.weighted { 1.0 } else { weight };
+        }
+        let correction = if area > 0.0 { exact / (area / FIXED_ONE) } else { 1.0 };
+        let small = (correction - 1.0).abs() <= POINTWISE_BOUND;
+        let scale = if small { correction } else { 1.0 };
+        knots.iter_mut().for_each(|(_, value)| *value *= scale);
+        let mean = if exact != 0.0 { (scale / correction - 1.0).abs() } else { 0.0 };
+        (knots, Bounds { pointwise: (scale - 1.0).abs(), mean })
     }
 
-    fn channel_bounds(&self, curve: &Curve, k: usize, lines: &[Line], bits: u32, kind: Exactness) -> Bounds {
-        let [from, to] = self.channels.bounds[k];
-        let peak = curve.max(from, to);
-        if peak <= 0.0 {
-            return Bounds::default();
-        }
-        let (mut pointwise, mut mean) = (0.0f64, 0.0);
-        for (j, line) in lines.iter().enumerate() {
-            let (a, b) = (self.warp.edge(k, j, bits), self.warp.edge(k, j + 1, bits));
-            mean += (line.value + 0.5 * line.slope) * (b - a) / (to - from);
-            for (nm, value) in curve.linear_pieces(a, b).unwrap_or_else(|| few_nodes(curve, a, b)) {
-                let place = (nm - a) / (b - a);
-                let of = if kind == Exactness::Pointwise { value.max(1e-9 * peak) } else { peak };
-                pointwise = pointwise.max((line.value + place * line.slope - value).abs() / of);
+    /// Lines \[channel\]\[stratum\], times the weights of their wavelengths where those are wanted, and how far they are off without.
+    fn fit(&self, wanted: &Wanted, bits: u32) -> (Vec<Vec<Line>>, Bounds) {
+        let mut bounds = Bounds::default();
+        let lines = (0..self.channels.len()).map(|k| {
+            let ([from, to], curve) = (self.channels.bounds[k], wanted.spectrum.of(k));
+            let peak = curve.max(from, to);
+            let (mut pointwise, mut mean) = (0.0f64, 0.0);
+            let lines = (0..1usize << bits).map(|stratum| {
+                let (a, b) = (self.warp.edge(k, stratum, bits), self.warp.edge(k, stratum + 1, bits));
+                let (line, error) = fit_within(curve, [a, b], peak, wanted.exactness);
+                pointwise = pointwise.max(error);
+                mean += (line.value + 0.5 * line.slope) * (b - a) / (to - from);
+                match wanted.weighted {
+                    true => line.times(self.warp.weight(k, stratum >> (bits - self.warp.bits()))),
+                    false => line,
+                }
+            });
+            let lines = lines.collect();
+            if peak > 0.0 {
+                bounds = bounds.max(Bounds { pointwise, mean: off(mean, curve.mean(from, to)) });
             }
-        }
-        let exact = curve.mean(from, to);
-        Bounds { pointwise, mean: off(mean, exact) }
+            lines
+        });
+        (lines.collect(), bounds)
     }
+}
+
+/// The line that stands for `curve` over [a, b], and how far it is off at most, of `peak` or of the value itself; not at all where the
+/// peak is 0.
+fn fit_within(curve: &Curve, [a, b]: [f64; 2], peak: f64, kind: Exactness) -> (Line, f64) {
+    let pieces = curve.linear_pieces(a, b);
+    let line = match &pieces {
+        Some(nodes) => fit_pieces(nodes, a, b),
+        None => fit_smooth(curve, a, b),
+    };
+    let nodes = match pieces {
+        // It is that line.
+        Some(nodes) if nodes.len() == 2 => return (line, 0.0),
+        Some(nodes) => nodes,
+        None => few_nodes(curve, a, b),
+    };
+    if peak <= 0.0 {
+        return (line, 0.0);
+    }
+    let error = |(nm, value): (f64, f64)| {
+        let place = (nm - a) / (b - a);
+        let of = if kind == Exactness::Pointwise { value.max(1e-9 * peak) } else { peak };
+        (line.value + place * line.slope - value).abs() / of
+    };
+    (line, nodes.into_iter().map(error).fold(0.0, f64::max))
 }
 
 /// How far a mean is off, relative to what it should be where that is not 0.
@@ -327,28 +359,36 @@ fn off(mean: f64, exact: f64) -> f64 {
 }
 
 /// Where a smooth curve is compared with a line.
-pub(super) fn few_nodes(curve: &Curve, from: f64, to: f64) -> Vec<(f64, f64)> {
+pub(super) fn few_nodes(curve: &Curve, from: f64, to: f64) -> Nodes {
     (0..=8).map(|i| from + (to - from) * f64::from(i) / 8.0).map(|nm| (nm, curve.eval(nm))).collect()
 }
 
 /// The line over [from, to] with the curve's mean and first moment (so that its product with a linear factor has the
 /// right mean as well), or the curve itself where it is linear; never negative.
 pub(super) fn fit(curve: &Curve, from: f64, to: f64) -> Line {
-    if let Some(nodes) = curve.linear_pieces(from, to) {
-        if let [(_, a), (_, b)] = nodes[..] {
-            return Line { value: a, slope: b - a };
-        }
-        // Mean and first moment about the middle, exactly, piece by piece; x in [-1/2, 1/2].
-        let (mut mean, mut moment) = (0.0, 0.0);
-        for w in nodes.windows(2) {
-            let x = [0, 1].map(|i| (w[i].0 - from) / (to - from) - 0.5);
-            let (h, y) = (x[1] - x[0], [w[0].1, w[1].1]);
-            mean += 0.5 * h * (y[0] + y[1]);
-            moment += h / 6.0 * (y[0] * (2.0 * x[0] + x[1]) + y[1] * (x[0] + 2.0 * x[1]));
-        }
-        return non_negative(mean, 12.0 * moment);
+    match curve.linear_pieces(from, to) {
+        Some(nodes) => fit_pieces(&nodes, from, to),
+        None => fit_smooth(curve, from, to),
     }
-    // Smooth: five Gauss-Legendre points.
+}
+
+fn fit_pieces(nodes: &[(f64, f64)], from: f64, to: f64) -> Line {
+    if let [(_, a), (_, b)] = nodes {
+        return Line { value: *a, slope: b - a };
+    }
+    // Mean and first moment about the middle, exactly, piece by piece; x in [-1/2, 1/2].
+    let (mut mean, mut moment) = (0.0, 0.0);
+    for w in nodes.windows(2) {
+        let x = [0, 1].map(|i| (w[i].0 - from) / (to - from) - 0.5);
+        let (h, y) = (x[1] - x[0], [w[0].1, w[1].1]);
+        mean += 0.5 * h * (y[0] + y[1]);
+        moment += h / 6.0 * (y[0] * (2.0 * x[0] + x[1]) + y[1] * (x[0] + 2.0 * x[1]));
+    }
+    non_negative(mean, 12.0 * moment)
+}
+
+/// With five Gauss-Legendre points.
+fn fit_smooth(curve: &Curve, from: f64, to: f64) -> Line {
     const NODE: [f64; 3] = [0.0, 0.538_469_310_105_683_1, 0.906_179_845_938_664];
     const WEIGHT: [f64; 3] = [0.568_888_888_888_888_9, 0.478_628_670_499_366_5, 0.236_926_885_056_189_1];
     let (mut mean, mut moment) = (0.0, 0.0);
@@ -397,12 +437,7 @@ mod tests {
             let at = ((stratum * t.stratified + id) * (t.channels_padded / 4) + k / 4) * 8 + k % 4;
             t.strata[at] + place * t.strata[at + 4]
         } else {
-            let first = t.knot_starts[(id - t.stratified) * t.channels_padded + k] as usize;
-            let last = t.knot_starts[(id - t.stratified) * t.channels_padded + k + 1] as usize - 1;
-            let i = first + t.knots[first..last].partition_point(|n| n[0] <= mu).max(1) - 1;
-            let [a_value, b_value] = [t.knots[i][1], t.knots[i + 1][1]].map(f32::from_bits);
-            let place = (mu - t.knots[i][0]) as f32 / ((t.knots[i + 1][0] - t.knots[i][0]) as f32).max(1.0);
-            a_value + place.min(1.0) * (b_value - a_value)
+            t.knots.lookup((id - t.stratified) * t.channels_padded / 4 + k / 4, mu)[k % 4]
         }
     }
 
@@ -415,11 +450,7 @@ mod tests {
             let sum: f64 = (0..strata).map(|j| f64::from(t.strata[at(j)]) + 0.5 * f64::from(t.strata[at(j) + 4])).sum();
             return sum / strata as f64;
         }
-        let start = (id - t.stratified) * t.channels_padded + k;
-        let range = t.knot_starts[start] as usize..t.knot_starts[start + 1] as usize;
-        let value = |knot: [u32; 2]| f64::from(f32::from_bits(knot[1]));
-        let area = |w: &[[u32; 2]]| f64::from(w[1][0] - w[0][0]) * 0.5 * (value(w[0]) + value(w[1]));
-        t.knots[range].windows(2).map(area).sum::<f64>() / FIXED_ONE
+        t.knots.mean((id - t.stratified) * t.channels_padded / 4 + k / 4, k % 4)
     }
 
     fn table(points: &[(f64, f64)], outside: Outside) -> Curve {

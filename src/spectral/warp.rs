@@ -27,7 +27,7 @@ pub struct Warp {
     knots: Vec<f64>,
 }
 
-/// Part of a channel in which the density of emission is linear.
+/// ChannelEmission of a channel in which the density of emission is linear.
 #[derive(Debug, Clone, Copy)]
 struct Piece {
     from: f64,
@@ -57,12 +57,12 @@ impl Piece {
 }
 
 /// A channel: what emits in it, and where its spectra have nodes.
-struct Part {
+struct ChannelEmission {
     pieces: Vec<Piece>,
     nodes: Vec<f64>,
 }
 
-impl Part {
+impl ChannelEmission {
     fn ends(&self) -> [f64; 2] {
         [self.pieces[0].from, self.pieces[self.pieces.len() - 1].to]
     }
@@ -122,14 +122,14 @@ impl Warp {
         most_bits: u32,
     ) -> Warp {
         let most_bits = most_bits.min(MAX_BITS);
-        let parts: Vec<Part> = (0..channels.len())
+        let parts: Vec<ChannelEmission> = (0..channels.len())
             .map(|k| {
                 let response = responses.map(|responses| &responses[k]);
                 let pieces = density(channels.bounds[k], emitters, response);
                 let nodes = nodes(channels.bounds[k], tabulated.iter().copied().chain(response));
                 // A channel that no affordable number of strata aligns is not worth more strata in the others.
                 let nodes = if nodes.len() < 1 << most_bits { nodes } else { Vec::new() };
-                Part { pieces, nodes }
+                ChannelEmission { pieces, nodes }
             })
             .collect();
         // Without spikes there is nothing to gain by other wavelengths.

@@ -3,6 +3,7 @@
 mod cube;
 mod export;
 mod imports;
+mod interop;
 mod outputs;
 mod python;
 mod refractive;

@@ -235,8 +235,8 @@ fn readers(path: &Path, to: &TempDir) -> Vec<(&'static str, Result<()>)> {
         }),
         ("compare", compare(&open(), &open()).map(drop)),
         ("a pixel", open().spectrum(1, 1).map(drop)),
-        ("a region", open().look().region(open().grid().whole()).map(drop)),
-        ("one channel", open().look().channels(&[2], open().grid().whole(), 1).map(drop)),
+        ("a region", open().state().region(open().grid().whole()).map(drop)),
+        ("one channel", open().state().channels(&[2], open().grid().whole(), 1).map(drop)),
     ]
 }
 
@@ -279,7 +279,7 @@ fn files_that_are_gone_are_not_passed_over() {
         });
         without("overview/c/0/0/0", &|| {
             let cube = Cube::open(&path).expect("opens");
-            assert!(is_lost(&cube.look().colour(cube.grid().whole(), 8).map(drop), "overview/c/0/0/0"));
+            assert!(is_lost(&cube.state().colour(cube.grid().whole(), 8).map(drop), "overview/c/0/0/0"));
         });
         without("standard_error/c/0/0/0", &|| {
             let cube = Cube::open(&path).expect("opens");
@@ -355,7 +355,7 @@ fn cubes_of_version_1_are_read_only() {
         assert_eq!(cube.standard_error(x, y).expect("read").as_ref(), Some(errors), "{x} {y}");
     }
     // Means of 8 x 8 pixels, which lie otherwise in the file too.
-    let means = cube.look().channels(&[4, 1], cube.grid().whole(), 8).expect("read");
+    let means = cube.state().channels(&[4, 1], cube.grid().whole(), 8).expect("read");
     assert_eq!((means.size, means.planes), ([3, 2], 2));
     for (block, mean) in means.values.chunks(2).enumerate() {
         let (x0, y0) = (block % 3 * 8, block / 3 * 8);

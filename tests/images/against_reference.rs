@@ -29,7 +29,7 @@ struct Effort {
     image: f64,
 }
 
-const USUAL: Effort = Effort { epochs: 32, reference: 4096, pixel: 0.25, image: 0.006 };
+const USUAL: Effort = Effort { epochs: 20, reference: 2560, pixel: 0.25, image: 0.006 };
 
 fn compare(what: &str, scene: &Scene, effort: &Effort) {
     let ours = render(scene, effort.epochs, 64, Settings { seed: 11, tile: [8, 8], ..Settings::default() });
@@ -179,7 +179,7 @@ fn grey_room_with_roulette() {
     let scene = b.bounces(12).roulette(1).lamp(lamp_quad(0.5), 2.0, Sides::Both).build();
     let f = features(&scene);
     assert!(f.registers && !f.strata && f.roulette);
-    compare("roulette", &scene, &Effort { epochs: 64, ..USUAL });
+    compare("roulette", &scene, &Effort { epochs: 32, ..USUAL });
 }
 
 /// Narrow lines (knots), more than eight spectra (tables), black bodies, a Gaussian filter, a crop, a thin lens.
@@ -233,7 +233,7 @@ fn many_plain_spectra() {
     let scene = b.lamp(lamp_quad(0.9), jagged(12, 4, 0.5, 2.0), Sides::Both).build();
     let f = features(&scene);
     assert!(!f.registers && f.strata && !f.knots && f.shapes);
-    compare("plain tables", &scene, &Effort { epochs: 40, ..USUAL });
+    compare("plain tables", &scene, &Effort { epochs: 40, reference: 4096, ..USUAL });
 }
 
 /// Every shape as a lamp, seen from outside, one side and both, under a sky, before one-sided surfaces; three cameras,
@@ -320,7 +320,7 @@ fn weak_lamp_under_a_strong_sky() {
         .lamp(icosphere(DVec3::new(-0.3, -0.2, -0.3), 0.05, 2), 1.0, Sides::Front)
         .sky(stepped([20.0, 10.0, 5.0]))
         .build();
-    compare("strong sky", &scene, &Effort { epochs: 64, reference: 8192, pixel: 0.4, image: 0.015 });
+    compare("strong sky", &scene, &Effort { epochs: 32, reference: 4096, pixel: 0.4, image: 0.015 });
 }
 
 /// Walls that glow, each in its own way, so that paths differ little: a bias of 0.2 % of any channel's mean fails.
@@ -341,7 +341,7 @@ fn small_biases() {
         .glowing(sphere(DVec3::new(0.4, -0.4, 0.0), 0.3), 0.8, 1.1, Sides::Front)
         .build();
     scene.integrator.sampler = Sampler::Sobol;
-    compare("small biases", &scene, &Effort { epochs: 256, reference: 65_536, pixel: 0.01, image: 0.0004 });
+    compare("small biases", &scene, &Effort { epochs: 160, reference: 40_000, pixel: 0.01, image: 0.0004 });
 }
 
 /// Responses that overlap, one that is narrow and one far away, over spectra with a step and a line; the reference draws

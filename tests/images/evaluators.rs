@@ -80,7 +80,7 @@ fn the_same_paths_give_the_same_means() {
     };
     let mut far = 0.0f64;
     let scenes = [
-        ("everything", general(9).build()),
+        ("everything", general(4).build()),
         ("plain", plain(6).build()),
         ("plain, independent, many channels", independent(plain(170).build())),
         ("no bounces", plain(5).bounces(0).build()),
@@ -158,7 +158,7 @@ fn kinks_are_the_same_spectra_as_strata() {
 /// Each evaluator, bit for bit, whatever the waves.
 #[test]
 fn waves_change_no_bit_of_any_evaluator() {
-    for scene in [plain(6).build(), general(9).build()] {
+    for scene in [plain(6).build(), general(4).build()] {
         let is_general = Prepared::new(&scene, 0).expect("a scene").is_general();
         for evaluator in OTHERS {
             let scene = with(&scene, evaluator);
@@ -181,8 +181,9 @@ fn waves_change_no_bit_of_any_evaluator() {
 
 /// With seeds of its own, each evaluator's mean is that of the others: z-scores of all channels of the image.
 #[test]
+#[ignore = "minutes: a weaker proof of what the same paths show"]
 fn no_evaluator_is_biased() {
-    let scene = general(9).build();
+    let scene = general(4).build();
     let of = |evaluator, seed| {
         let rendered = render(&with(&scene, evaluator), 32, 64, Settings { seed, ..Settings::default() });
         rendered.assert_clean();

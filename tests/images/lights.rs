@@ -340,7 +340,7 @@ fn every_kind_of_light_together() {
         .lamp(disk(DVec3::new(-1.0, 2.5, 0.0), DVec3::NEG_Y, 0.3), 8.0, Sides::Front)
         .roulette(3)
         .build();
-    compare("every light", &scene, 32, 4096, 0.02);
+    compare("every light", &scene, 16, 1024, 0.02);
 }
 
 /// The same colours as RGB and, where they must agree, as spectra: greys times D65.
@@ -382,7 +382,7 @@ fn thousands_of_emitting_triangles() {
     assert_eq!(Prepared::new(&scene, 0).unwrap().emitters.len(), 20_482);
     // The icosphere's faces lie up to 3e-4 inside the sphere (edges of 1/32 of 63 degrees): its cross-section lacks twice that.
     let expected = [2.0 / 16.0, 5.0 * side * side / PI];
-    let epochs = device::render(&scene, 1024, 64, Settings { seed: 41, ..Settings::default() });
+    let epochs = device::render(&scene, 64, 1024, Settings { seed: 41, ..Settings::default() });
     epochs.assert_clean();
     assert_estimates("triangles", &epochs.values(), &expected, Bound { resolution: 0.01, allowance: 1e-3 });
 }

@@ -30,14 +30,14 @@ fn shown(scene: &Scene, epochs: u32, samples: u32, seed: u64) -> Vec<Estimate> {
 fn slab_of_all_orders() {
     for Case { scene, expected, seed } in slab(60) {
         let bound = Bound { resolution: 0.01, allowance: 1e-4 };
-        assert_estimates("slab", &shown(&scene, 16, 1024, seed), &expected, bound);
+        assert_estimates("slab", &shown(&scene, 16, 768, seed), &expected, bound);
     }
 }
 
 #[test]
 fn prism_at_minimum_deviation() {
     for (line, Case { scene, expected, seed }) in prism().into_iter().enumerate() {
-        let shown = shown(&scene, 32, 1024, seed);
+        let shown = shown(&scene, 32, 512, seed);
         for (k, estimate) in shown.iter().enumerate().filter(|(k, _)| *k != line) {
             assert_eq!(estimate.mean, 0.0, "line {k} at the lamp of line {line}");
         }
@@ -140,24 +140,24 @@ fn white_balls_in_a_glowing_room() {
     let opaque = Bound { allowance: TABLE + 1e-4, ..bound };
     for alpha in size::first(1, [0.3, 0.0]) {
         let scene = in_glowing_room(|b, ball| b.dielectric(ball, 1.5, alpha), 40);
-        assert_estimates("glass", &shown(&scene, 16, 512, 140), &[1.0; 9], bound);
+        assert_estimates("glass", &shown(&scene, 16, 320, 140), &[1.0; 9], bound);
         let scene = in_glowing_room(|b, ball| white_metal(b, ball, [alpha; 2]), 10);
-        assert_estimates("metal", &shown(&scene, 16, 512, 141), &[1.0; 9], opaque);
+        assert_estimates("metal", &shown(&scene, 16, 320, 141), &[1.0; 9], opaque);
         let scene = in_glowing_room(|b, ball| b.plastic(ball, 1.0, 1.5, alpha), 10);
-        assert_estimates("plastic", &shown(&scene, 16, 512, 142), &[1.0; 9], opaque);
+        assert_estimates("plastic", &shown(&scene, 16, 320, 142), &[1.0; 9], opaque);
     }
     for roughness in size::first(1, [0.2, 0.01]) {
         let mut scene = in_glowing_room(|b, ball| b.dielectric(ball, glass_curve(), roughness), 40);
         scene.channels = Channels::equal(400.0, 700.0, 3);
         let bound = Bound { resolution: 0.03, ..bound };
-        assert_estimates("dispersive", &shown(&scene, 32, 512, 143), &[1.0; 27], bound);
+        assert_estimates("dispersive", &shown(&scene, 32, 320, 143), &[1.0; 27], bound);
     }
     let blended = |b: Builder, ball: Shape| {
         let b = white_metal(b, ball.clone(), [0.3; 2]).dielectric(ball.clone(), 1.5, 0.2);
         b.blend_of_last_two(ball, 0.5)
     };
     let scene = in_glowing_room(blended, 40);
-    assert_estimates("blend", &shown(&scene, 16, 512, 144), &[1.0; 9], bound);
+    assert_estimates("blend", &shown(&scene, 16, 448, 144), &[1.0; 9], bound);
 }
 
 /// From inside glass a white sky has radiance n².
@@ -167,7 +167,7 @@ fn radiance_inside_glass() {
         let mut scene = under_white_sky(|b, ball| b.dielectric(ball, 1.5, roughness), 40);
         scene.camera = look(DVec3::new(0.1, 0.2, 0.3), DVec3::new(0.4, 0.1, 1.0), DVec3::Y, narrow());
         scene.film.crop = [1, 1, 2, 2];
-        let estimate = shown(&scene, 32, 512, 150);
+        let estimate = shown(&scene, 32, 128, 150);
         assert_estimates("inside", &estimate, &[2.25], Bound { resolution: 0.01, allowance });
     }
 }
@@ -248,7 +248,7 @@ fn opaque_materials_are_those_of_the_reference() {
     let materials =
         [("blend", blend), ("plastic", plastic), ("varnish", varnish), ("rough metal", rough), ("metal", metal)];
     for (what, add) in size::first(3, materials) {
-        against_reference(what, &room_with(add), 128, 4096, [0.35, 0.02]);
+        against_reference(what, &room_with(add), 128, 2048, [0.35, 0.02]);
     }
 }
 
@@ -273,7 +273,7 @@ fn glass_is_that_of_the_reference() {
 fn dispersion_is_unbiased() {
     for roughness in size::first(2, [0.02, 0.0, 0.15]) {
         let scene = dispersive_ball(Channels::equal(400.0, 700.0, 6), roughness);
-        against_reference(&format!("roughness {roughness}"), &scene, 512, 20_000, [0.15, 0.06]);
+        against_reference(&format!("roughness {roughness}"), &scene, 192, 8_000, [0.15, 0.06]);
     }
 }
 
@@ -281,7 +281,7 @@ fn dispersion_is_unbiased() {
 /// plate turns the picture.
 #[test]
 fn anisotropy_follows_the_edges() {
-    let of = |turned, along_x, seed| shown(&brushed_plate(turned, along_x), 32, 1024, seed);
+    let of = |turned, along_x, seed| shown(&brushed_plate(turned, along_x), 32, 256, seed);
     let (rough, fine) = (of(false, true, 180), of(false, false, 181));
     assert!(rough[0].mean > 10.0 * fine[0].mean, "{rough:?} {fine:?}");
     let bound = Bound { resolution: 0.03, allowance: 1e-3 };

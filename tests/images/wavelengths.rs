@@ -139,7 +139,7 @@ fn heat_gases_and_the_sky() {
             Projection::Perspective { tan_half: DVec2::splat(0.4) },
         ))
         .film(8, 8, Filter::Box)
-        .channels(Channels::from_bounds(infrared().bounds.into_iter().chain([[3000.0, 5000.0]]).collect(), None))
+        .channels(infrared())
         .bounces(3)
         .diffuse(quad(DVec3::new(-2.0, -1.0, 2.0), 4.0 * DVec3::X, 4.0 * DVec3::NEG_Z), 0.3)
         .at_kelvin(320.0)

@@ -7,13 +7,15 @@ mod scene;
 use std::path::Path;
 use std::process::{Command, Output};
 
+use crate::binary::without_devices;
+
 /// A run of the real binary in `folder`; without any device unless one is asked for.
 fn spectile(folder: &Path, arguments: &[&str], device: bool) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_spectile"));
     // The Vulkan loader wants a folder, and would say so on stderr.
     command.current_dir(folder).env("XDG_RUNTIME_DIR", folder).args(arguments);
     if !device {
-        command.env("VK_DRIVER_FILES", "/nonexistent.json").env("VK_ICD_FILENAMES", "/nonexistent.json");
+        without_devices(&mut command);
     }
     command.output().expect("the binary runs")
 }

@@ -2,7 +2,8 @@
 
 use std::fs;
 
-use super::{Place, SCENE, spectrum};
+use super::{Place, SCENE, events, spectrum};
+use crate::binary;
 use crate::outside::{python, shared};
 
 /// A band with a tail, one that overlaps it, and one far away.
@@ -100,7 +101,9 @@ fn sensors_of_the_data_pack_are_cheap() {
     {
         let Some(path) = shared(&format!("sensor/{file}")) else { return };
         let place = Place::of(&scene(&format!("responses = \"{}\"", path.display())));
-        let done = place.events(&["plan", "scene.toml", "--size", "8x8"]).pop().expect("done");
+        let mut plan = place.command(&["plan", "scene.toml", "--size", "8x8", "--json"]);
+        let output = binary::output(binary::without_devices(&mut plan));
+        let done = events(&super::text(&output.stdout)).pop().expect("done");
         let features = done["features"].as_array().expect("features");
         let responses = features.iter().find(|f| f["name"] == "responses").expect("a feature");
         let strata = responses["effect"].as_str().and_then(|text| text.split(' ').next()?.parse::<u32>().ok());

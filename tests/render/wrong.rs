@@ -4,6 +4,7 @@ use std::fs;
 use std::process::Stdio;
 
 use super::{ENDLESS, Place, arrays, events, samples, text, wait_for};
+use crate::binary::without_devices;
 use crate::report::excuse;
 
 /// A run that must fail with `code`, say exactly one line that has all of `expected`, and leave no new file.
@@ -131,11 +132,7 @@ fn standard_output_that_cannot_be_written() {
 fn no_device() {
     let place = Place::new();
     for arguments in [vec!["render", "scene.toml", "-o", "o.zarr"], vec!["devices"]] {
-        let mut command = place.command(&arguments);
-        for name in ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"] {
-            command.env(name, "/nonexistent.json");
-        }
-        let output = command.output().expect("runs");
+        let output = without_devices(&mut place.command(&arguments)).output().expect("runs");
         let stderr = text(&output.stderr);
         if output.status.success() {
             excuse("this machine has devices that are no Vulkan drivers");
@@ -150,9 +147,8 @@ fn no_device() {
         assert!(!place.path().join("o.zarr").exists());
     }
     // A plan does not need one.
-    let mut command = place.command(&["plan", "scene.toml", "--json"]);
-    command.env("VK_DRIVER_FILES", "/nonexistent.json").env("VK_ICD_FILENAMES", "/nonexistent.json");
-    let done = events(&text(&command.output().expect("runs").stdout)).pop().expect("done");
+    let output = without_devices(&mut place.command(&["plan", "scene.toml", "--json"])).output().expect("runs");
+    let done = events(&text(&output.stdout)).pop().expect("done");
     assert!(done["device"].is_null() && done["predicted_s"].is_null() && done["disk_bytes"].is_u64(), "{done}");
 }
 

@@ -19,6 +19,11 @@ pub fn command(folder: &Path, arguments: &[&str]) -> Command {
     command
 }
 
+/// As on a machine that has no Vulkan.
+pub fn without_devices(command: &mut Command) -> &mut Command {
+    command.env("VK_DRIVER_FILES", "/nonexistent.json").env("VK_ICD_FILENAMES", "/nonexistent.json")
+}
+
 /// What a command says, when it has ended.
 pub fn output(command: &mut Command) -> Output {
     timed(Part::Program, || command.output().expect("it runs"))

@@ -6,7 +6,7 @@
 fn channel_value(spectrum: u32, channel: u32, mu: u32) -> f32 {
 #if KNOTS
     if (spectrum >= SPECTRA) {
-        return knot_value(spectrum - SPECTRA, channel, mu);
+        return between_knots(spectrum - SPECTRA, channel / 4u, mu)[channel % 4u];
     }
 #endif
 #if STRATA

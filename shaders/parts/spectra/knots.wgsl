@@ -1,26 +1,28 @@
-// Spectra that no affordable number of strata resolves, as exact knots.
+// Spectra that no affordable number of strata resolves, as exact knots (src/spectral/knots.rs).
 
-// First knot of (spectrum, channel), and (mu as it stands in the head, value).
-@group(1) @binding(10) var<storage, read> knot_starts: array<u32>;
-@group(1) @binding(11) var<storage, read> knots: array<vec2<u32>>;
+// Where the places of each (spectrum, quad of channels) begin in this list; then all places, mu as it stands in the head. And the
+// values there of the four channels.
+@group(1) @binding(10) var<storage, read> knot_places: array<u32>;
+@group(1) @binding(11) var<storage, read> knot_values: array<vec4<f32>>;
 
 // Binary search without a loop: an invocation may have 32,768 iterations in all, which the walk along the records takes;
 // and its length is known.
-fn knot_value(spectrum: u32, channel: u32, mu: u32) -> f32 {
-    let first = knot_starts[spectrum * CHANNELS_PADDED + channel];
-    var low = first;
+fn between_knots(spectrum: u32, quad: u32, mu: u32) -> vec4<f32> {
+    let row = spectrum * QUADS + quad;
+    var low = knot_places[row];
     // Segments still in question, from `low` on.
-    var left = knot_starts[spectrum * CHANNELS_PADDED + channel + 1u] - 1u - first;
+    var left = knot_places[row + 1u] - 1u - low;
     var half = 0u;
     var above = false;
 #repeat KNOT_STEPS i
     half = left / 2u;
-    above = knots[low + half].x <= mu;
+    above = knot_places[low + half] <= mu;
     low = select(low, low + half, above);
     left = select(half, left - half, above);
 #end
-    let a = knots[low];
-    let b = knots[low + 1u];
-    let place = min(f32(mu - a.x) / max(f32(b.x - a.x), 1.0), 1.0);
-    return bitcast<f32>(a.y) + place * (bitcast<f32>(b.y) - bitcast<f32>(a.y));
+    let begin = knot_places[low];
+    let place = min(f32(mu - begin) / max(f32(knot_places[low + 1u] - begin), 1.0), 1.0);
+    let a = knot_values[low - FIRST_KNOT_PLACE];
+    let b = knot_values[low + 1u - FIRST_KNOT_PLACE];
+    return a + place * (b - a);
 }

@@ -35,15 +35,19 @@ pub const RESPONSES: Part = Part {
 pub const KNOTS: Part = Part {
     name: "exact spectral knots",
     used: |scene| scene.features.knots,
-    effect: |_| "a search per lookup and channel".into(),
+    effect: |_| "a search per lookup and four channels".into(),
     is_planned: true,
     modules: &[(Place::Evaluate, KNOT_VALUES)],
-    defines: |scene, _, defines| _ = defines.set("KNOTS", true).set("KNOT_STEPS", scene.tables.knot_steps()),
+    defines: |scene, _, defines| {
+        let knots = &scene.tables.knots;
+        defines.set("KNOTS", true).set("KNOT_STEPS", knots.steps());
+        defines.constant("FIRST_KNOT_PLACE", knots.first_place() as u32);
+    },
     buffers: |scene| {
         let tables = &scene.prepared.tables;
         vec![
-            SceneBuffer::new("knot_starts", &tables.knot_starts, CONTENT, REMEDY),
-            SceneBuffer::new("knots", &tables.knots, CONTENT, REMEDY),
+            SceneBuffer::new("knot_places", &tables.knots.places, CONTENT, REMEDY),
+            SceneBuffer::new("knot_values", &tables.knots.values, CONTENT, REMEDY),
         ]
     },
     example: Some(|exhibit| exhibit.add_spiky_paint()),

@@ -18,7 +18,7 @@ use serde_json::json;
 
 use super::guard::Peer;
 use super::{App, events, image, page};
-use crate::cube::{Look, Rect};
+use crate::cube::{CubeState, Rect};
 use crate::format::text;
 use crate::preview::Control;
 use crate::spectral::colour::{ProjectionKind, three_of};
@@ -116,7 +116,7 @@ impl App {
     /// Runs `read` on a thread that may wait for files, with the cube as it is now.
     pub async fn read<T: Send + 'static>(
         self: &Arc<Self>,
-        read: impl FnOnce(Look<'_>) -> Result<T> + Send + 'static,
+        read: impl FnOnce(CubeState<'_>) -> Result<T> + Send + 'static,
     ) -> std::result::Result<T, Refused> {
         let turn = tokio::time::timeout(PATIENCE, self.readers.acquire()).await;
         let Ok(Ok(_turn)) = turn else {
@@ -125,7 +125,7 @@ impl App {
         let source = self.feed.snapshot().source.ok_or_else(no_cube)?;
         let task = tokio::task::spawn_blocking(move || {
             let (mut read, mut result) = (Some(read), None);
-            source.look(&mut |look| result = read.take().map(|read| read(look)));
+            source.with_state(&mut |state| result = read.take().map(|read| read(state)));
             result
         });
         match task.await {
@@ -136,10 +136,10 @@ impl App {
     }
 
     /// What does not change about the cube, read without waiting for anybody.
-    pub fn cube<T>(&self, read: impl FnOnce(Look<'_>) -> T) -> std::result::Result<T, Refused> {
+    pub fn cube<T>(&self, read: impl FnOnce(CubeState<'_>) -> T) -> std::result::Result<T, Refused> {
         let source = self.feed.snapshot().source.ok_or_else(no_cube)?;
         let (mut read, mut result) = (Some(read), None);
-        source.look(&mut |look| result = read.take().map(|read| read(look)));
+        source.with_state(&mut |state| result = read.take().map(|read| read(state)));
         result.ok_or_else(no_cube)
     }
 }
@@ -183,8 +183,8 @@ async fn status(State(app): State<Arc<App>>) -> Response {
 }
 
 async fn channels(State(app): State<Arc<App>>) -> std::result::Result<Response, Refused> {
-    app.cube(|look| {
-        let (cube, channels) = (look.cube(), look.cube().channels());
+    app.cube(|state| {
+        let (cube, channels) = (state.cube(), state.cube().channels());
         let (false_colour, rgb) = match cube.projection().kind {
             ProjectionKind::Xyz => (None, three_of(channels, true)),
             ProjectionKind::FalseColour(rgb) => (Some(rgb), rgb),
@@ -229,7 +229,7 @@ async fn spectrum(
 ) -> std::result::Result<Response, Refused> {
     let Query(place) = place.map_err(|error| Refused::bad(error.body_text()))?;
     let format = place.format;
-    let body = app.read(move |look| read_spectrum(look, &place)).await?;
+    let body = app.read(move |state| read_spectrum(state, &place)).await?;
     let body = body.ok_or_else(|| Refused(StatusCode::NOT_FOUND, "there are no samples here yet".into()))?;
     Ok(match format {
         Format::Json => json_response(body),
@@ -253,22 +253,22 @@ struct Spectrum<T> {
 }
 
 /// The spectrum of a pixel, or the mean over a rectangle, as text; `None` where nothing is rendered yet.
-fn read_spectrum(look: Look<'_>, place: &Where) -> Result<Option<String>> {
-    let ([width, height], &Where { x, y, x1, y1, .. }) = (look.cube().header().size, place);
+fn read_spectrum(state: CubeState<'_>, place: &Where) -> Result<Option<String>> {
+    let ([width, height], &Where { x, y, x1, y1, .. }) = (state.cube().header().size, place);
     let [end_x, end_y] = [(x, x1), (y, y1)].map(|(from, to)| to.unwrap_or(from.saturating_add(1)));
     if x >= end_x || y >= end_y || end_x > width || end_y > height {
         return Err(Error::Usage(format!(
             "pixels {x}..{end_x} x {y}..{end_y} are not of the picture; columns are 0..{width}, rows 0..{height}"
         )));
     }
-    let samples = look.samples(look.cube().grid().tile_at(x, y))?;
+    let samples = state.samples(state.cube().grid().tile_at(x, y))?;
     if x1.is_none() && y1.is_none() {
-        let Some(radiance) = look.spectrum(x, y)? else { return Ok(None) };
-        let standard_error = look.standard_error(x, y)?;
+        let Some(radiance) = state.spectrum(x, y)? else { return Ok(None) };
+        let standard_error = state.standard_error(x, y)?;
         let spectrum = Spectrum { x, y, x1, y1, pixels: 1, samples, radiance, standard_error };
-        return Ok(Some(spectrum.text(look, place.format)));
+        return Ok(Some(spectrum.text(state, place.format)));
     }
-    let Some(mean) = look.region(Rect { x0: x, y0: y, x1: end_x, y1: end_y })? else { return Ok(None) };
+    let Some(mean) = state.region(Rect { x0: x, y0: y, x1: end_x, y1: end_y })? else { return Ok(None) };
     let spectrum = Spectrum {
         x,
         y,
@@ -279,15 +279,15 @@ fn read_spectrum(look: Look<'_>, place: &Where) -> Result<Option<String>> {
         radiance: mean.radiance,
         standard_error: mean.standard_error,
     };
-    Ok(Some(spectrum.text(look, place.format)))
+    Ok(Some(spectrum.text(state, place.format)))
 }
 
 impl<T: serde::Serialize + std::fmt::Debug> Spectrum<T> {
-    fn text(&self, look: Look<'_>, format: Format) -> String {
+    fn text(&self, state: CubeState<'_>, format: Format) -> String {
         match format {
             // Numbers and lists of them can always be written.
             Format::Json => serde_json::to_string(self).unwrap_or_default(),
-            Format::Csv => text::spectrum_csv(look.cube().channels(), &self.radiance, self.standard_error.as_deref()),
+            Format::Csv => text::spectrum_csv(state.cube().channels(), &self.radiance, self.standard_error.as_deref()),
         }
     }
 }

@@ -38,8 +38,8 @@ pub fn status(app: &App, snapshot: &Snapshot, curve: bool) -> Value {
         "served_s": app.began.elapsed().as_secs_f64(),
     });
     let mut set = |name: &str, value: Value| state[name] = value;
-    if let Ok([cube, channels]) = app.cube(|look| {
-        let (cube, header) = (look.cube(), look.cube().header());
+    if let Ok([cube, channels]) = app.cube(|state| {
+        let (cube, header) = (state.cube(), state.cube().header());
         let shows = match cube.projection().kind {
             crate::spectral::colour::ProjectionKind::Xyz => "xyz",
             crate::spectral::colour::ProjectionKind::FalseColour(_) => "false",
@@ -48,7 +48,7 @@ pub fn status(app: &App, snapshot: &Snapshot, curve: bool) -> Value {
             "size": header.size, "origin": header.origin, "tile": header.tile, "tiles": cube.grid().count(),
             "epoch": header.epoch, "bytes": header.store_bytes(), "shows": shows,
         });
-        [cube, json!(cube_channels(look))]
+        [cube, json!(cube_channels(state))]
     }) {
         set("cube", cube);
         set("channels", channels);
@@ -87,8 +87,8 @@ pub fn status(app: &App, snapshot: &Snapshot, curve: bool) -> Value {
     state
 }
 
-fn cube_channels(look: crate::cube::Look<'_>) -> usize {
-    look.cube().channels().len()
+fn cube_channels(state: crate::cube::CubeState<'_>) -> usize {
+    state.cube().channels().len()
 }
 
 /// Somebody who listens.

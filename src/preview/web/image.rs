@@ -13,7 +13,7 @@ use serde::Deserialize;
 
 use super::App;
 use super::api::Refused;
-use crate::cube::{BLOCK, Look, Rect, Window};
+use crate::cube::{BLOCK, CubeState, Rect, Window};
 use crate::format::png;
 use crate::spectral::Channels;
 use crate::spectral::temperature::{BandTemperature, THERMAL_NM, is_thermal, shown_range};
@@ -87,8 +87,8 @@ pub async fn image(
     let Query(asked) = asked.map_err(|error| Refused::bad(error.body_text()))?;
     let thermometers = Arc::clone(&app);
     let (window, tone, png) = app
-        .read(move |look| {
-            let window = asked.window(look, &thermometers.thermometers)?;
+        .read(move |state| {
+            let window = asked.window(state, &thermometers.thermometers)?;
             let tone = asked.tone(&window);
             let png = (asked.format == Format::Png).then(|| asked.png(&window, tone)).transpose()?;
             Ok((window, tone, png))
@@ -105,9 +105,9 @@ pub async fn image(
 }
 
 impl Asked {
-    fn window(&self, look: Look<'_>, thermometers: &Thermometers) -> Result<Window> {
+    fn window(&self, state: CubeState<'_>, thermometers: &Thermometers) -> Result<Window> {
         let refuse = |what: String| Err(Error::Usage(what));
-        let ([width, height], channels) = (look.cube().header().size, look.cube().channels());
+        let ([width, height], channels) = (state.cube().header().size, state.cube().channels());
         let [x0, y0] = [self.x0, self.y0].map(|v| v.unwrap_or(0));
         let rect = Rect { x0, y0, x1: self.x1.unwrap_or(width), y1: self.y1.unwrap_or(height) };
         if rect.x0 >= rect.x1 || rect.y0 >= rect.y1 || rect.x1 > width || rect.y1 > height {
@@ -134,11 +134,11 @@ impl Asked {
             _ => Err(Error::Usage(format!("{name}: a channel from 0 to {} is needed", channels.len() - 1))),
         };
         match self.show {
-            Show::Colour => look.colour(rect, scale),
-            Show::Channel => look.channels(&[channel("k", self.k)?], rect, scale),
+            Show::Colour => state.colour(rect, scale),
+            Show::Channel => state.channels(&[channel("k", self.k)?], rect, scale),
             Show::False => {
                 let rgb = [channel("r", self.r)?, channel("g", self.g)?, channel("b", self.b)?];
-                look.channels(&rgb, rect, scale)
+                state.channels(&rgb, rect, scale)
             }
             Show::Temperature => {
                 let k = channel("k", self.k)?;
@@ -148,7 +148,7 @@ impl Asked {
                     ));
                 }
                 let thermometer = thermometers.of(channels, k);
-                let mut window = look.channels(&[k], rect, scale)?;
+                let mut window = state.channels(&[k], rect, scale)?;
                 window.values.iter_mut().for_each(|v| *v = thermometer.kelvin(f64::from(*v)) as f32);
                 Ok(window)
             }

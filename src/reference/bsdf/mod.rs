@@ -81,7 +81,7 @@ enum Choice {
 }
 
 /// A lobe's place in a material.
-struct Part {
+struct PlacedLobe {
     lobe: Box<dyn Lobe>,
     /// Share of a blend, but for what is textured of it.
     weight: f64,
@@ -94,7 +94,7 @@ struct Part {
 
 /// A material.
 pub struct Bsdf {
-    parts: Vec<Part>,
+    parts: Vec<PlacedLobe>,
     hot: Vec<Hot>,
     spectra: Vec<SpectrumId>,
     textures: Vec<TextureId>,
@@ -112,7 +112,7 @@ pub struct Sampled {
 
 /// A material at a vertex, with what is decided there.
 pub struct Scattering<'v> {
-    parts: Vec<(&'v Part, f64)>,
+    parts: Vec<(&'v PlacedLobe, f64)>,
     at: Vertex<'v>,
     survival: f64,
 }
@@ -207,14 +207,14 @@ impl Bsdf {
             }
         };
         let two_sided = material.two_sided;
-        let part = |lobe| Part { lobe, weight, shares: shares.to_vec(), opaque, two_sided };
+        let part = |lobe| PlacedLobe { lobe, weight, shares: shares.to_vec(), opaque, two_sided };
         self.parts.extend(lobes.into_iter().map(part));
     }
 
     /// The material as a path meets it; `None` where nothing is scattered.
     pub fn at<'v>(&'v self, at: Vertex<'v>) -> Option<Scattering<'v>> {
         let active = self.parts.iter().filter(|part| !at.inside || !part.opaque || part.two_sided);
-        let mut parts: Vec<(&Part, f64)> = active.map(|part| (part, 1.0)).collect();
+        let mut parts: Vec<(&PlacedLobe, f64)> = active.map(|part| (part, 1.0)).collect();
         if let [(part, _)] = parts[..] {
             let seen = part.seen_from(&at);
             let largest = at.alive.clone().map(|k| part.share(&at) * part.lobe.albedo(&seen, k)).fold(0.0, f64::max);
@@ -248,7 +248,7 @@ impl Bsdf {
     }
 }
 
-impl Part {
+impl PlacedLobe {
     /// The share of a blend at a vertex.
     fn share(&self, at: &Vertex) -> f64 {
         let factor = |&(texture, missing): &(TextureId, bool)| {

@@ -7,7 +7,7 @@ use glam::DVec3;
 use quick_cache::sync::Cache;
 use rayon::prelude::*;
 
-use super::microfacet::{LATTICE, Lattice, azimuth_at, cosine_at, lambda, smith_ratio, turn};
+use super::microfacet::{Lattice, azimuth_at, cosine_at, lambda, smith_ratio, turn};
 use super::recent;
 
 /// Cosines between direction and facet for which there is a weight, spread as cubes: metals change fastest near grazing.
@@ -17,6 +17,8 @@ const CUBES: usize = 256;
 const MASKED: usize = 128;
 /// Azimuths over a quarter turn where roughness differs along and across.
 const AZIMUTHS: usize = 65;
+/// Points and generator of the [`Lattice`], Fibonacci numbers: fewer than for albedos, since the weights are f32 and held to 1e-4.
+const POINTS: (usize, usize) = (4_181, 2_584);
 
 /// Weights w_j over direction such that Σ w_j f(c_j) is the mean over visible facets of f(o·h) G2/G1, f linear between
 /// [`facet_cosine`]s: with f = F the single-scattering albedo, with f = 1 - F what is absorbed at once.
@@ -50,7 +52,7 @@ impl FacetCosines {
             .extend(alpha[..rows.min(2)].iter().flat_map(|&alpha| (1..MASKED - 1).map(move |i| cosine_at(i, alpha))));
         cosines.sort_by(f64::total_cmp);
         cosines.dedup();
-        let lattice = Lattice::new(LATTICE);
+        let lattice = Lattice::new(POINTS);
         let of_node = |node: usize| {
             let (sin, cos) =
                 if rows == 1 { (0.0, 1.0) } else { azimuth_at(node / cosines.len(), alpha, AZIMUTHS).sin_cos() };
@@ -137,6 +139,9 @@ mod tests {
     use super::super::microfacet::FINE;
     use super::*;
 
+    /// Of two roughnesses, whose table takes long.
+    const BRUSHED: [f64; 2] = [0.3, 0.1];
+
     fn direction(z: f64, azimuth: f64) -> DVec3 {
         let r = (1.0 - z * z).max(0.0).sqrt();
         DVec3::new(r * azimuth.cos(), r * azimuth.sin(), z)
@@ -154,8 +159,8 @@ mod tests {
             ("coat", &|c| dielectric(c, 1.5)),
         ];
         let mut largest = 0.0f64;
-        for alpha in [[0.01; 2], [0.1; 2], [0.4; 2], [1.0; 2], [0.3, 0.1]] {
-            let table = FacetCosines::new(alpha);
+        for alpha in [[0.01; 2], [0.1; 2], [0.4; 2], [1.0; 2], BRUSHED] {
+            let table = FacetCosines::shared(alpha);
             for (name, f) in &fresnel {
                 let values = std::array::from_fn(|j| f(facet_cosine(j)));
                 for (turn, z) in [0.0013, 0.0123, 0.052, 0.21, 0.43, 0.77, 0.993].into_iter().enumerate() {
@@ -180,8 +185,8 @@ mod tests {
     /// With f = 1, what [`ReflectionAlbedo`] has.
     #[test]
     fn of_a_white_surface_it_is_the_albedo() {
-        for alpha in [[0.2; 2], [0.5, 0.2]] {
-            let (table, albedo) = (FacetCosines::new(alpha), ReflectionAlbedo::new(alpha));
+        for alpha in [[0.2; 2], BRUSHED] {
+            let (table, albedo) = (FacetCosines::shared(alpha), ReflectionAlbedo::new(alpha));
             for z in [0.05, 0.3, 0.8, 1.0] {
                 let o = direction(z, 0.7);
                 let difference = table.mean(o, &[1.0; FACET_COSINES]) + albedo.loss(o) - 1.0;

@@ -11,7 +11,7 @@ use std::time::{Duration, SystemTime};
 use super::grid::Rect;
 use super::map::Chunk;
 use super::metadata::Layout;
-use super::store::{Cube, Part};
+use super::store::{Cube, TileArray};
 use super::writer::Writer;
 use super::{BLOCK, Grid};
 use crate::spectral::tone::Picture;
@@ -22,7 +22,7 @@ const MOST_RADIANCE: u64 = 4 << 30;
 
 /// A cube as it is at this moment: as its last commits left it, or with every unit that a writer has merged so far.
 #[derive(Clone, Copy)]
-pub struct Look<'a> {
+pub struct CubeState<'a> {
     cube: &'a Cube,
     writer: Option<&'a Writer>,
 }
@@ -46,24 +46,24 @@ pub struct RegionMean {
 }
 
 impl Cube {
-    pub fn look(&self) -> Look<'_> {
-        Look { cube: self, writer: None }
+    pub fn state(&self) -> CubeState<'_> {
+        CubeState { cube: self, writer: None }
     }
 }
 
 impl Writer {
-    pub fn look(&self) -> Look<'_> {
-        Look { cube: self.cube(), writer: Some(self) }
+    pub fn state(&self) -> CubeState<'_> {
+        CubeState { cube: self.cube(), writer: Some(self) }
     }
 }
 
-impl<'a> Look<'a> {
+impl<'a> CubeState<'a> {
     pub fn cube(&self) -> &'a Cube {
         self.cube
     }
 
     /// The newest file of a tile in one of the arrays; `None` before its first unit.
-    fn open(&self, part: Part, tile: u32) -> Result<Option<File>> {
+    fn open(&self, part: TileArray, tile: u32) -> Result<Option<File>> {
         if let Some(writer) = self.writer
             && let Some(suffix) = writer.pending(tile)
             // By now it may have taken its place, or a newer one is about to.
@@ -75,7 +75,7 @@ impl<'a> Look<'a> {
     }
 
     /// Reads `values` from the file of a tile, `offset` bytes from its start; false before its first unit.
-    fn read<T: bytemuck::Pod>(&self, part: Part, tile: u32, offset: u64, values: &mut [T]) -> Result<bool> {
+    fn read<T: bytemuck::Pod>(&self, part: TileArray, tile: u32, offset: u64, values: &mut [T]) -> Result<bool> {
         let Some(mut file) = self.open(part, tile)? else { return Ok(false) };
         self.read_from(&mut file, part, tile, offset, values).map(|()| true)
     }
@@ -83,7 +83,7 @@ impl<'a> Look<'a> {
     fn read_from<T: bytemuck::Pod>(
         &self,
         file: &mut File,
-        part: Part,
+        part: TileArray,
         tile: u32,
         offset: u64,
         values: &mut [T],
@@ -95,10 +95,10 @@ impl<'a> Look<'a> {
     /// Samples per pixel of a tile.
     pub fn samples(&self, tile: u32) -> Result<u32> {
         let mut samples = [0u32];
-        Ok(if self.read(Part::Samples, tile, 0, &mut samples)? { samples[0] } else { 0 })
+        Ok(if self.read(TileArray::Samples, tile, 0, &mut samples)? { samples[0] } else { 0 })
     }
 
-    fn chunk(&self, part: Part, tile: u32) -> Result<Option<Chunk>> {
+    fn chunk(&self, part: TileArray, tile: u32) -> Result<Option<Chunk>> {
         let Some(file) = self.open(part, tile)? else { return Ok(None) };
         self.cube.map(&file, &self.cube.part_path(part, tile), tile).map(Some)
     }
@@ -111,7 +111,7 @@ impl<'a> Look<'a> {
         let rect = grid.rect(tile);
         let pixel = self.cube.layout().pixel(grid.tile, x - rect.x0, y - rect.y0) as u64;
         let mut spectrum = vec![0.0f32; channels];
-        let there = self.read::<f32>(Part::Radiance, tile, pixel * channels as u64 * 4, &mut spectrum)?;
+        let there = self.read::<f32>(TileArray::Radiance, tile, pixel * channels as u64 * 4, &mut spectrum)?;
         Ok(there.then_some(spectrum))
     }
 
@@ -136,7 +136,7 @@ impl<'a> Look<'a> {
             // The rows that are needed, from the first to the last.
             let row = grid.tile[0] as usize * 3;
             let rows = &mut values[..shared.height() as usize * row];
-            if !self.read(Part::Preview, tile, u64::from(shared.y0 - part.y0) * row as u64 * 4, rows)? {
+            if !self.read(TileArray::Preview, tile, u64::from(shared.y0 - part.y0) * row as u64 * 4, rows)? {
                 continue;
             }
             for (y, row) in (shared.y0..shared.y1).zip(rows.chunks_exact(row)) {
@@ -166,7 +166,7 @@ impl<'a> Look<'a> {
         self.check_radiance(pixels)?;
         let mut values = vec![0.0; channels.len()];
         for tile in self.cube.grid().tiles_in(pixels) {
-            let Some(chunk) = self.chunk(Part::Radiance, tile)? else { continue };
+            let Some(chunk) = self.chunk(TileArray::Radiance, tile)? else { continue };
             let Some(shared) = chunk.rect().intersection(&pixels) else { continue };
             for y in shared.y0..shared.y1 {
                 for x in shared.x0..shared.x1 {
@@ -189,7 +189,7 @@ impl<'a> Look<'a> {
         let mut values = vec![0.0f32; blocks * channels.len()];
         let mut scratch = Vec::new();
         for tile in grid.tiles_in(pixels) {
-            let Some(mut file) = self.open(Part::Overview, tile)? else { continue };
+            let Some(mut file) = self.open(TileArray::Overview, tile)? else { continue };
             self.read_blocks(&mut file, tile, channels, blocks, &mut scratch, &mut values)?;
             let part = grid.rect(tile);
             for (y, x) in (0..rows).flat_map(|y| (0..columns).map(move |x| (y, x))) {
@@ -218,8 +218,9 @@ impl<'a> Look<'a> {
         values: &mut [f32],
     ) -> Result<()> {
         let (all, wanted) = (self.cube.channels().len(), channels.len());
-        let mut read =
-            |first: usize, values: &mut [f32]| self.read_from(file, Part::Overview, tile, (first * 4) as u64, values);
+        let mut read = |first: usize, values: &mut [f32]| {
+            self.read_from(file, TileArray::Overview, tile, (first * 4) as u64, values)
+        };
         match self.cube.layout() {
             Layout::Columns if 2 * wanted > all => {
                 scratch.resize(blocks * all, 0.0);
@@ -262,7 +263,7 @@ impl<'a> Look<'a> {
         let mut radiance = vec![0.0; channels];
         let mut variance = Some(vec![0.0; channels]);
         for tile in self.cube.grid().tiles_in(rect) {
-            let Some(chunk) = self.chunk(Part::Radiance, tile)? else { continue };
+            let Some(chunk) = self.chunk(TileArray::Radiance, tile)? else { continue };
             let errors = self.standard_errors(tile)?;
             let Some(shared) = chunk.rect().intersection(&rect) else { continue };
             for y in shared.y0..shared.y1 {
@@ -398,7 +399,7 @@ impl Cube {
         let [columns, _] = self.grid().tiles();
         let mut changed = Vec::new();
         for (row, known) in (0..).zip(&mut seen.rows) {
-            let path = self.part_path(Part::Samples, row * columns);
+            let path = self.part_path(TileArray::Samples, row * columns);
             let folder = crate::files::parent(&path);
             let modified = match fs::metadata(folder).and_then(|found| found.modified()) {
                 Ok(modified) => modified,

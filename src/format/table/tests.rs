@@ -1,0 +1,81 @@
+//! Tables of spreadsheets.
+
+use super::*;
+
+fn numbers(text: &[u8]) -> Vec<Vec<Option<f64>>> {
+    let table = read(text, Path::new("t.csv")).unwrap_or_else(|problem| panic!("{problem}"));
+    let row = |row: &Row| (0..table.columns()).map(|i| table.number(row, i).unwrap()).collect();
+    table.rows.iter().map(row).collect()
+}
+
+#[test]
+fn whatever_separates_and_ends_lines() {
+    let expected = vec![vec![Some(400.5), Some(1.25)], vec![Some(700.0), Some(-2.0)]];
+    let utf16 = |text: &str, big: bool| -> Vec<u8> {
+        let mark = if big { "" } else { "\u{feff}" };
+        format!("{mark}{text}")
+            .encode_utf16()
+            .flat_map(|word| if big { word.to_be_bytes() } else { word.to_le_bytes() })
+            .collect()
+    };
+    for text in [
+        &b"nm,value\r400.5,1.25\r700,-2\r"[..],
+        b"nm,value\r\n400.5,1.25\r\n\r\n700,-2\r\n,\r\n,,\r\n",
+        b"sep=;\nnm;value\n400,5;1,25\n700;-2\n",
+        b"nm;value\n400,5;1,25\n700,0;-2,0\n",
+        b"nm\tvalue\n400,5\t1,25\n700\t-2,0\n",
+        b"400,5 1,25\n700,0 -2,0\n",
+        b"nm,value,\n400.5,1.25,\n700,-2,\n",
+        b"\"Wavelength, nm\",\"Value, none\"\n400.5,1.25\n700,-2\n",
+        b"Instrument: X\nDate: 2026-01-01\nnm,value\n400.5,1.25\n700,-2\n",
+        b"Wavelength,Radiance\n(nm),(W)\n400.5,1.25\n700,-2\n",
+        b"nm,value\n4.005D+02,1.25d+0\n7.0D2,-2\n",
+        b"% about\n! about\n// about\nnm,value\n400.5,1.25\n700,\xe2\x88\x922\n",
+        b"nm\tRed; left\n400.5\t1.25\n700\t-2\n",
+        b"nm,value\n400.5,125%\n700,-200%\n",
+        b"wavelength (nm)   reflectance (no unit)\n 400.5  1.25\n 700  -2\n",
+        &utf16("nm,value\n400.5,1.25\n700,-2\n", false),
+        &utf16("nm,value\n400.5,1.25\n700,-2\n", true),
+    ] {
+        assert_eq!(numbers(text), expected, "{}", String::from_utf8_lossy(text));
+    }
+    assert_eq!(numbers(b"nm,v\n400,1.0-101\n500,2.5+100\n")[1][1], Some(2.5e100));
+    assert_eq!(
+        numbers(b"nm,v,w\n400,#N/A,1\n500,n/a,2\n"),
+        [[Some(400.0), None, Some(1.0)], [Some(500.0), None, Some(2.0)]]
+    );
+    let table = read(b"nm,Sample #1,Sample #2 # of two\n400,1,2 # first\n700,1,2\n", Path::new("t.csv")).unwrap();
+    assert_eq!(table.names, ["nm", "Sample #1", "Sample #2"]);
+}
+
+#[test]
+fn headers_are_found_where_they_stand() {
+    for (text, names) in [
+        ("# wavelength_um,radiance\n0.4,1\n0.5,1\n", &["wavelength_um", "radiance"][..]),
+        ("# made in 2020, by X\n400,1\n500,1\n", &[]),
+        ("# wavelength [um] radiance\n0.4 1\n0.5 1\n", &["wavelength [um]", "radiance"]),
+        ("Long name,second\nnm,W\nof a lamp,\n400,1\n500,2\n", &["Long name (nm)", "second (W)"]),
+        ("400,1\n500,1\n", &[]),
+        ("band,nm,response\nred,400,1\n", &["band", "nm", "response"]),
+    ] {
+        let table = read(text.as_bytes(), Path::new("t.csv")).unwrap_or_else(|problem| panic!("{text}: {problem}"));
+        assert_eq!(table.names, names, "{text}");
+    }
+}
+
+#[test]
+fn what_can_be_read_in_two_ways_is_refused() {
+    for (text, line, words) in [
+        ("nm\tv\n1,000\t2,000\n1,100\t2,100\n", 2, "decimal comma or a comma between thousands"),
+        ("nm;v\n1,5;2.5\n2,5;3.5\n", 2, "decimal comma"),
+        ("Scale factor: 100\nnm,v\n400,1\n500,1\n", 1, "not applied"),
+        ("X Units: um\nwl,v\n400,1\n500,1\n", 1, "not applied"),
+        ("nm,v,w,x\n400,1\n500,1\n", 1, "4 cells where the numbers below have 2"),
+    ] {
+        let problem = read(text.as_bytes(), Path::new("t.csv")).unwrap_err();
+        assert!(problem.message.contains(words) && problem.line == Some(line), "{text}: {problem}");
+    }
+    let table = read(b"nm,v\n400,0,1,0\n700,0,1,0\n", Path::new("t.csv"));
+    let problem = table.and_then(|table| table.check_row(&table.rows[0])).unwrap_err();
+    assert!(problem.to_string().contains("2") && problem.line.is_some(), "{problem}");
+}
