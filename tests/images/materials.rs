@@ -186,6 +186,42 @@ fn blends_reflect_by_share() {
     assert!((shown[0].mean / expected - 1.0).abs() < 1e-6, "{shown:?}");
 }
 
+/// Rough metals beyond the ends of their tables, which are held, and at the ends of what n and k may be: no sample is bad, on a device
+/// or in the reference, and none sends on more than it gets.
+#[test]
+fn rough_metals_are_finite_outside_their_tables() {
+    let ends = |a: f64, b: f64| Curve::Linear { nm: vec![500.0, 600.0], value: vec![a, b], outside: Outside::Hold };
+    let metals = [(ends(0.05, 0.3), ends(3.4, 120.0)), (ends(1e-3, 1e-3), ends(0.0, 1e-6))]
+        .into_iter()
+        .chain([(ends(1000.0, 1e-3), ends(1000.0, 1000.0)), (ends(1.0, 1.0), ends(0.0, 1e-4))]);
+    let bounds = vec![[380.0, 400.0], [499.0, 601.0], [779.0, 780.0], [19_000.0, 20_000.0]];
+    let mut builder = Builder::new()
+        .camera(look(
+            DVec3::new(0.0, 0.0, 3.0),
+            DVec3::ZERO,
+            DVec3::Y,
+            Projection::Perspective { tan_half: DVec2::splat(0.5) },
+        ))
+        .film(8, 8, Filter::Box)
+        .channels(Channels::from_bounds(bounds, None))
+        .bounces(4)
+        .sky(1.0);
+    for (i, (eta, k)) in metals.enumerate() {
+        let at = DVec3::new(0.7 * f64::from(i as u32 % 2) - 0.35, 0.7 * f64::from(i as u32 / 2) - 0.35, 0.0);
+        builder = builder.conductor(sphere(at, 0.33), eta, k, [0.3; 2]);
+    }
+    let scene = builder.build();
+    let rendered = render(&scene, 1, 64, Settings::default());
+    rendered.assert_clean();
+    let theirs = render_image(&scene, 64, 1);
+    let ours = rendered.means[0].iter().map(|value| f64::from(*value)).collect();
+    for values in [ours, theirs.mean] {
+        let means = (0..4).map(|k| values.iter().skip(k).step_by(4).sum::<f64>() / 64.0);
+        assert!(values.iter().all(|value| value.is_finite() && *value >= 0.0), "{values:?}");
+        assert!(means.clone().all(|mean| mean < 1.0 + TABLE), "{:?}", means.collect::<Vec<_>>());
+    }
+}
+
 // ---- Against the reference, per pixel and channel
 
 /// Welch's t-test, Sidak over pixels x channels, and over channels for the image; the largest standard errors relative to the

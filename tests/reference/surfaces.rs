@@ -127,7 +127,7 @@ fn blends_reflect_by_share() {
 /// means of six renders of one channel, where none has to stop: within 3.5 standard errors in 24 comparisons.
 #[test]
 fn dispersion_is_unbiased() {
-    for (roughness, samples, resolution) in [(0.0, 400_000, 0.02), (0.15, 60_000, 0.02)] {
+    for (roughness, samples, resolution) in [(0.0, 240_000, 0.02), (0.15, 40_000, 0.02)] {
         let all = Channels::equal(400.0, 700.0, 6);
         let together = shown(&dispersive_ball(all.clone(), roughness), samples, 170);
         for k in 0..6 {
