@@ -130,6 +130,15 @@ def told(test):
     return f"{test.seconds:7.1f} s  {', '.join(parts)}".rstrip()
 
 
+# The folder that temporary folders are made in, where this program has made it: the only one that it may remove.
+own_folder = None
+
+
+def remove_own_folder():
+    if own_folder:
+        shutil.rmtree(own_folder, ignore_errors=True)
+
+
 class Process(subprocess.Popen):
     """A program of tests, and whatever it starts: a render that its test did not live to end is ended with it."""
 
@@ -142,17 +151,18 @@ class Process(subprocess.Popen):
 
     def end(self):
         with Process.lock:
-            Process.all.discard(self)
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(self.pid, signal.SIGKILL)
+            # Once: its number may be another's later.
+            if self in Process.all:
+                Process.all.remove(self)
+                with contextlib.suppress(ProcessLookupError):
+                    os.killpg(self.pid, signal.SIGKILL)
 
     @staticmethod
     def end_all(number, _frame):
         for process in list(Process.all):
             process.end()
+        remove_own_folder()
         # The threads that wait for them are not waited for.
-        if tempfile.tempdir:
-            shutil.rmtree(tempfile.tempdir, ignore_errors=True)
         os._exit(128 + number)
 
 
@@ -273,14 +283,14 @@ def main():
     parser.add_argument("--failed", action="append", default=[], help="another check that failed, to be counted")
     parser.add_argument("words", nargs="*")
     arguments = parser.parse_args()
-    global verbose, full
+    global verbose, full, own_folder
     verbose, full = arguments.verbose, arguments.full
 
     # Tests of what is safe on a disk wait for it a hundred times longer than they work.
     memory = pathlib.Path("/dev/shm")
     if "TMPDIR" not in os.environ and memory.is_dir() and shutil.disk_usage(memory).free > MEMORY_FOLDER_BYTES:
-        tempfile.tempdir = os.environ["TMPDIR"] = tempfile.mkdtemp(prefix="spectile-tests-", dir=memory)
-        atexit.register(shutil.rmtree, tempfile.tempdir, ignore_errors=True)
+        own_folder = tempfile.tempdir = os.environ["TMPDIR"] = tempfile.mkdtemp(prefix="spectile-tests-", dir=memory)
+        atexit.register(remove_own_folder)
 
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, Process.end_all)
