@@ -19,14 +19,14 @@ pub struct Interrupt {
     end: Receiver<Infallible>,
     /// Holds one message at most: who asks twice before there is an answer gets one.
     ask: Sender<()>,
-    asked: Receiver<()>,
+    inquiries: Receiver<()>,
 }
 
 impl Default for Interrupt {
     fn default() -> Self {
         let (open, end) = bounded(0);
-        let (ask, asked) = bounded(1);
-        Interrupt { signal: AtomicI32::new(0), open: Mutex::new(Some(open)), end, ask, asked }
+        let (ask, inquiries) = bounded(1);
+        Interrupt { signal: AtomicI32::new(0), open: Mutex::new(Some(open)), end, ask, inquiries }
     }
 }
 
@@ -50,7 +50,7 @@ impl Interrupt {
 
     /// Has a message when somebody has asked how far the work is.
     pub fn inquiries(&self) -> &Receiver<()> {
-        &self.asked
+        &self.inquiries
     }
 
     /// [`Error::Interrupted`] once the end has been asked for.

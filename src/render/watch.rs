@@ -34,7 +34,7 @@ pub struct Reports {
 /// Where users ask for something.
 pub struct Requests {
     pub end: Receiver<Infallible>,
-    pub asked: Receiver<()>,
+    pub inquiries: Receiver<()>,
     pub controls: Receiver<Control>,
 }
 
@@ -43,14 +43,14 @@ impl Requests {
     pub fn new(interrupt: &Interrupt, controls: Option<&Receiver<Control>>) -> Requests {
         Requests {
             end: interrupt.end().clone(),
-            asked: interrupt.inquiries().clone(),
+            inquiries: interrupt.inquiries().clone(),
             controls: controls.cloned().unwrap_or_else(never),
         }
     }
 
     /// Nobody asks for anything.
     pub fn none() -> Requests {
-        Requests { end: never(), asked: never(), controls: never() }
+        Requests { end: never(), inquiries: never(), controls: never() }
     }
 }
 
@@ -101,7 +101,7 @@ impl Reports {
             }
             select_biased! {
                 recv(requests.end) -> _ => return Heard::End,
-                recv(requests.asked) -> _ => return Heard::Asked,
+                recv(requests.inquiries) -> _ => return Heard::Asked,
                 recv(requests.controls) -> control => if let Ok(control) = control {
                     return Heard::Control(control);
                 },

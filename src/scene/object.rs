@@ -71,7 +71,7 @@ impl<'s, 'a> Objects<'s, 'a> {
         let mut common = self.common(&fields);
         let named = fields.get("material");
         // An outer `None` has no material; an inner one is a mistake.
-        let look = match (&named, fields.get("interior")) {
+        let covering = match (&named, fields.get("interior")) {
             (Some(named), _) => Some(self.named_material(named).map(Covering::Of)),
             (None, Some(_)) => Some(self.null_boundary(&fields)),
             (None, None) => None,
@@ -84,19 +84,19 @@ impl<'s, 'a> Objects<'s, 'a> {
             if fields.has("interior") {
                 common.interior = self.filling(&fields, &Shape::Mesh(shape::join(&parts, Needs::default()).0));
             }
-            match look {
-                Some(look) => {
-                    if let Some(Covering::Invisible) = look {
+            match covering {
+                Some(covering) => {
+                    if let Some(Covering::Invisible) = covering {
                         self.warn_about_usemtl(&shape, &parts);
                     }
-                    self.push_mesh(&fields, &shape, &parts, None, look, &common);
+                    self.push_mesh(&fields, &shape, &parts, None, covering, &common);
                 }
                 None => self.push_by_usemtl(&fields, &shape, &parts, &common),
             }
             return;
         }
         let Some(local) = shape::decode(&shape) else { return };
-        let Some(look) = look else {
+        let Some(covering) = covering else {
             no_material(&fields, "the object has no `material`");
             return;
         };
@@ -104,9 +104,9 @@ impl<'s, 'a> Objects<'s, 'a> {
             common.interior = self.filling(&fields, &local);
         }
         let kind = shape.path.rsplit('.').next().unwrap_or_default();
-        let attributes = shape::attributes(&local, self.needs(look));
+        let attributes = shape::attributes(&local, self.needs(covering));
         let name = format!("{} ({kind})", item.path);
-        self.push(&fields, name, (local, attributes), look, &common);
+        self.push(&fields, name, (local, attributes), covering, &common);
     }
 
     pub fn finish(self) -> Vec<Object> {
@@ -240,12 +240,12 @@ impl<'s, 'a> Objects<'s, 'a> {
         shape: &Item<'a>,
         parts: &[&FaceRun],
         usemtl: Option<&str>,
-        look: Option<Covering>,
+        covering: Option<Covering>,
         common: &Common,
     ) {
-        let needs = self.needs(look);
+        let needs = self.needs(covering);
         let bare = parts.iter().find(|part| (needs.uv || needs.tangent) && part.uv.is_none());
-        if let (Some(part), Some(Covering::Of(material))) = (bare, look) {
+        if let (Some(part), Some(Covering::Of(material))) = (bare, covering) {
             let why = if needs.uv { "is textured" } else { "has two roughnesses" };
             let message = format!(
                 "material \"{}\" {why}, but the faces from here on have no texture coordinates (vt)",
@@ -273,11 +273,11 @@ impl<'s, 'a> Objects<'s, 'a> {
                 ));
             }
         }
-        self.push(fields, name, (Shape::Mesh(mesh), attributes), look, common);
+        self.push(fields, name, (Shape::Mesh(mesh), attributes), covering, common);
     }
 
-    fn needs(&self, look: Option<Covering>) -> Needs {
-        match look {
+    fn needs(&self, covering: Option<Covering>) -> Needs {
+        match covering {
             Some(Covering::Of(material)) => self.materials.needs(material),
             _ => Needs::default(),
         }
@@ -289,7 +289,7 @@ impl<'s, 'a> Objects<'s, 'a> {
         fields: &Fields<'a>,
         name: String,
         (local, mut attributes): (Shape, Attributes),
-        look: Option<Covering>,
+        covering: Option<Covering>,
         common: &Common,
     ) {
         let Some(affine) = common.affine else { return };
@@ -326,8 +326,10 @@ impl<'s, 'a> Objects<'s, 'a> {
                 fields.cx.warn(warning);
             }
         }
-        let (Some(look), Some(emission), Some(interior)) = (look, common.emission, common.interior) else { return };
-        let material = match look {
+        let (Some(covering), Some(emission), Some(interior)) = (covering, common.emission, common.interior) else {
+            return;
+        };
+        let material = match covering {
             Covering::Of(material) => Some(material),
             Covering::Invisible => None,
         };

@@ -15,6 +15,12 @@ pub enum Outside {
     Hold,
 }
 
+/// On the line from node `i - 1` to node `i`.
+fn between(x: &[f64], y: &[f64], i: usize, at: f64) -> f64 {
+    let t = (at - x[i - 1]) / (x[i] - x[i - 1]);
+    y[i - 1] + t * (y[i] - y[i - 1])
+}
+
 /// A function of wavelength (nm). Values carry the unit of what they describe.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Curve {
@@ -51,9 +57,7 @@ impl Curve {
                 if i > last {
                     return y[last];
                 }
-                let (x0, x1) = (x[i - 1], x[i]);
-                let t = (nm - x0) / (x1 - x0);
-                y[i - 1] + t * (y[i] - y[i - 1])
+                between(x, y, i, nm)
             }
         }
     }
@@ -75,17 +79,13 @@ impl Curve {
                 } else {
                     x.partition_point(|&xi| xi < to)
                 };
-                let between = |i: usize, nm: f64| {
-                    let t = (nm - x[i - 1]) / (x[i] - x[i - 1]);
-                    y[i - 1] + t * (y[i] - y[i - 1])
-                };
                 // Value just inside the interval, at either end.
                 let start = if from < first {
                     beyond(y[0])
                 } else if from >= last {
                     beyond(y[y.len() - 1])
                 } else {
-                    between(a, from)
+                    between(x, y, a, from)
                 };
                 let mut nodes: Nodes = smallvec![(from, start)];
                 let mut push = |node: (f64, f64)| {
@@ -108,7 +108,7 @@ impl Curve {
                 } else if to > last {
                     beyond(y[y.len() - 1])
                 } else {
-                    if x[b] == to || b == 0 { y[b] } else { between(b, to) }
+                    if x[b] == to || b == 0 { y[b] } else { between(x, y, b, to) }
                 };
                 push((to, end));
                 if nodes.len() == 1 {

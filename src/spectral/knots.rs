@@ -8,19 +8,18 @@ pub struct Knots {
     pub places: Vec<u32>,
     /// Values of the four channels at each place.
     pub values: Vec<[f32; 4]>,
-    quads: usize,
     filled: usize,
 }
 
 impl Knots {
     /// Room for so many (spectrum, quad of channels), to be filled by [`Knots::push`].
     pub fn new(quads: usize) -> Knots {
-        Knots { places: vec![quads as u32 + 1; quads + 1], values: Vec::new(), quads, filled: 0 }
+        Knots { places: vec![quads as u32 + 1; quads + 1], values: Vec::new(), filled: 0 }
     }
 
     /// Entries of `places` before the first place.
     pub fn first_place(&self) -> usize {
-        self.quads + 1
+        self.places[0] as usize
     }
 
     pub fn is_empty(&self) -> bool {

@@ -267,12 +267,14 @@ impl Place<'_> {
             let curve = spectrum.of(k);
             let [from, to] = self.channels.bounds[k];
             let peak = curve.max(from, to);
-            let keeps_bound = |stratum: usize, bits: u32| {
-                let (a, b) = (self.warp.edge(k, stratum, bits), self.warp.edge(k, stratum + 1, bits));
-                fit_within(curve, [a, b], peak, kind).1 <= bound
-            };
+            let keeps_bound = |stratum, bits| fit_within(curve, self.ends(k, stratum, bits), peak, kind).1 <= bound;
             (least..=max_bits).find(|&bits| (0..1usize << bits).all(|stratum| keeps_bound(stratum, bits)))
         })
+    }
+
+    /// The wavelengths between which one of 2^`bits` strata of channel `k` lies.
+    fn ends(&self, k: usize, stratum: usize, bits: u32) -> [f64; 2] {
+        [stratum, stratum + 1].map(|edge| self.warp.edge(k, edge, bits))
     }
 
     /// What [`Knots`] has of one channel, and how far its mean is off.
@@ -282,7 +284,7 @@ impl Place<'_> {
         // (μ in units of the device, value), and the integral over wavelength of what lies between.
         let (mut knots, mut area) = (Vec::<(f64, f64)>::new(), 0.0);
         for stratum in 0..1usize << warp.bits() {
-            let [a, b] = [stratum, stratum + 1].map(|j| warp.edge(k, j, warp.bits()));
+            let [a, b] = self.ends(k, stratum, warp.bits());
             let weight = warp.weight(k, stratum);
             let nodes = curve.linear_pieces(a, b).map_or_else(|| smooth_nodes(curve, a, b), Nodes::into_vec);
             let mu = |nm: f64| (stratum as f64 + (nm - a) / (b - a)) / f64::from(1u32 << warp.bits());
@@ -309,7 +311,7 @@ impl Place<'_> {
             let peak = curve.max(from, to);
             let (mut pointwise, mut mean) = (0.0f64, 0.0);
             let lines = (0..1usize << bits).map(|stratum| {
-                let (a, b) = (self.warp.edge(k, stratum, bits), self.warp.edge(k, stratum + 1, bits));
+                let [a, b] = self.ends(k, stratum, bits);
                 let (line, error) = fit_within(curve, [a, b], peak, wanted.exactness);
                 pointwise = pointwise.max(error);
                 mean += (line.value + 0.5 * line.slope) * (b - a) / (to - from);

@@ -12,6 +12,11 @@ use crate::{size, statistics};
 
 const OTHERS: [Evaluator; 3] = [Evaluator::DpeptPath, Evaluator::DpeptSpectral, Evaluator::Pt];
 
+/// Kernels of general scenes take long to compile, and those of a path a thread read records as those of a path a workgroup do.
+fn others(is_general: bool) -> impl Iterator<Item = Evaluator> {
+    OTHERS.into_iter().filter(move |other| size::is_full() || !is_general || *other != Evaluator::DpeptPath)
+}
+
 fn table(nm: &[f64], value: &[f64]) -> Curve {
     Curve::Linear { nm: nm.to_vec(), value: value.to_vec(), outside: Outside::Hold }
 }
@@ -95,11 +100,7 @@ fn the_same_paths_give_the_same_means() {
         let prepared = Prepared::new(&scene, 0).expect("a scene");
         assert_eq!(prepared.tables.kinks, 0, "{what}: the others have strata instead");
         let bound = device::rounding(prepared.max_records(), samples);
-        // Kernels of general scenes take long to compile, and those of a path a thread read records as those of a path a workgroup do.
-        let others = OTHERS
-            .into_iter()
-            .filter(|other| size::is_full() || !prepared.is_general() || *other != Evaluator::DpeptPath);
-        for evaluator in others {
+        for evaluator in others(prepared.is_general()) {
             // Waves of a few pixels and samples, and large ones.
             let is_plain = what.starts_with("plain");
             for paths in [None, Some(600)].into_iter().take(if is_plain { 2 } else { 1 }) {
@@ -164,9 +165,7 @@ fn kinks_are_the_same_spectra_as_strata() {
 fn waves_change_no_bit_of_any_evaluator() {
     for scene in [plain(6).build(), general(4).build()] {
         let is_general = Prepared::new(&scene, 0).expect("a scene").is_general();
-        for evaluator in
-            OTHERS.into_iter().filter(|other| size::is_full() || !is_general || *other != Evaluator::DpeptPath)
-        {
+        for evaluator in others(is_general) {
             let scene = with(&scene, evaluator);
             let bits = |settings: Settings| -> Vec<u32> {
                 render(&scene, 1, 64, settings).means.iter().flatten().map(|v| v.to_bits()).collect()
