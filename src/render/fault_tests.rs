@@ -159,7 +159,10 @@ fn another_device_finishes_with_the_same_bytes() {
             assert_eq!(faults.fired(), 1, "{name}, {phase:?}");
             outcome.succeeded();
             let [warning] = &outcome.warnings[..] else { panic!("{name}, {phase:?}: {:?}", outcome.warnings) };
-            assert!(warning.starts_with("device 1 is lost, 1 go on") && warning.contains(said), "{phase:?}: {warning}");
+            // The other may have rendered what was given back before the first has said that it leaves.
+            let lost = ["device 1 is lost, 1 go on without it: ", "device 1 is lost, others finished the render: "];
+            assert!(lost.iter().any(|lost| warning.starts_with(lost)), "{name}, {phase:?}: {warning}");
+            assert!(warning.contains(said), "{name}, {phase:?}: {warning}");
             assert!(outcome.arrays == undisturbed.arrays, "{name}, {phase:?}");
             faults.release();
         }

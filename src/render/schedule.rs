@@ -128,7 +128,9 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
         // Nothing is under way but set-up, which nobody waits for.
         return Err(result.err().unwrap_or_else(no_cube));
     }
-    reports.for_each(|(_, report)| render.note_last(report));
+    // Every device is heard out, whatever one of them says.
+    let told = reports.map(|(device, report)| render.note_last(device, report, result.is_ok(), observe));
+    let told = told.fold(Ok(()), Result::and);
     // What ended the epochs is the error to report, whatever else fails for the same reason.
     let Some(cube) = pool.cube.get() else { return Err(result.err().unwrap_or_else(no_cube)) };
     cube.close();
@@ -143,6 +145,7 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
     result?;
     flushed?;
     facts?;
+    told?;
     warned?;
     Ok(Summary {
         profile: render.profile,
@@ -472,17 +475,35 @@ impl<'a> Render<'a> {
         observe(Event::Progress(&self.status))
     }
 
-    /// What a device says after the end: what it measured, and units that it merged meanwhile.
-    fn note_last(&mut self, report: Report) {
+    /// What a device says after the end, which is a good one if the render `is_complete`: what it measured, units that it
+    /// merged meanwhile, and trouble, of which others were faster to make up for than it was to tell.
+    fn note_last(
+        &mut self,
+        device: usize,
+        report: Report,
+        is_complete: bool,
+        observe: &mut dyn FnMut(Event) -> Result<()>,
+    ) -> Result<()> {
         match report {
             Report::Left { result: Ok(Some(of_device)) } => {
                 let sum = self.profile.get_or_insert_default();
                 sum.generate_s += of_device.generate_s;
                 sum.evaluate_s += of_device.evaluate_s;
             }
+            Report::Left { result: Err(error) } if is_complete => match error {
+                Error::DevicesLost(what) | Error::NoDevice(what) => {
+                    let device = device + 1;
+                    observe(Event::Warning(format!("device {device} is lost, others finished the render: {what}")))?;
+                }
+                // Asked for too late.
+                Error::Interrupted { .. } => {}
+                error => return Err(error),
+            },
             Report::Merged(merged) => self.count(&merged),
-            _ => {}
+            Report::Warning(what) => observe(Event::Warning(what))?,
+            Report::Left { .. } | Report::Ready { .. } => {}
         }
+        Ok(())
     }
 
     /// Adds what a group of units took.
