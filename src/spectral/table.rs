@@ -1,13 +1,15 @@
 //! Spectra as the device wants them: for every channel a few strata of the wavelength coordinate μ, in each of them a
 //! value and a slope; and exact knots for what no affordable number of strata resolves.
 
+use std::borrow::Cow;
+
 use rayon::prelude::*;
 
 use super::curve::Nodes;
 use super::kinks::BentLine;
 use super::knots::Knots;
 use super::warp::Warp;
-use super::{Channels, Curve};
+use super::{Channels, Curve, Outside};
 
 /// Pointwise bound relative to the channel's peak: what tables may be off, well below a render's noise.
 pub const POINTWISE_BOUND: f64 = 1e-4;
@@ -264,9 +266,12 @@ impl Place<'_> {
     fn strata_needed(&self, spectrum: Tabulated, max_bits: u32, bound: f64, kind: Exactness) -> Option<u32> {
         // What satisfied the channels so far is where the next channel starts.
         (0..self.channels.len()).try_fold(self.warp.bits(), |least, k| {
-            let curve = spectrum.of(k);
             let [from, to] = self.channels.bounds[k];
-            let peak = curve.max(from, to);
+            let curve = match Within::of(spectrum.of(k), from, to) {
+                Within::Line(_) => return Some(least),
+                Within::Curve(curve) => curve,
+            };
+            let (curve, peak) = (&*curve, curve.max(from, to));
             let keeps_bound = |stratum, bits| fit_within(curve, self.ends(k, stratum, bits), peak, kind).1 <= bound;
             (least..=max_bits).find(|&bits| (0..1usize << bits).all(|stratum| keeps_bound(stratum, bits)))
         })
@@ -307,18 +312,31 @@ impl Place<'_> {
     fn fit(&self, wanted: &Wanted, bits: u32) -> (Vec<Vec<Line>>, Bounds) {
         let mut bounds = Bounds::default();
         let lines = (0..self.channels.len()).map(|k| {
-            let ([from, to], curve) = (self.channels.bounds[k], wanted.spectrum.of(k));
-            let peak = curve.max(from, to);
+            let [from, to] = self.channels.bounds[k];
+            let weighted = |line: Line, stratum: usize| match wanted.weighted {
+                true => line.times(self.warp.weight(k, stratum >> (bits - self.warp.bits()))),
+                false => line,
+            };
+            let strata = 0..1usize << bits;
+            let curve = match Within::of(wanted.spectrum.of(k), from, to) {
+                Within::Line([first, last]) => {
+                    let at = |nm: f64| first + (nm - from) / (to - from) * (last - first);
+                    let line = |stratum| {
+                        let [a, b] = self.ends(k, stratum, bits).map(at);
+                        weighted(Line { value: a, slope: b - a }, stratum)
+                    };
+                    return strata.map(line).collect();
+                }
+                Within::Curve(curve) => curve,
+            };
+            let (curve, peak) = (&*curve, curve.max(from, to));
             let (mut pointwise, mut mean) = (0.0f64, 0.0);
-            let lines = (0..1usize << bits).map(|stratum| {
+            let lines = strata.map(|stratum| {
                 let [a, b] = self.ends(k, stratum, bits);
                 let (line, error) = fit_within(curve, [a, b], peak, wanted.exactness);
                 pointwise = pointwise.max(error);
                 mean += (line.value + 0.5 * line.slope) * (b - a) / (to - from);
-                match wanted.weighted {
-                    true => line.times(self.warp.weight(k, stratum >> (bits - self.warp.bits()))),
-                    false => line,
-                }
+                weighted(line, stratum)
             });
             let lines = lines.collect();
             if peak > 0.0 {
@@ -327,6 +345,26 @@ impl Place<'_> {
             lines
         });
         (lines.collect(), bounds)
+    }
+}
+
+/// A curve within a channel, so that its strata search through few nodes, or none.
+enum Within<'a> {
+    /// From one value to another.
+    Line([f64; 2]),
+    Curve(Cow<'a, Curve>),
+}
+
+impl Within<'_> {
+    fn of(curve: &Curve, from: f64, to: f64) -> Within<'_> {
+        match curve.linear_pieces(from, to) {
+            None => Within::Curve(Cow::Borrowed(curve)),
+            Some(nodes) if nodes.len() == 2 => Within::Line([nodes[0].1, nodes[1].1]),
+            Some(nodes) => {
+                let (nm, value) = nodes.into_iter().unzip();
+                Within::Curve(Cow::Owned(Curve::Linear { nm, value, outside: Outside::Hold }))
+            }
+        }
     }
 }
 
@@ -423,7 +461,6 @@ fn smooth_nodes(curve: &Curve, from: f64, to: f64) -> Vec<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spectral::Outside;
 
     fn build(curves: &[&Curve], channels: &Channels) -> SpectralTables {
         let same: Vec<Tabulated> = curves.iter().map(|curve| Tabulated::Same(curve)).collect();

@@ -56,7 +56,7 @@ pub fn reflectance(rgb: [f64; 3]) -> Curve {
     if rgb[0] == rgb[1] && rgb[1] == rgb[2] {
         return Curve::Constant(rgb[0]);
     }
-    let coefficients = solve(DVec3::from_array(rgb));
+    let coefficients = solve(DVec3::from_array(rgb)).coefficients;
     on_grid((0..NODES).map(|i| smooth(coefficients, i)))
 }
 
@@ -69,7 +69,7 @@ impl Smooth {
     pub fn new(rgb: [f64; 3]) -> Self {
         match grey(rgb) {
             Some(grey) => grey,
-            None => Smooth(solve(DVec3::from_array(rgb)).to_array()),
+            None => Smooth(solve(DVec3::from_array(rgb)).coefficients.to_array()),
         }
     }
 
@@ -97,10 +97,15 @@ pub fn smooth_of(colours: &[[f32; 3]]) -> Vec<Smooth> {
 
     const BLOCK: usize = 256;
     let solve = |block: &[[f32; 3]]| {
-        let mut before = None;
+        let mut similar = None;
         let solved = block.iter().map(|rgb| {
-            let smooth = near(rgb.map(f64::from), before);
-            before = Some(smooth).filter(|_| grey(rgb.map(f64::from)).is_none());
+            let colour = rgb.map(f64::from);
+            let smooth = grey(colour).unwrap_or_else(|| {
+                let solution = near(DVec3::from_array(colour), similar.take());
+                let smooth = Smooth(solution.coefficients.to_array());
+                similar = Some(solution);
+                smooth
+            });
             (rgb.map(f32::to_bits), smooth)
         });
         solved.collect::<Vec<_>>()
@@ -109,16 +114,16 @@ pub fn smooth_of(colours: &[[f32; 3]]) -> Vec<Smooth> {
     colours.iter().map(|rgb| solved[&rgb.map(f32::to_bits)]).collect()
 }
 
-/// The solution for `rgb` from that of a similar colour, or from none.
-fn near(rgb: [f64; 3], similar: Option<Smooth>) -> Smooth {
-    if let (Some(similar), None) = (similar, grey(rgb)) {
-        let target = lab(OBSERVER.from_rgb * DVec3::from_array(rgb)).0;
-        let coefficients = descend(DVec3::from_array(similar.0), target, 12);
-        if (appearance(coefficients).0 - target).length_squared() < CLOSE_ENOUGH {
-            return Smooth(coefficients.to_array());
+/// The solution for `rgb`, not grey, from that of a similar colour, or from none.
+fn near(rgb: DVec3, similar: Option<Found>) -> Found {
+    if let Some(similar) = similar {
+        let target = lab(OBSERVER.from_rgb * rgb).0;
+        let found = descend(similar, target, 12);
+        if found.is_close(target) {
+            return found;
         }
     }
-    Smooth::new(rgb)
+    solve(rgb)
 }
 
 /// Ten bits of each component, taken in turn (Morton 1966).
@@ -202,33 +207,76 @@ fn lab(xyz: DVec3) -> (DVec3, DMat3) {
     (value, derivative)
 }
 
-/// CIELAB of the smooth reflectance, and its derivative by the coefficients.
-fn appearance(coefficients: DVec3) -> (DVec3, DMat3) {
-    let (mut xyz, mut derivative) = (DVec3::ZERO, DMat3::ZERO);
-    for (i, &weight) in OBSERVER.weight.iter().enumerate() {
-        let b = basis(i);
-        let x = coefficients.dot(b);
-        let root = (1.0 + x * x).sqrt().recip();
-        xyz += weight * (0.5 + 0.5 * x * root);
-        let slope = weight * (0.5 * root * root * root);
-        derivative += DMat3::from_cols(slope * b.x, slope * b.y, slope * b.z);
+/// Nodes that are summed side by side, the registers of a processor: the last ones are padded with weights of 0.
+const LANES: usize = 4;
+
+/// Some neighbouring nodes of the grid: t and the weights of x̄, ȳ and z̄.
+struct Nodes {
+    t: [f64; LANES],
+    weight: [[f64; LANES]; 3],
+}
+
+static NODES_BY_LANES: LazyLock<Vec<Nodes>> = LazyLock::new(|| {
+    let node = |i: usize| (i < NODES).then(|| (basis(i).y, OBSERVER.weight[i].to_array()));
+    let nodes = |first: usize| Nodes {
+        t: std::array::from_fn(|lane| node(first + lane).map_or(0.0, |(t, _)| t)),
+        weight: std::array::from_fn(|bar| {
+            std::array::from_fn(|lane| node(first + lane).map_or(0.0, |(_, weight)| weight[bar]))
+        }),
+    };
+    (0..NODES).step_by(LANES).map(nodes).collect()
+});
+
+/// Coefficients, CIELAB of their smooth reflectance, and its derivative by the coefficients.
+#[derive(Clone, Copy)]
+struct Found {
+    coefficients: DVec3,
+    lab: DVec3,
+    jacobian: DMat3,
+}
+
+impl Found {
+    /// A picture of many colours spends its time here.
+    fn at(coefficients: DVec3) -> Found {
+        let [a, b, c] = coefficients.to_array();
+        // Of each bar: the sum of values, and of slopes by each coefficient.
+        let mut sums = [[[0.0; LANES]; 4]; 3];
+        for Nodes { t, weight } in NODES_BY_LANES.iter() {
+            let x = t.map(|t| (a * t + b) * t + c);
+            let root = x.map(|x| (1.0 + x * x).sqrt().recip());
+            for (sums, weight) in sums.iter_mut().zip(weight) {
+                for lane in 0..LANES {
+                    let (t, root) = (t[lane], root[lane]);
+                    let slope = weight[lane] * (0.5 * root * root * root);
+                    sums[0][lane] += weight[lane] * (0.5 + 0.5 * x[lane] * root);
+                    sums[1][lane] += slope * t * t;
+                    sums[2][lane] += slope * t;
+                    sums[3][lane] += slope;
+                }
+            }
+        }
+        let sum = |of: usize| DVec3::from_array(sums.map(|bar| bar[of].iter().sum()));
+        let (lab, by_xyz) = lab(sum(0));
+        Found { coefficients, lab, jacobian: by_xyz * DMat3::from_cols(sum(1), sum(2), sum(3)) }
     }
-    let (value, by_xyz) = lab(xyz);
-    (value, by_xyz * derivative)
+
+    fn is_close(&self, target: DVec3) -> bool {
+        (self.lab - target).length_squared() < CLOSE_ENOUGH
+    }
 }
 
 /// The coefficients for `rgb` in [0, 1]³, not grey. From a grey of equal luminance the target moves to the colour in
 /// steps, each starting at the solution of the one before, as the paper builds its table.
-fn solve(rgb: DVec3) -> DVec3 {
+fn solve(rgb: DVec3) -> Found {
     const STEPS: u32 = 8;
     let grey = (OBSERVER.from_rgb * rgb).y.clamp(1e-3, 1.0 - 1e-3);
     let x = 2.0 * grey - 1.0;
-    let mut coefficients = DVec3::new(0.0, 0.0, x / (1.0 - x * x).sqrt());
+    let mut found = Found::at(DVec3::new(0.0, 0.0, x / (1.0 - x * x).sqrt()));
     for step in 1..=STEPS {
         let target = DVec3::splat(grey).lerp(rgb, f64::from(step) / f64::from(STEPS));
-        coefficients = descend(coefficients, lab(OBSERVER.from_rgb * target).0, 100);
+        found = descend(found, lab(OBSERVER.from_rgb * target).0, 100);
     }
-    coefficients
+    found
 }
 
 /// CIELAB units, squared: far below what f32 output can show.
@@ -236,29 +284,26 @@ const CLOSE_ENOUGH: f64 = 1e-18;
 
 /// Gauss-Newton on the CIELAB difference to `target`, damped (Levenberg-Marquardt) so that it also ends well where
 /// the colour is out of reach and the coefficients would run away.
-fn descend(mut coefficients: DVec3, target: DVec3, iterations: usize) -> DVec3 {
+fn descend(mut found: Found, target: DVec3, iterations: usize) -> Found {
     let mut damping = 1e-3;
-    let (value, mut jacobian) = appearance(coefficients);
-    let mut residual = value - target;
     for _ in 0..iterations {
-        if residual.length_squared() < CLOSE_ENOUGH || damping > 1e12 {
+        if found.is_close(target) || damping > 1e12 {
             break;
         }
+        let (residual, jacobian) = (found.lab - target, found.jacobian);
         let normal = jacobian.transpose() * jacobian;
         let diagonal = DVec3::new(normal.x_axis.x, normal.y_axis.y, normal.z_axis.z);
         let damped = normal + DMat3::from_diagonal(diagonal * damping + 1e-12);
-        let candidate = coefficients - damped.inverse() * (jacobian.transpose() * residual);
-        let (value, derivative) = appearance(candidate);
-        let difference = value - target;
+        let candidate = Found::at(found.coefficients - damped.inverse() * (jacobian.transpose() * residual));
         // A singular matrix gives NaN, which is no improvement either.
-        if difference.length_squared() < residual.length_squared() {
-            (coefficients, residual, jacobian) = (candidate, difference, derivative);
+        if (candidate.lab - target).length_squared() < residual.length_squared() {
+            found = candidate;
             damping = (damping * 0.1).max(1e-15);
         } else {
             damping *= 10.0;
         }
     }
-    coefficients
+    found
 }
 
 #[cfg(test)]

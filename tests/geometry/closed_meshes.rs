@@ -103,7 +103,7 @@ fn closed_meshes_are_watertight() {
             vec![DVec3::ZERO, DVec3::new(0.25, 0.25, 0.25), DVec3::new(0.5, 0.0, 0.0), DVec3::new(0.0, 0.125, -0.5)];
         origins.extend((0..4).map(|_| 0.4 * random.in_cube()));
         origins.push(0.97 * DVec3::new(0.3, 0.9, 0.1).normalize());
-        assert_no_leak(what, &prepared, &hard_rays(&prepared, &origins, 600_000, &mut random));
+        assert_no_leak(what, &prepared, &hard_rays(&prepared, &origins, 400_000, &mut random));
     }
 }
 

@@ -29,7 +29,7 @@ struct Effort {
     image: f64,
 }
 
-const USUAL: Effort = Effort { epochs: 20, reference: 2560, pixel: 0.25, image: 0.006 };
+const USUAL: Effort = Effort { epochs: 20, reference: 1_280, pixel: 0.25, image: 0.006 };
 
 fn compare(what: &str, scene: &Scene, effort: &Effort) {
     let ours = render(scene, effort.epochs, 64, Settings { seed: 11, tile: [8, 8], ..Settings::default() });
@@ -219,7 +219,7 @@ fn many_spectra_with_lines() {
     scene.integrator.wavelengths = Wavelengths::Uniform;
     let f = features(&scene);
     assert!(!f.registers && f.strata && f.knots && f.thin_lens && f.gaussian && !f.shapes);
-    compare("many spectra", &scene, &Effort { epochs: 64, reference: 32_768, pixel: 0.4, image: 0.015 });
+    compare("many spectra", &scene, &Effort { epochs: 48, reference: 16_384, pixel: 0.4, image: 0.018 });
 }
 
 /// More than eight spectra without lines: tables without knots.

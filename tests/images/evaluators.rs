@@ -12,9 +12,9 @@ use crate::{size, statistics};
 
 const OTHERS: [Evaluator; 3] = [Evaluator::DpeptPath, Evaluator::DpeptSpectral, Evaluator::Pt];
 
-/// Kernels of general scenes take long to compile, and those of a path a thread read records as those of a path a workgroup do.
+/// Kernels of general scenes take long to compile, and all of these read records by one text: the one that is chosen by itself.
 fn others(is_general: bool) -> impl Iterator<Item = Evaluator> {
-    OTHERS.into_iter().filter(move |other| size::is_full() || !is_general || *other != Evaluator::DpeptPath)
+    OTHERS.into_iter().filter(move |other| size::is_full() || !is_general || *other == Evaluator::Pt)
 }
 
 fn table(nm: &[f64], value: &[f64]) -> Curve {

@@ -382,7 +382,7 @@ fn thousands_of_emitting_triangles() {
     assert_eq!(Prepared::new(&scene, 0).unwrap().emitters.len(), 20_482);
     // The icosphere's faces lie up to 3e-4 inside the sphere (edges of 1/32 of 63 degrees): its cross-section lacks twice that.
     let expected = [2.0 / 16.0, 5.0 * side * side / PI];
-    let epochs = device::render(&scene, 64, 1024, Settings { seed: 41, ..Settings::default() });
+    let epochs = device::render(&scene, 64, 256, Settings { seed: 41, ..Settings::default() });
     epochs.assert_clean();
-    assert_estimates("triangles", &epochs.values(), &expected, Bound { resolution: 0.01, allowance: 1e-3 });
+    assert_estimates("triangles", &epochs.values(), &expected, Bound { resolution: 0.02, allowance: 1e-3 });
 }

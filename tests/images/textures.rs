@@ -245,10 +245,15 @@ fn smooth_ball(levels: u32, add: &dyn Fn(Builder, Shape) -> Builder) -> Builder 
 
 /// Welch's t-test, Sidak over pixels x channels, and over channels for the image; the largest standard errors relative to the
 /// channel's mean over the image.
-fn against_reference(what: &str, scene: &Scene, [pixel, image]: [f64; 2]) {
+/// Samples of each of 16 epochs, and of the reference.
+const USUAL: [u32; 2] = [256, 6000];
+/// Where every pixel sees much of the light.
+const FEW: [u32; 2] = [64, 1000];
+
+fn against_reference(what: &str, scene: &Scene, samples: [u32; 2], [pixel, image]: [f64; 2]) {
     let channels = scene.channels.len();
-    let theirs = of_reference(scene, 6000, 31);
-    let ours = render(scene, 16, 256, Settings { seed: 31, tile: [8, 8], ..Settings::default() });
+    let theirs = of_reference(scene, samples[1], 31);
+    let ours = render(scene, 16, samples[0], Settings { seed: 31, tile: [8, 8], ..Settings::default() });
     ours.assert_clean();
     let pixels = theirs.len() / channels;
     let mean = |k: usize| theirs.iter().skip(k).step_by(channels).map(|e| e.mean).sum::<f64>() / pixels as f64;
@@ -298,6 +303,7 @@ fn textured_materials_are_those_of_the_reference() {
             let texture = b.mixture([2, 2], &shares, &ends);
             b.textured(plate(), texture).attributes(quad_uv()).roulette(2)
         }),
+        USUAL,
         [0.25, 0.03],
     );
     for roughness in size::first(1, [0.3, 0.0]) {
@@ -307,6 +313,7 @@ fn textured_materials_are_those_of_the_reference() {
                 let texture = b.texture([2, 2], &colours, TextureKind::Colour);
                 b.coated(plate(), texture, slanted(1.6, 1.5), roughness).attributes(quad_uv())
             }),
+            USUAL,
             [0.25, 0.03],
         );
     }
@@ -318,6 +325,7 @@ fn textured_materials_are_those_of_the_reference() {
             let b = b.conductor(plate(), 0.2, 3.4, [0.3; 2]).textured(plate(), texture);
             b.masked_last_two(plate(), mask).attributes(quad_uv())
         }),
+        USUAL,
         [0.25, 0.03],
     );
 }
@@ -328,13 +336,19 @@ fn smooth_and_brushed_surfaces_are_those_of_the_reference() {
         let lamp = quad(DVec3::new(-1.0, 3.0, 1.0), DVec3::new(2.0, 0.0, 0.0), DVec3::new(0.0, 0.5, 1.5));
         b.lamp(lamp, 5.0, Sides::Both).sky(0.3).film(5, 5, Filter::Box).bounces(3).build()
     };
-    against_reference("smooth diffuse", &lamp(smooth_ball(1, &|b, ball| b.diffuse(ball, 0.7))), [0.25, 0.03]);
+    against_reference("smooth diffuse", &lamp(smooth_ball(1, &|b, ball| b.diffuse(ball, 0.7))), FEW, [0.25, 0.03]);
     against_reference(
         "smooth metal",
         &lamp(smooth_ball(1, &|b, ball| b.conductor(ball, 0.2, 3.4, [0.3; 2]))),
+        FEW,
         [0.25, 0.03],
     );
-    against_reference("smooth glass", &lamp(smooth_ball(1, &|b, ball| b.dielectric(ball, 1.5, 0.2))), [0.25, 0.03]);
+    against_reference(
+        "smooth glass",
+        &lamp(smooth_ball(1, &|b, ball| b.dielectric(ball, 1.5, 0.2))),
+        FEW,
+        [0.25, 0.03],
+    );
 
     // Brushed around a tilted axis; and by the coordinates of a mesh.
     let tilted = DMat3::from_axis_angle(DVec3::Z, 0.6);
@@ -342,7 +356,7 @@ fn smooth_and_brushed_surfaces_are_those_of_the_reference() {
     let seen = || Builder::new().camera(look(DVec3::new(1.0, 2.0, 4.0), DVec3::ZERO, DVec3::Y, wide.clone()));
     let ball = sphere(DVec3::ZERO, 1.0);
     let brushed = seen().conductor(ball, 0.2, 3.4, [0.5, 0.1]).attributes(axes(tilted));
-    against_reference("brushed ball", &lamp(brushed), [0.25, 0.03]);
+    against_reference("brushed ball", &lamp(brushed), FEW, [0.25, 0.03]);
 }
 
 /// Brushing follows u: a mesh whose u runs along y with roughness (a, b) is a quad, whose tangent is x, with (b, a).
@@ -407,10 +421,10 @@ fn a_constant_texture_is_no_texture() {
         ]
     };
     for (i, (textured, plain)) in size::first(2, scenes(true).iter().zip(&scenes(false))).enumerate() {
-        let [a, b] = [textured, plain].map(|scene| of_device(scene, 16, 256, 51));
+        let [a, b] = [textured, plain].map(|scene| of_device(scene, 16, 80, 51));
         let scale: Vec<f64> = b.iter().map(|e| e.mean).collect();
         assert_agreement(&format!("scene {i}"), &a, &b, &scale, Bound { resolution: 0.1, allowance: 1e-4 });
-        let [a, b] = [textured, plain].map(|scene| of_reference(scene, 3000, 52));
+        let [a, b] = [textured, plain].map(|scene| of_reference(scene, 1000, 52));
         assert_agreement(&format!("reference {i}"), &a, &b, &scale, Bound { resolution: 0.1, allowance: 1e-9 });
     }
 }

@@ -39,6 +39,7 @@ cases! {
     #[ignore = "installs packages of Python"]
     cube_to_netcdf = "cube-to-netcdf",
     emission_outside_channels = "emission-outside-channels",
+    #[ignore = "installs packages of Python"]
     envi_long_lines = "envi-long-lines",
     envi_scale_and_bad_bands = "envi-scale-and-bad-bands",
     export_overwrites_neighbour = "export-overwrites-neighbour",

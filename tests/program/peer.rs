@@ -9,16 +9,18 @@ use tempfile::tempdir;
 
 use crate::binary::{cornell, repository, run};
 use crate::outside::python;
+use crate::size;
 
-/// 16 independent renders of 128 samples per pixel: their spread is their error, with 15 degrees of freedom a pixel.
-const SEEDS: u64 = 16;
+/// Independent renders of 128 samples per pixel: their spread is their error, with 15 degrees of freedom a pixel, in `--full`.
+const SEEDS: [u64; 2] = [10, 16];
 const SAMPLES: &str = "128";
 
 #[test]
 fn the_cornell_box_is_the_peers() {
     let Some(mut python) = python("compare_peer.py") else { return };
     let folder = tempdir().expect("folder");
-    let cubes: Vec<PathBuf> = (0..SEEDS).map(|seed| render(folder.path(), seed)).collect();
+    let cubes: Vec<PathBuf> =
+        (0..SEEDS[usize::from(size::is_full())]).map(|seed| render(folder.path(), seed)).collect();
     let output =
         python.arg(repository("tests/data/cornell_reference_K32.npz")).args(cubes).output().expect("Python runs");
     let said = String::from_utf8_lossy(&output.stdout);

@@ -11,6 +11,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use crate::device::part::{Part, Place, Records, SceneBuffer};
 use crate::device::parts::geometry::{FEWER_MATERIALS, MATERIALS};
@@ -287,9 +288,11 @@ pub fn as_emission(scene: &Scene) -> Heat<'_> {
                     continue;
                 }
                 let by_place = parts.iter().any(|part| part.differs_by_place(scene));
-                let leaves: Vec<Leaf> = match by_place {
-                    true => parts.iter().flat_map(|part| part.typical(scene)).collect(),
-                    false => parts.iter().map(|part| part.leaf(scene)).collect(),
+                let leaves = || -> Vec<Leaf> {
+                    match by_place {
+                        true => parts.iter().flat_map(|part| part.typical(scene)).collect(),
+                        false => parts.iter().map(|part| part.leaf(scene)).collect(),
+                    }
                 };
                 let name = format!("heat of \"{}\"", scene.materials[material].name);
                 let of_lamp = |back: bool| {
@@ -299,23 +302,28 @@ pub fn as_emission(scene: &Scene) -> Heat<'_> {
                     lit.spectra.push(Spectrum { name: name.clone(), curve });
                     lit.spectra.len() - 1
                 };
-                let even = leaves.iter().all(Leaf::is_even) && emitted.is_none_or(|(_, both)| both);
+                let of_all = leaves();
+                let even = of_all.iter().all(Leaf::is_even) && emitted.is_none_or(|(_, both)| both);
                 let new = if by_place {
-                    let typical = radiance(of_lamp(false), &leaves, TYPICAL_COSINE, false, &scene.channels);
+                    let typical = radiance(of_lamp(false), &of_all, TYPICAL_COSINE, false, &scene.channels);
                     heat.radiating.push(Radiating { parts, lamp: emitted });
                     (push(typical), Kind::ByPlace(heat.radiating.len() - 1))
                 } else if even {
-                    (push(radiance(of_lamp(false), &leaves, 1.0, false, &scene.channels)), Kind::Lamp)
+                    (push(radiance(of_lamp(false), &of_all, 1.0, false, &scene.channels)), Kind::Lamp)
                 } else {
                     let row = |back: bool| -> Vec<Curve> {
                         let cosine = |j: usize| (j as f64 / (COSINES - 1) as f64).powi(3);
-                        let at = |j: usize| radiance(of_lamp(back), &leaves, cosine(j), back, &scene.channels);
-                        (0..COSINES).map(at).collect()
+                        // A thread's leaves remember what its cosines have in common.
+                        let share = COSINES.div_ceil(2 * rayon::current_num_threads());
+                        let cosines = (0..COSINES).into_par_iter().with_min_len(share).map_init(leaves, |leaves, j| {
+                            radiance(of_lamp(back), leaves, cosine(j), back, &scene.channels)
+                        });
+                        cosines.collect()
                     };
                     let front = row(false);
                     // Lights are chosen by what they send typically.
                     let typical = front[(TYPICAL_COSINE.cbrt() * (COSINES - 1) as f64) as usize].clone();
-                    let same = leaves.iter().all(|leaf| leaf.two_sided) && emitted.is_none_or(|(_, both)| both);
+                    let same = of_all.iter().all(|leaf| leaf.two_sided) && emitted.is_none_or(|(_, both)| both);
                     let front: Vec<SpectrumId> = front.into_iter().map(&mut push).collect();
                     let back = if same { front.clone() } else { row(true).into_iter().map(&mut push).collect() };
                     heat.by_angle.push([front, back]);
