@@ -20,7 +20,7 @@ use crate::{Error, Result};
 /// and 2 in 95 % of all cases if nothing but noise differs) and z_rms that of single pixels, root mean square (then 1).
 ///
 /// Size and channels must agree, tiles need not. Pixels that one of the cubes has not rendered yet are left out, which is
-/// said.
+/// said. Of many channels, those ten with the largest relMSE are shown; --all shows all, and so does --json.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = "\
 Examples:
@@ -39,6 +39,10 @@ pub struct Args {
     #[arg(long, value_name = "RELMSE", value_parser = parse_tolerance, allow_negative_numbers = true)]
     pub tolerance: Option<f64>,
 
+    /// Show every channel, not only the ten that differ most
+    #[arg(long)]
+    pub all: bool,
+
     /// One JSON object on stdout, instead of a table
     #[arg(long)]
     pub json: bool,
@@ -49,7 +53,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     let comparison = compare(&cube, &reference)?;
     let verdict = args.tolerance.map(|tolerance| judge(&comparison, tolerance));
     output.event("done", facts(args, &cube, &comparison, verdict.as_ref().map(|v| v.is_ok())))?;
-    output.text(&table(&cube, &comparison))?;
+    output.text(&table(&cube, &comparison, args.all))?;
     verdict.unwrap_or(Ok(()))
 }
 
@@ -97,7 +101,10 @@ fn facts(args: &Args, cube: &Cube, comparison: &Comparison, passed: Option<bool>
     })
 }
 
-fn table(cube: &Cube, comparison: &Comparison) -> String {
+/// Channels that are shown unless all are asked for.
+const SHOWN: usize = 10;
+
+fn table(cube: &Cube, comparison: &Comparison, all: bool) -> String {
     let has_z = comparison.channels.iter().any(|c| c.z.is_some());
     let mut text = format!(
         "{:>7} {:>14} {:>13} {:>13} {:>13} {:>13}{}\n",
@@ -109,8 +116,16 @@ fn table(cube: &Cube, comparison: &Comparison) -> String {
         "relMSE",
         if has_z { format!(" {:>9} {:>9}", "z", "z_rms") } else { String::new() }
     );
-    for (k, c) in comparison.channels.iter().enumerate() {
-        let nm = cube.channels().centre(k);
+    let count = comparison.channels.len();
+    let mut shown: Vec<usize> = (0..count).collect();
+    if !all && count > SHOWN {
+        // What is not a number differs most of all.
+        shown.sort_by(|&a, &b| comparison.channels[b].rel_mse.total_cmp(&comparison.channels[a].rel_mse));
+        shown.truncate(SHOWN);
+        shown.sort_unstable();
+    }
+    for &k in &shown {
+        let (c, nm) = (&comparison.channels[k], cube.channels().centre(k));
         let (mean, bias, rmse, rel_mse) = (c.reference_mean, c.bias, c.rmse, c.rel_mse);
         // Writing to a string cannot fail.
         let _ = write!(text, "{k:>7} {nm:>14.4} {mean:>13.5e} {bias:>13.5e} {rmse:>13.5e} {rel_mse:>13.5e}");
@@ -121,6 +136,9 @@ fn table(cube: &Cube, comparison: &Comparison) -> String {
     }
     let ((worst, largest), mean) = (comparison.worst(), mean_rel_mse(comparison));
     let Comparison { pixels, pixels_in_all, .. } = comparison;
+    if shown.len() < count {
+        let _ = writeln!(text, "the {SHOWN} of {count} channels with the largest relMSE; --all shows all");
+    }
     let left_out = match pixels_in_all - pixels {
         0 => String::new(),
         missing => format!("; {missing} pixels left out, not rendered in both yet"),

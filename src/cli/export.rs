@@ -55,11 +55,11 @@ pub struct Args {
     #[arg(long, value_enum)]
     pub format: Option<Format>,
 
-    /// Only these bands: numbers from 0, half-open ranges, or wavelengths, with commas between
+    /// Only these bands: names, numbers from 0, half-open ranges, or wavelengths, with commas between
     ///
-    /// 3 and 0..10 are channels by number, 550nm is the one that holds that wavelength, 8um..14um are all with their
-    /// centres in that range. They are written in this order. For a PNG: three are shown as red, green and blue, one as
-    /// grey.
+    /// B4 is the band of that name (a name that is a number comes before the number), 3 and 0..10 are channels by number,
+    /// 550nm is the one whose centre is nearest, 8um..14um are all with their centres in that range. They are written in
+    /// this order. For a PNG: three are shown as red, green and blue, one as grey.
     #[arg(long, value_name = "BANDS", value_parser = Bands::parse)]
     pub bands: Option<Bands>,
 
@@ -180,7 +180,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         PICTURE.check_target(&args.output)?;
         return write_png(args, &cube, output);
     }
-    let view = view(args, &cube)?;
+    let view = view(args, &cube, output)?;
     let format = match format {
         Format::Envi => export::Format::Envi { interleave: interleave(args)? },
         Format::Exr => {
@@ -261,11 +261,18 @@ fn check_options(args: &Args, format: Format) -> Result<()> {
     }
 }
 
+/// The channels that are asked for; what might have been meant otherwise is said.
+fn choose(bands: &Bands, cube: &Cube, output: &Said) -> Result<Vec<usize>> {
+    let chosen = bands.resolve(cube.channels()).map_err(Error::Usage)?;
+    chosen.notes.iter().try_for_each(|note| output.output.warn(note))?;
+    Ok(chosen.channels)
+}
+
 /// The part of the cube that is asked for.
-fn view<'c>(args: &Args, cube: &'c Cube) -> Result<View<'c>> {
+fn view<'c>(args: &Args, cube: &'c Cube, output: &Said) -> Result<View<'c>> {
     let mut view = View::whole(cube);
     if let Some(bands) = &args.bands {
-        let chosen = bands.resolve(cube.channels()).map_err(Error::Usage)?;
+        let chosen = choose(bands, cube, output)?;
         let mut seen = std::collections::BTreeSet::new();
         if let Some(twice) = chosen.iter().find(|&&band| !seen.insert(band)) {
             return Err(Error::Usage(format!("--bands names the band {twice} twice")));
@@ -341,7 +348,7 @@ fn write_png(args: &Args, cube: &Cube, output: &Said) -> Result<()> {
     if let Some(crop) = args.crop {
         view = view.with_rect(crop)?;
     }
-    let bands = args.bands.as_ref().map(|bands| bands.resolve(cube.channels()).map_err(Error::Usage)).transpose()?;
+    let bands = args.bands.as_ref().map(|bands| choose(bands, cube, output)).transpose()?;
     if args.temperature || args.colour_map {
         if let Some(option) = args.observer.map(|_| "--observer").or(args.exposure.map(|_| "--exposure")) {
             return Err(usage(format!("{option} means nothing in a colour map; --range gives its ends")));

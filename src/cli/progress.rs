@@ -234,6 +234,10 @@ impl<'a> Reporter<'a> {
             short(status.elapsed),
             HumanCount(status.paths)
         );
+        if let Some((samples, seconds)) = summary.too_long {
+            let about = short(Duration::from_secs_f64(seconds));
+            text += &format!("--time: the next {samples} samples/pixel, of about {about}, do not fit any more\n");
+        }
         if let (Some(preview), Some(exposure)) = (&job.preview, summary.exposure) {
             text += &format!("{}: exposure {exposure:+.2} EV\n", preview.file.display());
         }

@@ -50,7 +50,8 @@ fn bands(channels: &Channels, named: &[(String, Response)], findings: &mut Findi
         let running = RunningIntegral::new(channels, std::array::from_ref(response.curve()));
         let of = |k: usize| running.at(channels.bounds[k][1])[0] - running.at(channels.bounds[k][0])[0];
         let inside: Vec<(usize, f64)> = (0..channels.len()).map(|k| (k, of(k))).filter(|(_, w)| *w > 0.0).collect();
-        let covered: f64 = inside.iter().map(|(_, weight)| weight).sum();
+        // The sum of nothing is -0.
+        let covered: f64 = inside.iter().map(|(_, weight)| weight).sum::<f64>() + 0.0;
         let share = covered / response.integral();
         if share < COVERED {
             findings.left_out.push((name.clone(), share));

@@ -278,6 +278,24 @@ impl Measure {
     }
 }
 
+/// The kelvins that `text` says, a number and a unit of temperature.
+pub fn kelvin(text: &str) -> Option<f64> {
+    let number = text.rfind(|c: char| c.is_ascii_digit() || c == '.')? + 1;
+    let (number, unit) = (text[..number].trim().parse::<f64>().ok()?, text[number..].trim());
+    match unit.to_lowercase().trim_start_matches(['°', 'º']) {
+        "f" | "degf" | "deg_f" | "deg f" | "fahrenheit" => Some((number + 459.67) * 5.0 / 9.0),
+        _ if is_celsius(unit) => Some(number + 273.15),
+        _ => Some(number * spelling::parse(unit)?.kelvin()?),
+    }
+}
+
+/// Whether a unit is the degree Celsius, which no factor makes a kelvin.
+pub fn is_celsius(unit: &str) -> bool {
+    let unit = unit.to_lowercase();
+    let spellings = ["c", "celsius", "degc", "deg_c", "deg c", "degree_celsius", "degrees_celsius"];
+    spellings.contains(&unit.trim_start_matches(['°', 'º']).trim_start())
+}
+
 /// Rounds to 15 digits: what products of powers of ten leave behind the last.
 fn tidy(value: f64) -> f64 {
     format!("{value:.14e}").parse().unwrap_or(value)

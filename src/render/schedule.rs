@@ -51,6 +51,8 @@ pub struct Summary {
     pub device_bytes: u64,
     /// EV of the last preview written.
     pub exposure: Option<f64>,
+    /// The epoch that the time ended before: its samples, and how many seconds it was predicted to take.
+    pub too_long: Option<(u32, f64)>,
     pub tally: Tally,
 }
 
@@ -153,6 +155,7 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
         merge_s: render.merge_s,
         device_bytes: render.device_bytes,
         exposure: preview?,
+        too_long: render.too_long,
         tally: render.tally,
         status: render.status,
     })
@@ -191,6 +194,7 @@ struct Render<'a> {
     first_bad: Option<[u32; 4]>,
     /// Samples of the last epoch, and the seconds that it took.
     last_epoch: Option<(u32, f64)>,
+    too_long: Option<(u32, f64)>,
     /// When the preview file may be rewritten.
     next_preview: Option<Instant>,
 }
@@ -237,6 +241,7 @@ impl<'a> Render<'a> {
             tally: Tally::default(),
             first_bad: None,
             last_epoch: None,
+            too_long: None,
             next_preview: None,
         }
     }
@@ -357,7 +362,11 @@ impl<'a> Render<'a> {
                             camera, or it is too rare to have been met yet";
                 observe(Event::Warning(what.into()))?;
             }
-            if enough || self.too_late(n) || is_accurate {
+            if enough || is_accurate {
+                return Ok(());
+            }
+            if self.too_late(n) {
+                self.too_long = Some((n, self.predicted_s(n)));
                 return Ok(());
             }
             let (began, rested, there) = (Instant::now(), self.rested(), self.merged.front().copied().unwrap_or(0));
@@ -413,14 +422,18 @@ impl<'a> Render<'a> {
         (self.started.elapsed() - self.rested()).as_secs_f64() - self.setup_s
     }
 
-    /// Whether an epoch of `n` samples would not fit into the time that is left, at the pace of the last one: the first ones
-    /// of a render also wait for shaders to be compiled.
+    /// Seconds of an epoch of `n` samples at the pace of the last one: the first ones of a render also wait for shaders to be
+    /// compiled.
+    fn predicted_s(&self, n: u32) -> f64 {
+        self.last_epoch.map_or(0.0, |(samples, seconds)| seconds / f64::from(samples) * f64::from(n))
+    }
+
+    /// Whether an epoch of `n` samples would not fit into the time that is left.
     fn too_late(&self, n: u32) -> bool {
         let Some(limit) = self.job.stop.time else { return false };
-        let predicted = self.last_epoch.map_or(0.0, |(samples, seconds)| seconds / f64::from(samples) * f64::from(n));
         // A render always begins; one that is gone on with need not.
         self.status.samples > 0
-            && (self.started.elapsed() - self.rested()).as_secs_f64() + predicted > limit.as_secs_f64()
+            && (self.started.elapsed() - self.rested()).as_secs_f64() + self.predicted_s(n) > limit.as_secs_f64()
     }
 
     /// A device has left. The others go on without it, if it was lost and there are others.

@@ -4,7 +4,7 @@ use super::decode::{Fields, Item};
 use super::keys;
 use super::spectrum::report_in_file;
 use crate::format::response::{self, Responses};
-use crate::format::unit;
+use crate::format::unit::MICROMETRES_BELOW;
 use crate::spectral::{self, Channels, Response};
 
 /// The most channels a cube may have; far beyond the 5,000 that are meant to be used.
@@ -15,10 +15,22 @@ const MAX_NM: f64 = 1e6;
 const SHORTEST: f64 = 380.0;
 const LONGEST: f64 = 20_000.0;
 const WAVELENGTHS: &str = "greater than 0 and at most 1000000 (nm)";
+/// Units of wavelengths, and how many nm one is.
+const UNITS: [(&str, f64); 2] = [("nm", 1.0), ("um", 1e3)];
 
 pub fn decode(item: &Item) -> Option<Channels> {
     let fields = item.table(&keys::CHANNELS)?;
     let kind = fields.exactly_one("kind of channels");
+    if let (Some(kind), Some(unit)) =
+        (kind.as_ref().filter(|kind| kind.path != "channels.intervals"), fields.get("unit"))
+    {
+        let help = match kind.path.as_str() {
+            "channels.equal" => "write it inside of `equal`: equal = { from = 8, to = 14, unit = \"um\", count = 60 }",
+            _ => "remove it",
+        };
+        unit.error_help("is the unit of `intervals` only", help);
+        return None;
+    }
     if let Some(kind) = kind.as_ref().filter(|kind| kind.path == "channels.responses") {
         let named = responses(kind);
         let false_colour = match fields.get("false_colour") {
@@ -32,7 +44,7 @@ pub fn decode(item: &Item) -> Option<Channels> {
     let bounds = kind.as_ref().and_then(|kind| match kind.path.as_str() {
         "channels.equal" => equal(kind),
         "channels.wavenumber" => wavenumber(kind),
-        "channels.intervals" => intervals(kind),
+        "channels.intervals" => intervals(kind, unit(&fields)?),
         // Refused by the table's key check.
         _ => None,
     });
@@ -55,8 +67,8 @@ fn warn_of_far_channels(kind: &Item, channels: &Channels) {
     let found: Vec<[f64; 2]> = (0..channels.len()).filter(far).map(|k| channels.bounds[k]).collect();
     let Some(hull) = spectral::hull(found.iter().copied()) else { return };
     let all = channels.bounds.iter().flatten().copied();
-    let hint = if all.fold(0.0, f64::max) < unit::MICROMETRES_BELOW {
-        "; the numbers look like micrometres, of which one is 1000 nm"
+    let hint = if all.fold(0.0, f64::max) < MICROMETRES_BELOW {
+        "; the numbers look like micrometres: write unit = \"um\""
     } else {
         ""
     };
@@ -84,8 +96,18 @@ fn responses(item: &Item) -> Option<Vec<(String, Response)>> {
     Some(named)
 }
 
-fn wavelength(item: &Item) -> Option<f64> {
-    item.number_where(|nm| nm > 0.0 && nm <= MAX_NM, WAVELENGTHS)
+/// What a `unit` is in nm.
+fn unit(fields: &Fields) -> Option<f64> {
+    fields.get("unit").map_or(Some(1.0), |item| item.choice(&UNITS))
+}
+
+/// A wavelength in nm, written in a unit.
+fn wavelength(item: &Item, unit: f64) -> Option<f64> {
+    let range = match unit {
+        1.0 => WAVELENGTHS,
+        _ => "greater than 0 and at most 1000 (um)",
+    };
+    item.number_where(|value| value > 0.0 && value * unit <= MAX_NM, range).map(|value| value * unit)
 }
 
 /// `from` < `to` and `count` of a table, `from` and `to` read by `number`.
@@ -103,7 +125,9 @@ fn range(fields: &Fields, example: &str, number: impl Fn(&Item) -> Option<f64>) 
 
 fn equal(item: &Item) -> Option<Vec<[f64; 2]>> {
     const EXAMPLE: &str = "all of { from = 380, to = 780, count = 400 }";
-    let (from, to, count) = range(&item.table(&keys::EQUAL)?, EXAMPLE, wavelength)?;
+    let fields = item.table(&keys::EQUAL)?;
+    let unit = unit(&fields)?;
+    let (from, to, count) = range(&fields, EXAMPLE, |item| wavelength(item, unit))?;
     not_empty(item, Channels::equal(from, to, count).bounds)
 }
 
@@ -116,7 +140,7 @@ fn wavenumber(item: &Item) -> Option<Vec<[f64; 2]>> {
     not_empty(item, edges.iter().rev().map(|[low, high]| [1e7 / high, 1e7 / low]).collect())
 }
 
-fn intervals(item: &Item) -> Option<Vec<[f64; 2]>> {
+fn intervals(item: &Item, unit: f64) -> Option<Vec<[f64; 2]>> {
     let items = item.array()?;
     if items.is_empty() || items.len() > MAX_CHANNELS as usize {
         let help = "list [from, to] pairs in nm, e.g. [[380, 390], [8000, 12000]]";
@@ -125,7 +149,7 @@ fn intervals(item: &Item) -> Option<Vec<[f64; 2]>> {
     }
     let pair = |item: &Item| {
         let [from, to] = item.array_of::<2>("two wavelengths [from, to]")?;
-        let (from, to) = (wavelength(&from), wavelength(&to));
+        let (from, to) = (wavelength(&from, unit), wavelength(&to, unit));
         let (from, to) = (from?, to?);
         if from >= to {
             item.error_help(format!("must be [from, to] with from less than to, but {from} ≥ {to}"), "exchange them");

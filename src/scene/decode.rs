@@ -248,6 +248,11 @@ impl<'a> Fields<'a> {
         assert!(known, "`{key}` has no row in scene::keys for `{}`", self.section.path);
     }
 
+    /// Says `warning` to the user, once.
+    pub fn warn(&self, warning: String) {
+        self.cx.warn(warning);
+    }
+
     /// The value of `key`, whose absence is an error; `help` shows how to write it.
     pub fn require(&self, key: &str, help: &str) -> Option<Item<'a>> {
         let item = self.get(key);

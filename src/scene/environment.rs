@@ -4,12 +4,13 @@ use glam::{DMat3, DQuat, DVec3};
 
 use super::decode::{Fields, Item};
 use super::keys;
+use super::material::kelvin;
 use super::spectrum::{Quantity, Spectra, report_in_file};
 use super::{Environment, EnvironmentMap, Texels};
 use crate::error::Problem;
 use crate::format::maps::{self, Content, Map};
 use crate::format::noise::{self, Range};
-use crate::spectral::upsample;
+use crate::spectral::{Curve, upsample};
 
 /// `None` where something is wrong, which has been said.
 pub fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Environment> {
@@ -42,7 +43,12 @@ pub fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Environm
         }));
     }
     // A uniform environment looks the same however it is turned; the keys still have to make sense.
-    let radiance = spectra.resolve(&source, Quantity::Radiance);
+    let radiance = match source.path.as_str() {
+        "environment.temperature" => {
+            kelvin(&source).map(|kelvin| spectra.add(&source.path, Curve::Blackbody { kelvin, scale: 1.0 }))
+        }
+        _ => spectra.resolve(&source, Quantity::Radiance),
+    };
     to_map?;
     let radiance = match scale {
         Some(scale) => spectra.scaled(radiance?, &scale)?,

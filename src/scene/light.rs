@@ -1,9 +1,14 @@
 //! `[[lights]]`: light that comes from no surface.
 
+use glam::DVec3;
+use toml::value::Datetime;
+
 use super::Light;
 use super::decode::{Fields, Item};
 use super::keys;
 use super::spectrum::{Handle, Quantity, Spectra};
+use super::sun;
+use super::tree::Value;
 
 /// Degrees. Smaller disks are too narrow for a device to tell which directions are inside; larger ones are no disks.
 const ANGULAR_RADIUS: std::ops::RangeInclusive<f64> = 0.001..=90.0;
@@ -31,8 +36,8 @@ fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Light> {
         }
         _ => {
             let fields = kind.table(&keys::SUN)?;
-            let direction = direction(&fields);
-            let radius = fields.require("angular_radius", "angular_radius = 0.2665, in degrees").and_then(|item| {
+            let placed = placed_sun(&fields);
+            let radius = fields.get("angular_radius").map_or(Some(None), |item| {
                 let degrees = item.positive()?;
                 if !ANGULAR_RADIUS.contains(&degrees) {
                     let [least, most] = [ANGULAR_RADIUS.start(), ANGULAR_RADIUS.end()];
@@ -40,16 +45,115 @@ fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Light> {
                     item.error_help(message, "what is smaller is a `directional` light, what is larger an environment");
                     return None;
                 }
-                Some(degrees.to_radians())
+                Some(Some(degrees))
             });
             let irradiance = spectrum(&fields, "irradiance", Quantity::Irradiance, spectra);
-            let (direction, angular_radius) = (direction?, radius?);
-            Some(Light::Sun { direction, angular_radius, irradiance: spectra.take(irradiance?) })
+            let (Sun { direction, distance }, degrees) = (placed?, radius?);
+            let irradiance = match distance {
+                // Who gives an irradiance of their own gives that of the day.
+                Some(distance) if spectra.is_standard(&fields.get("irradiance")?) => {
+                    spectra.times(irradiance?, distance.powi(-2))
+                }
+                _ => irradiance?,
+            };
+            let degrees = degrees.unwrap_or(sun::ANGULAR_RADIUS / distance.unwrap_or(1.0));
+            let angular_radius = degrees.to_radians();
+            Some(Light::Sun { direction, angular_radius, irradiance: spectra.take(irradiance) })
         }
     }
 }
 
-fn direction(fields: &Fields) -> Option<glam::DVec3> {
+/// A sun in the scene.
+struct Sun {
+    /// Of its light.
+    direction: DVec3,
+    /// In astronomical units, where a date tells.
+    distance: Option<f64>,
+}
+
+/// The sun by the direction of its light, by where it stands, or by date and place.
+fn placed_sun(fields: &Fields) -> Option<Sun> {
+    const BY_PLACE: [&str; 2] = ["azimuth", "elevation"];
+    const BY_DATE: [&str; 3] = ["date", "latitude", "longitude"];
+    let first_of = |keys: &[&str]| keys.iter().find_map(|key| fields.get(key));
+    let ways = [fields.get("direction"), first_of(&BY_PLACE), first_of(&BY_DATE)];
+    if let [_, second, ..] = &ways.iter().flatten().collect::<Vec<_>>()[..] {
+        second.error_help(
+            "says once more where the sun stands",
+            "keep one of `direction`, `azimuth` and `elevation`, or `date`, `latitude` and `longitude`",
+        );
+        return None;
+    }
+    let axes = [("north", DVec3::NEG_Z), ("up", DVec3::Y)]
+        .map(|(key, default)| fields.get(key).map_or(Some(default), |item| item.direction()));
+    let (azimuth, elevation, distance) = match ways {
+        [_, Some(_), _] => {
+            let azimuth = fields.require("azimuth", "azimuth = 135, in degrees from north over east");
+            let elevation = fields.require("elevation", "elevation = 40, in degrees above the horizon");
+            let azimuth = azimuth.and_then(|item| degrees(&item, 360.0));
+            (azimuth?, elevation.and_then(|item| degrees(&item, 90.0))?, None)
+        }
+        [_, _, Some(_)] => {
+            let date = fields.require("date", "date = \"2026-06-21T10:30:00Z\"");
+            let latitude = fields.require("latitude", "latitude = 43.6, in degrees north");
+            let longitude = fields.require("longitude", "longitude = 5.1, in degrees east");
+            let latitude = latitude.and_then(|item| degrees(&item, 90.0));
+            let longitude = longitude.and_then(|item| degrees(&item, 180.0));
+            let date = date.and_then(|item| moment(&item).map(|date| (date, item)));
+            let ((date, item), latitude, longitude) = (date?, latitude?, longitude?);
+            match sun::position(&date, latitude, longitude) {
+                Ok(sun) => (sun.azimuth, sun.elevation, Some(sun.distance)),
+                Err(what) => {
+                    item.error_help(what, "write e.g. \"2026-06-21T10:30:00Z\", or +02:00 in the place of Z");
+                    return None;
+                }
+            }
+        }
+        _ => {
+            let given = direction(fields);
+            if let Some(item) = first_of(&["north", "up"]) {
+                item.error_help("says nothing beside `direction`", "remove it, or give `azimuth` and `elevation`");
+                return None;
+            }
+            return given.map(|direction| Sun { direction, distance: None });
+        }
+    };
+    let [north, up] = axes;
+    let Some(direction) = sun::travels(azimuth, elevation, north?, up?) else {
+        let item = first_of(&["north", "up"])?;
+        item.error_help(
+            "`north` and `up` must not be parallel",
+            "where up is +z, write up = [0, 0, 1] and north = [0, 1, 0]",
+        );
+        return None;
+    };
+    if elevation < 0.0 {
+        let path = &first_of(&["elevation", "date"])?.path;
+        let below = -elevation;
+        fields.warn(format!("`{path}`: the sun stands {below:.2} degrees below the horizon, and shines from there"));
+    }
+    Some(Sun { direction, distance })
+}
+
+/// Degrees of at most `most` on either side.
+fn degrees(item: &Item, most: f64) -> Option<f64> {
+    item.number_where(|degrees| degrees.abs() <= most, &format!("an angle in [-{most}, {most}] degrees"))
+}
+
+/// A date, as TOML has them or as text.
+fn moment(item: &Item) -> Option<Datetime> {
+    let parsed = match &item.node.value {
+        Value::Datetime(date) => Some(*date),
+        Value::String(text) => text.parse().ok(),
+        _ => None,
+    };
+    if parsed.is_none() {
+        item.error_help("must be a date and a time", "write e.g. \"2026-06-21T10:30:00Z\"");
+    }
+    parsed
+}
+
+fn direction(fields: &Fields) -> Option<DVec3> {
     fields.require("direction", "direction = [0, -1, 0], in which the light travels").and_then(|item| item.direction())
 }
 

@@ -7,6 +7,7 @@ use super::spectrum::{Handle, Quantity, Spectra};
 use super::texture::{self, Number, Textures, is_texture};
 use super::tree::Value;
 use super::{Bsdf, Material, MaterialId, Reflectance, SMOOTH, Temperature, Texture, Weight};
+use crate::format::unit;
 
 /// K. The peak of Planck's radiance there is 4e33 W m⁻² sr⁻¹ nm⁻¹, near the end of f32.
 const HOTTEST: f64 = 1e9;
@@ -240,7 +241,7 @@ fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>, textures: &mut Texture
     let (fields, kind) = match kind.path.rsplit('.').next() {
         Some("diffuse") => {
             let fields = kind.table(&keys::DIFFUSE)?;
-            let reflectance = reflects(&fields, spectra, textures);
+            let reflectance = diffusely_reflects(&fields, spectra, textures);
             (fields, reflectance.map(|reflectance| Kind::Diffuse { reflectance }))
         }
         Some("conductor") => {
@@ -346,9 +347,23 @@ fn temperature(fields: &Fields, textures: &mut Textures) -> Option<Option<Varyin
     temperature.map(Some)
 }
 
-/// A temperature that `item` holds.
+/// A temperature that `item` holds: a number of kelvins, or text with its unit.
 pub fn kelvin(item: &Item) -> Option<f64> {
-    item.number_where(|kelvin| kelvin > 0.0 && kelvin <= HOTTEST, "a temperature in K, above 0 and at most 1e9")
+    const RANGE: &str = "a temperature in K, above 0 and at most 1e9";
+    let allowed = |kelvin: f64| kelvin > 0.0 && kelvin <= HOTTEST;
+    let Value::String(text) = &item.node.value else { return item.number_where(allowed, RANGE) };
+    let Some(kelvin) = unit::kelvin(text) else {
+        item.error_help(
+            format!("must be {RANGE}, but is \"{text}\""),
+            "write kelvins as a number, or text with the unit K, C or F: \"37 C\"",
+        );
+        return None;
+    };
+    if !allowed(kelvin) {
+        item.error(format!("must be {RANGE}, but is {kelvin} K"));
+        return None;
+    }
+    Some(kelvin)
 }
 
 fn blend<'a>(fields: &Fields<'a>, textures: &mut Textures) -> Option<Kind<'a>> {
@@ -372,6 +387,17 @@ fn reflects<'a>(fields: &Fields<'a>, spectra: &mut Spectra<'a>, textures: &mut T
         return textures.reflectance(&item, spectra).map(Reflects::Texture);
     }
     spectra.resolve(&item, Quantity::Reflectance).map(Reflects::Spectrum)
+}
+
+/// Of a diffuse surface, whose emissivity is the same in all directions, that may be given instead.
+fn diffusely_reflects<'a>(fields: &Fields<'a>, spectra: &mut Spectra<'a>, textures: &mut Textures) -> Option<Reflects> {
+    let Some(emissivity) = fields.get("emissivity") else { return reflects(fields, spectra, textures) };
+    if let Some(reflectance) = fields.get("reflectance") {
+        reflectance.error_help("is the complement of `emissivity`", "keep one of the two");
+        return None;
+    }
+    let emissivity = spectra.resolve(&emissivity, Quantity::Emissivity)?;
+    Some(Reflects::Spectrum(spectra.complement(emissivity)))
 }
 
 fn spectrum<'a>(

@@ -11,7 +11,7 @@ use super::spectrum::{Handle, Quantity, Spectra, report_in_file};
 use super::tree::Value;
 use super::{Absorber, Field, Grid, Medium, MediumId};
 use crate::format::noise::{self, Range};
-use crate::format::unit::Measure;
+use crate::format::unit::{self, Measure};
 use crate::format::volume::{self, Volume};
 
 /// Strength, and columns of a temperature and a spectrum each.
@@ -279,8 +279,6 @@ fn convert(
     text: &str,
     measure: Option<Measure>,
 ) -> Option<()> {
-    let lower = text.to_lowercase();
-    let celsius = ["celsius", "degc", "deg_c", "\u{b0}c", "c", "degree_celsius", "degrees_celsius", "deg c"];
     match (describes, measure) {
         (Describes::Temperature, Some(measure)) if measure.kelvin().is_some() => {
             let kelvin = measure.kelvin()? as f32;
@@ -288,7 +286,7 @@ fn convert(
                 values.iter_mut().for_each(|value| *value *= kelvin);
             }
         }
-        (Describes::Temperature, _) if celsius.contains(&lower.as_str()) => {
+        (Describes::Temperature, _) if unit::is_celsius(text) => {
             values.iter_mut().for_each(|value| *value = (f64::from(*value) + 273.15) as f32);
             item.cx.warn(format!("{name} is in `{text}`: converted to K"));
         }

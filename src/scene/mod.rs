@@ -19,6 +19,7 @@ mod object;
 mod overrides;
 mod shape;
 mod spectrum;
+mod sun;
 mod texture;
 mod transform;
 mod tree;

@@ -138,14 +138,31 @@ fn rivals(parents: &[&str], key: &str) -> Vec<&'static str> {
     };
     match parents {
         ["camera"] => others(&keys::CAMERA),
-        ["channels"] => others(&keys::CHANNELS),
+        ["channels"] => {
+            let mut rivals = others(&keys::CHANNELS);
+            if is_one_of(&keys::CHANNELS) && key != "intervals" {
+                rivals.push("unit");
+            }
+            rivals
+        }
         ["materials", _] => others(&keys::MATERIAL),
+        ["materials", _, "diffuse"] => match key {
+            "reflectance" => vec!["emissivity"],
+            "emissivity" => vec!["reflectance"],
+            _ => Vec::new(),
+        },
         ["materials", _, "conductor"] => match key {
             "nk" => vec!["eta", "k"],
             "eta" | "k" => vec!["nk"],
             _ => Vec::new(),
         },
         ["lights", _] => others(&keys::LIGHT),
+        ["lights", _, "sun"] => match key {
+            "direction" => vec!["azimuth", "elevation", "date", "latitude", "longitude", "north", "up"],
+            "azimuth" | "elevation" => vec!["direction", "date", "latitude", "longitude"],
+            "date" | "latitude" | "longitude" => vec!["direction", "azimuth", "elevation"],
+            _ => Vec::new(),
+        },
         ["environment"] => others(&keys::ENVIRONMENT),
         ["objects", _] => {
             let mut rivals = others(&keys::OBJECT);
@@ -251,6 +268,28 @@ mod tests {
         );
         check("r = { texture = \"a.exr\", endmembers = [\"s\"] }", &[("r.constant", "1")], &["r.constant=1"]);
         check("r = { file = \"a\", column = \"c\", scale = 2 }", &[("r.texture", "a.png")], &["r.texture=a.png"]);
+        check(
+            "materials.w.diffuse.reflectance = 1",
+            &[("materials.w.diffuse.emissivity", "0.9")],
+            &["materials.w.diffuse.emissivity=0.9"],
+        );
+        check(
+            "channels = { intervals = [[1, 2]], unit = \"um\" }",
+            &[("channels.equal.count", "9")],
+            &["channels.equal.count=9"],
+        );
+        check(
+            "[[lights]]\nsun = { azimuth = 1, elevation = 2, up = [0, 0, 1], irradiance = 3 }",
+            &[("lights.0.sun.latitude", "4"), ("lights.0.sun.date", "x")],
+            &[
+                "lights.0.sun.date=x",
+                "lights.0.sun.irradiance=3",
+                "lights.0.sun.latitude=4",
+                "lights.0.sun.up.0=0",
+                "lights.0.sun.up.1=0",
+                "lights.0.sun.up.2=1",
+            ],
+        );
         check("objects = []", &[("objects.0.material", "red")], &["objects.0.material=red"]);
         check("p = [1, 2, 3]", &[("p.1", "-4e1")], &["p.0=1", "p.1=-40.0", "p.2=3"]);
         check("m.\"my paint\".k = 1", &[("m.\"my paint\".k", "dpept-pixel")], &["m.\"my paint\".k=dpept-pixel"]);

@@ -17,11 +17,20 @@ use crate::format::noise;
 use crate::format::refractive;
 use crate::format::text::{self, SpectrumTable};
 use crate::format::unit::{Density, Meaning, Stated};
-use crate::spectral::{Channels, Curve, Outside, hull, upsample};
+use crate::spectral::{Channels, Curve, Outside, SOLAR, columns, hull, upsample};
 
 /// Wavelengths, in nm, far beyond any channel, between which a curve's peak is looked for.
 const SHORTEST: f64 = 1e-3;
 const LONGEST: f64 = 1e15;
+
+/// Irradiances of the sun that need no definition, by column of the built-in table.
+const STANDARDS: [&str; 2] = ["am0", "am1.5"];
+
+fn standard(name: &str) -> Option<Curve> {
+    let column = STANDARDS.iter().position(|known| *known == name)?;
+    let (nm, value) = columns::<3>(SOLAR).map(|row| (row[0], row[1 + column])).unzip();
+    Some(Curve::Linear { nm, value, outside: Outside::Zero })
+}
 
 /// A table that is checked, and what it is called.
 #[derive(Clone, Copy)]
@@ -83,7 +92,11 @@ impl<'a> Spectra<'a> {
             return self.check(&source, &item.path, item, quantity);
         };
         let Some((_, definition)) = self.named.iter().find(|(known, _)| known == name) else {
-            let names = self.named.iter().map(|(name, _)| *name);
+            if let (Quantity::Irradiance, Some(curve)) = (quantity, standard(name)) {
+                return Some(self.standard(name, curve));
+            }
+            let of_the_sun = if quantity == Quantity::Irradiance { &STANDARDS[..] } else { &[] };
+            let names = self.named.iter().map(|(name, _)| *name).chain(of_the_sun.iter().copied());
             let help = if name.contains(['.', '/']) {
                 format!("for a file write {{ file = \"{}\" }}", name.escape_debug())
             } else {
@@ -172,29 +185,69 @@ impl<'a> Spectra<'a> {
         id
     }
 
+    /// A curve that no spectrum of the file describes.
+    pub fn add(&mut self, name: &str, curve: Curve) -> Handle {
+        self.checked.push(Checked { name: name.to_owned(), curve, warnings: Vec::new(), taken: None });
+        self.checked.len() - 1
+    }
+
     /// The index in the scene of a curve that no spectrum of the file describes. Equal curves share one.
     pub fn curve(&mut self, name: &str, curve: Curve) -> SpectrumId {
-        self.checked.push(Checked { name: name.to_owned(), curve, warnings: Vec::new(), taken: None });
-        self.take(self.checked.len() - 1)
+        let handle = self.add(name, curve);
+        self.take(handle)
+    }
+
+    /// A spectrum that is known without a definition.
+    fn standard(&mut self, name: &str, curve: Curve) -> Handle {
+        let Curve::Linear { nm, .. } = &curve else { unreachable!("standards are tables") };
+        let gap = self.uncovered(nm[0], nm[nm.len() - 1]);
+        let handle = self.add(name, curve);
+        self.checked[handle].warnings =
+            gap.map(|gap| format!("the standard `{name}` does not cover {gap}: it is 0 there")).into_iter().collect();
+        handle
+    }
+
+    /// Whether `item` names a spectrum that is known without a definition, and that the file does not define.
+    pub fn is_standard(&self, item: &Item) -> bool {
+        matches!(&item.node.value, Value::String(name)
+            if STANDARDS.contains(&name.as_str()) && !self.named.iter().any(|(known, _)| known == name))
+    }
+
+    /// `handle` times `factor`.
+    pub fn times(&mut self, handle: Handle, factor: f64) -> Handle {
+        let Checked { name, curve, warnings, .. } = &self.checked[handle];
+        let scaled =
+            Checked { name: name.clone(), curve: curve.scaled(factor), warnings: warnings.clone(), taken: None };
+        self.checked.push(scaled);
+        self.checked.len() - 1
+    }
+
+    /// One minus `handle`, a share.
+    pub fn complement(&mut self, handle: Handle) -> Handle {
+        let Checked { name, curve, warnings, .. } = &self.checked[handle];
+        let curve = match curve {
+            Curve::Constant(value) => Curve::Constant(1.0 - value),
+            Curve::Linear { nm, value, outside: Outside::Hold } => {
+                Curve::Linear { nm: nm.clone(), value: value.iter().map(|v| 1.0 - v).collect(), outside: Outside::Hold }
+            }
+            Curve::Linear { .. } | Curve::Blackbody { .. } => {
+                unreachable!("refused for shares whose complement is asked")
+            }
+        };
+        let complement = Checked { name: format!("1 - {name}"), curve, warnings: warnings.clone(), taken: None };
+        self.checked.push(complement);
+        self.checked.len() - 1
     }
 
     /// `handle`, a radiance, times the number of at least 0 that `item` holds.
     pub fn scaled(&mut self, handle: Handle, item: &Item) -> Option<Handle> {
-        let factor = item.not_negative()?;
-        let Checked { name, curve, warnings, .. } = &self.checked[handle];
-        let (name, warnings, mut curve) = (name.clone(), warnings.clone(), curve.clone());
-        match &mut curve {
-            Curve::Constant(value) => *value *= factor,
-            Curve::Blackbody { scale, .. } => *scale *= factor,
-            Curve::Linear { value, .. } => value.iter_mut().for_each(|v| *v *= factor),
-        }
-        let peak = curve.max(SHORTEST, LONGEST);
+        let scaled = self.times(handle, item.not_negative()?);
+        let peak = self.checked[scaled].curve.max(SHORTEST, LONGEST);
         if !Quantity::Radiance.allows(peak) {
             item.error(format!("{}, but is {peak:e} after scaling", Quantity::Radiance.range()));
             return None;
         }
-        self.checked.push(Checked { name, curve, warnings, taken: None });
-        Some(self.checked.len() - 1)
+        Some(scaled)
     }
 
     /// Says `warning` to the user, once.
@@ -216,6 +269,12 @@ impl<'a> Spectra<'a> {
         };
         let mut warnings = Vec::new();
         let is_index = quantity.is_index();
+        if quantity == Quantity::Emissivity && source.outside == Some(Outside::Zero) {
+            let help = "remove `outside`, or write outside = \"hold\"; a reflectance may be 0 there";
+            let message = format!("an emissivity is held outside its table, where it is not known{used_by}");
+            self.cx.error(source.at, &source.path, message, Some(help.to_owned()));
+            return None;
+        }
         if is_index && !quantity.allows(0.0) && source.outside == Some(Outside::Zero) {
             let help = "remove `outside`, or write outside = \"hold\"";
             let message = format!("an index of refraction cannot be 0 outside its table{used_by}");
@@ -320,9 +379,14 @@ impl<'a> Spectra<'a> {
             (Outside::Zero, _) => None,
         };
         if let (Some(instead), None) = (instead, source.outside) {
-            warnings.extend(self.uncovered(nm[0], nm[nm.len() - 1]).map(|gap| {
+            let (first, last) = (nm[0], nm[nm.len() - 1]);
+            warnings.extend(self.uncovered(first, last).map(|gap| {
                 let noun = quantity.noun();
-                format!("spectrum `{name}` ({noun}) does not cover {gap}: {instead}")
+                let hint = match self.meets_no_channel(first, last) {
+                    true => format!("; it lies at {first} to {last} nm, beside all channels: is that its unit?"),
+                    false => String::new(),
+                };
+                format!("spectrum `{name}` ({noun}) does not cover {gap}: {instead}{hint}")
             }));
         }
         let mut nm = nm.to_vec();
@@ -436,6 +500,12 @@ impl<'a> Spectra<'a> {
         let from = nm.partition_point(|x| *x <= first).saturating_sub(1);
         let to = (nm.partition_point(|x| *x < last) + 1).min(nm.len());
         from.min(nm.len() - 1)..to
+    }
+
+    /// Whether there are channels, and none of them between `first` and `last` nm.
+    fn meets_no_channel(&self, first: f64, last: f64) -> bool {
+        let bounds = self.channels.iter().flat_map(|channels| &channels.bounds);
+        bounds.clone().next().is_some() && bounds.clone().all(|[from, to]| *to < first || *from > last)
     }
 
     /// The parts of the channels below `first` and above `last` nm, in words.

@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
+use toml::value::Datetime;
 
 /// Where a key or value was written.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,7 +32,7 @@ pub enum Value {
     Integer(i64),
     Float(f64),
     Boolean(bool),
-    Datetime,
+    Datetime(Datetime),
     Array(Vec<Node>),
     Table(Vec<Entry>),
 }
@@ -53,7 +54,7 @@ impl Value {
             Value::Integer(_) => "a whole number",
             Value::Float(_) => "a number",
             Value::Boolean(_) => "a boolean",
-            Value::Datetime => "a date",
+            Value::Datetime(_) => "a date",
             Value::Array(_) => "an array",
             Value::Table(_) => "a table",
         }
@@ -111,7 +112,7 @@ fn convert(value: &Spanned<DeValue<'_>>, origin: MakeOrigin) -> Node {
         },
         DeValue::Float(f) => Value::Float(f.as_str().parse().unwrap_or(f64::NAN)),
         DeValue::Boolean(b) => Value::Boolean(*b),
-        DeValue::Datetime(_) => Value::Datetime,
+        DeValue::Datetime(date) => Value::Datetime(*date),
         DeValue::Array(items) => Value::Array(items.iter().map(|item| convert(item, origin)).collect()),
         DeValue::Table(table) => Value::Table(convert_table(table, origin)),
     };

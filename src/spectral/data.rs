@@ -8,6 +8,8 @@ pub const CIE1964: &str = include_str!("data/cie1964_10deg_1nm.csv");
 pub const CIE2015: &str = include_str!("data/cie2015_2deg_1nm.csv");
 /// CIE standard illuminant D65: nm, relative power, every 5 nm from 300 to 780.
 pub const D65: &str = include_str!("data/d65_300-780_5nm.csv");
+/// Spectral irradiance of the sun: nm, outside the atmosphere, direct through air mass 1.5 (W m⁻² nm⁻¹), from 280 to 4,000.
+pub const SOLAR: &str = include_str!("data/solar_astm_g173_280-4000nm.csv");
 
 /// The numbers of a built-in table; comments and the header are the lines that do not begin with a digit.
 pub fn columns<const N: usize>(table: &'static str) -> impl Iterator<Item = [f64; N]> {

@@ -214,6 +214,23 @@ fn compare_has_a_verdict() {
     assert_eq!((&lines[0]["passed"], &lines[1]["event"]), (&Value::from(false), &Value::from("error")));
     success(folder.path(), &["compare", "a.zarr", "a.zarr", "--tolerance", "0"]);
 
+    // Of many channels those that differ most are shown, in their order.
+    let many = |name: &str, grown: usize| {
+        let cube = create(folder.path(), name, header([20, 13], [16, 8], 25));
+        for tile in 0..4 {
+            let value = |_, _, k: usize| if k % 2 == grown { 1.0 + k as f32 } else { 1.0 };
+            cube.merge_unit(tile, 1, &unit(&cube, tile, value)).expect("merged");
+        }
+    };
+    many("even.zarr", 0);
+    many("none.zarr", 2);
+    let text = success(folder.path(), &["compare", "even.zarr", "none.zarr"]);
+    let shown: Vec<&str> = text.lines().skip(1).map_while(|line| line.split_whitespace().next()).collect();
+    assert_eq!(shown[..11].join(" "), "6 8 10 12 14 16 18 20 22 24 the", "{text}");
+    assert!(text.contains("the 10 of 25 channels with the largest relMSE"), "{text}");
+    let all = success(folder.path(), &["compare", "even.zarr", "none.zarr", "--all"]);
+    assert_eq!(all.lines().count(), 27, "{all}");
+
     // What is not rendered is left out, said, and never passes.
     noisy(folder.path(), "part.zarr", 1);
     noisy(folder.path(), "same.zarr", 1);

@@ -106,7 +106,12 @@ fn time_ends_a_render_with_an_epoch() {
     assert!(n >= 64 && n.is_multiple_of(64), "{n}");
     assert_eq!((&done["event"], &done["samples"], &done["units"]), (&json!("done"), &json!(n), &json!(9)));
     // One epoch there always is, and the first of several rules stops.
-    assert_eq!(samples(&place.render("soon.zarr", &["--time", "1e-9", "--spp", "1000"])), 1);
+    let soon = place.success(&["render", "scene.toml", "-o", "soon.zarr", "--time", "1e-9", "--spp", "1000"]).0;
+    assert_eq!(samples(&place.cube("soon.zarr")), 1);
+    assert!(
+        soon.contains("--time: the next 1 samples/pixel, of about") && soon.contains("do not fit any more"),
+        "{soon}"
+    );
     assert_eq!(samples(&place.render("few.zarr", &["--time", "1h", "--spp", "4"])), 4);
 }
 

@@ -7,6 +7,7 @@ mod materials;
 mod media;
 mod never_panics;
 mod resolved;
+mod sun;
 mod textures;
 mod wrong;
 

@@ -95,6 +95,11 @@ fn channels_resolve_in_their_order() {
     assert_eq!(bounds, expected);
     let bounds = good(BASE, &[], &[("channels.intervals", "[[8000, 12000], [380, 390], [385, 400]]")]).channels.bounds;
     assert_eq!(bounds, [[8000.0, 12000.0], [380.0, 390.0], [385.0, 400.0]]);
+    let um = ("channels.unit", "um");
+    let bounds = good(BASE, &[], &[("channels.intervals", "[[8, 12.5], [3, 5]]"), um]).channels.bounds;
+    assert_eq!(bounds, [[8000.0, 12500.0], [3000.0, 5000.0]]);
+    let equal = ("channels.equal", "{ from = 8, to = 14, unit = \"um\", count = 3 }");
+    assert_eq!(good(BASE, &[], &[equal]).channels.bounds, [[8e3, 10e3], [10e3, 12e3], [12e3, 14e3]]);
 }
 
 /// Area, and the sum of triangle normals times areas (0 for a closed surface).
@@ -246,6 +251,12 @@ fn warnings_are_said_once_and_name_the_interval() {
     assert!(warnings[0].contains("`grey`") && warnings[0].contains("400-450 nm and 650-700 nm"), "{warnings:?}");
     let explicit = ("spectra.grey", "{ samples = [[450, 0.1], [650, 0.8]], outside = \"hold\" }");
     assert!(good(BASE, &[], &[explicit]).warnings.is_empty());
+    let beside = ("spectra.grey", "{ samples = [[0.4, 0.1], [0.7, 0.8]] }");
+    let warnings = good(BASE, &[], &[beside]).warnings;
+    assert!(
+        warnings.len() == 1 && warnings[0].contains("at 0.4 to 0.7 nm, beside all channels: is that its unit?"),
+        "{warnings:?}"
+    );
     let unused = ("spectra.other", "{ samples = [[450, 0.1], [650, 0.8]] }");
     assert!(good(BASE, &[], &[unused]).warnings.is_empty());
     let rgb = [("spectra.grey", "{ rgb = [0.9, 0.1, 0.1] }"), ("channels.equal.to", "2000")];

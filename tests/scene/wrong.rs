@@ -158,6 +158,9 @@ fn channels() {
     check_all(&[
         ("from above to", EQUAL, "equal = { from = 700, to = 400, count = 3 } #!", "channels.equal.from", &["less than `to`", "700", "400"]),
         ("from is to", EQUAL, "equal = { from = 400, to = 400, count = 3 } #!", "channels.equal.from", &["less than `to`"]),
+        ("unit of equal", EQUAL, "equal = { from = 400, to = 700, count = 3 }\nunit = \"um\" #!", "channels.unit", &["of `intervals` only", "inside of `equal`"]),
+        ("unknown unit", EQUAL, "equal = { from = 4, to = 7, unit = \"m\", count = 3 } #!", "channels.equal.unit", &["\"nm\", \"um\""]),
+        ("too far in um", EQUAL, "equal = { from = 4, to = 7000, unit = \"um\", count = 3 } #!", "channels.equal.to", &["at most 1000 (um)"]),
         ("from 0", EQUAL, "equal = { from = 0, to = 400, count = 3 } #!", "channels.equal.from", &["greater than 0"]),
         ("to too far", EQUAL, "equal = { from = 1, to = 1e7, count = 3 } #!", "channels.equal.to", &["at most 1000000"]),
         ("no channels", EQUAL, "equal = { from = 1, to = 2, count = 0 } #!", "channels.equal.count", &["from 1 to 65536"]),

@@ -1,7 +1,7 @@
 //! What surfaces do with light.
 
 use super::Kind::{Boolean, File, List, Name, Number, Refused, Spectrum, Table};
-use super::{Key, Section};
+use super::{CELSIUS, Key, Section};
 use crate::scene::Quantity;
 
 pub static MATERIAL: Section = Section {
@@ -39,6 +39,7 @@ const TEMPERATURE: Key = Key::optional(
     "The surface emits Planck's radiance at this temperature as much as it absorbs, at each wavelength, angle and \
      place, on both sides. It adds to an object's `emission`.",
 )
+.or(CELSIUS)
 .unit("K")
 .range("(0, 1e9]")
 .tables(NUMBERS);
@@ -48,6 +49,13 @@ const REFLECTANCE: Key = Key::required(
     "The share of light that is scattered, the same in all directions.",
 )
 .tables(COLOURS);
+const EMISSIVITY: Key = Key::required(
+    "emissivity",
+    Spectrum(Quantity::Emissivity),
+    "What is emitted of what a black body emits, and absorbed of what arrives: the rest is scattered. In the place of \
+     `reflectance`.",
+)
+.unless("`reflectance`");
 const ROUGHNESS: Key = Key::default("roughness", Number, "0.0", "GGX's α; 0 is smooth.").range("[0, 1]");
 
 const A_DIFFUSE: &str = r#"
@@ -55,6 +63,11 @@ const A_DIFFUSE: &str = r#"
 reflectance = { samples = [[380, 0.05], [500, 0.1], [600, 0.7], [780, 0.8]] }
 two_sided = false
 temperature = 300.0
+"#;
+const A_WARM_SKIN: &str = r#"
+[materials.paint.diffuse]
+emissivity = 0.98
+temperature = "33.5 C"
 "#;
 const A_CONDUCTOR: &str = r#"
 [materials.paint.conductor]
@@ -99,10 +112,10 @@ pub static DIFFUSE: Section = Section {
     heading: "`[materials.NAME.diffuse]`",
     summary: "Lambert's law",
     about: "",
-    keys: &[REFLECTANCE, TWO_SIDED, TEMPERATURE],
+    keys: &[REFLECTANCE.unless("`emissivity`"), EMISSIVITY, TWO_SIDED, TEMPERATURE],
     later: &[],
     at: "materials.paint.diffuse",
-    examples: &[A_DIFFUSE],
+    examples: &[A_DIFFUSE, A_WARM_SKIN],
     notes: "",
 };
 

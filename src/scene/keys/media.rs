@@ -1,7 +1,7 @@
 //! Gases that absorb and emit.
 
 use super::Kind::{File, ListOfTables, Number, Spectrum};
-use super::{Key, Section};
+use super::{CELSIUS, Key, Section};
 use crate::scene::Quantity;
 
 pub static MEDIUM: Section = Section {
@@ -21,6 +21,7 @@ pub static MEDIUM: Section = Section {
             "it does not emit",
             "Required where the table of a species has several columns. In grids 0 is allowed, and emits nothing.",
         )
+        .or(CELSIUS)
         .unit("K")
         .range("(0, 1e9]")
         .tables(&[&GRID]),

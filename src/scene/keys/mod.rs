@@ -25,6 +25,9 @@ pub use view::*;
 use super::Quantity;
 use super::words::{did_you_mean, edit_distance, list};
 
+/// What a temperature may be instead of a number.
+const CELSIUS: &str = "text with its unit (K, C or F) such as `\"37 C\"`";
+
 /// A table of the scene file.
 #[derive(Debug)]
 pub struct Section {

@@ -294,8 +294,14 @@ pub static CHANNELS: Section = Section {
             List("list of `[from, to]`"),
             "Any intervals, kept in this order. They may overlap, and leave gaps. 1 to 65,536 of them.",
         )
-        .unit("nm")
-        .range("from < to, both in (0, 1e6]"),
+        .unit("nm, or as `unit` says")
+        .range("from < to, both in (0, 1e6] nm"),
+        Key::default(
+            "unit",
+            Choice(&["nm", "um"]),
+            "\"nm\"",
+            "Of `intervals`, the micrometre for short; `equal` has its own.",
+        ),
         Key::one_of("responses", File, "The responses of a sensor, one channel each; see [Responses](#responses)."),
         Key::optional(
             "false_colour",
@@ -325,6 +331,11 @@ intervals = [[380, 390], [450, 470], [8000, 12000]]
 "#,
         r#"
 [channels]
+intervals = [[3, 5], [8, 12]]
+unit = "um"
+"#,
+        r#"
+[channels]
 responses = "sensor.csv"
 "#,
     ],
@@ -337,18 +348,32 @@ pub static EQUAL: Section = Section {
     summary: "channels of equal width",
     about: "",
     keys: &[
-        Key::required("from", Number, "Where the first channel begins.").unit("nm").range("(0, 1e6], less than `to`"),
-        Key::required("to", Number, "Where the last one ends.").unit("nm").range("(0, 1e6], more than `from`"),
+        Key::required("from", Number, "Where the first channel begins.")
+            .unit("nm, or as `unit` says")
+            .range("(0, 1e6], less than `to`"),
+        Key::required("to", Number, "Where the last one ends.")
+            .unit("nm, or as `unit` says")
+            .range("(0, 1e6], more than `from`"),
         Key::required("count", Whole, "How many channels.").range("[1, 65536]"),
+        Key::default("unit", Choice(&["nm", "um"]), "\"nm\"", "Of `from` and `to`: nanometres or micrometres."),
     ],
     later: &[],
     at: "channels.equal",
-    examples: &["
+    examples: &[
+        "
 [channels.equal]
 from = 380.0
 to = 780.0
 count = 400
-"],
+",
+        r#"
+[channels.equal]
+from = 8
+to = 14
+unit = "um"
+count = 60
+"#,
+    ],
     notes: "",
 };
 

@@ -16,6 +16,8 @@ const MOST_ABSORBING: f64 = 1e15;
 pub enum Quantity {
     /// Dimensionless, in [0, 1]; held beyond its table, with a warning.
     Reflectance,
+    /// What a surface emits of what a black body does: as [`Quantity::Reflectance`], of which it is the complement.
+    Emissivity,
     /// W m⁻² sr⁻¹ nm⁻¹, not negative; zero beyond its table.
     Radiance,
     /// Of a point light, W sr⁻¹ nm⁻¹; as [`Quantity::Radiance`].
@@ -33,8 +35,9 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    pub const ALL: [Quantity; 8] = [
+    pub const ALL: [Quantity; 9] = [
         Quantity::Reflectance,
+        Quantity::Emissivity,
         Quantity::Radiance,
         Quantity::Intensity,
         Quantity::Irradiance,
@@ -49,7 +52,7 @@ impl Quantity {
         matches!(self, Quantity::Radiance | Quantity::Intensity | Quantity::Irradiance)
     }
 
-    /// Whether it is an index of refraction or an absorption, which no temperature and no colour makes.
+    /// Whether it is an emissivity, an index of refraction or an absorption, which no temperature and no colour makes.
     pub fn is_index(self) -> bool {
         self != Quantity::Reflectance && !self.is_light()
     }
@@ -70,7 +73,11 @@ impl Quantity {
             Quantity::Intensity => "W sr⁻¹ nm⁻¹",
             Quantity::Irradiance => "W m⁻² nm⁻¹",
             Quantity::Absorption => "m⁻¹",
-            Quantity::Reflectance | Quantity::Index | Quantity::CoatIndex | Quantity::Extinction => "",
+            Quantity::Reflectance
+            | Quantity::Emissivity
+            | Quantity::Index
+            | Quantity::CoatIndex
+            | Quantity::Extinction => "",
         }
     }
 
@@ -86,6 +93,7 @@ impl Quantity {
     pub fn noun(self) -> &'static str {
         match self {
             Quantity::Reflectance => "a reflectance",
+            Quantity::Emissivity => "an emissivity",
             Quantity::Radiance => "a radiance",
             Quantity::Intensity => "an intensity",
             Quantity::Irradiance => "an irradiance",
@@ -98,7 +106,7 @@ impl Quantity {
 
     pub fn allows(self, value: f64) -> bool {
         match self {
-            Quantity::Reflectance => (0.0..=1.0).contains(&value),
+            Quantity::Reflectance | Quantity::Emissivity => (0.0..=1.0).contains(&value),
             Quantity::Radiance | Quantity::Intensity | Quantity::Irradiance => (0.0..=BRIGHTEST).contains(&value),
             Quantity::Index => value > 0.0 && value <= DENSEST,
             Quantity::CoatIndex => (1.0..=DENSEST).contains(&value),
@@ -110,7 +118,7 @@ impl Quantity {
     /// What measured values of it may be but for noise; `None` where there is no bound that noise could cross.
     pub(super) fn noise(self) -> Option<Range> {
         match self {
-            Quantity::Reflectance => Some(Range::Share),
+            Quantity::Reflectance | Quantity::Emissivity => Some(Range::Share),
             Quantity::Extinction => Some(Range::Extinction),
             Quantity::Index | Quantity::CoatIndex => None,
             _ => Some(Range::NotNegative),
@@ -131,7 +139,7 @@ impl Quantity {
     /// The values that are allowed.
     pub fn interval(self) -> &'static str {
         match self {
-            Quantity::Reflectance => "[0, 1]",
+            Quantity::Reflectance | Quantity::Emissivity => "[0, 1]",
             Quantity::Radiance | Quantity::Intensity | Quantity::Irradiance => "[0, 1e35]",
             Quantity::Index => "(0, 1000]",
             Quantity::CoatIndex => "[1, 1000]",
