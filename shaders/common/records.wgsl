@@ -69,6 +69,16 @@
 #repeat VECTORS v
         var value_$v = operation_value(record, raw, quad_$v, s);
 #end
+#if WAVELENGTHS
+#if OP_ONLY
+        // Behind dispersion a path goes where its own wavelength goes: the others of its channel see what is before it only.
+        if ((record.x & 0x3fu) == OP_ONLY) {
+#repeat VECTORS v
+            value_$v *= select(0.0, f32(WAVELENGTHS), turn == 0u);
+#end
+        }
+#endif
+#endif
 #if RADIATORS
         if ((record.x & 0x3fu) == OP_HELD) {
 #repeat VECTORS v

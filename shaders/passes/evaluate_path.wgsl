@@ -13,7 +13,10 @@ fn evaluate_path(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
     let slot = wave.pixel_begin + local_slot;
     let path = local_slot * wave.samples + step.sample;
     let head = heads[path];
+#if WAVELENGTHS
+#else
     let s = spectral_sample(head.x);
+#endif
     let used = head.y & 0xffffu;
     let first_record = path * frame.max_records;
     let index = wave.sample_begin + step.sample + 1u;
@@ -24,10 +27,26 @@ fn evaluate_path(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
         let quad_$v = min(b * VECTORS + $vu, QUADS - 1u);
         let out_$v = slot * CHANNELS + 4u * quad_$v;
         let channels_$v = select(0u, min(4u, CHANNELS - 4u * quad_$v), b * VECTORS + $vu < QUADS);
+#if WAVELENGTHS
+        var sum_$v = vec4<f32>(0.0);
+#end
+        for (var turn = 0u; turn < WAVELENGTHS; turn += 1u) {
+        let s = spectral_sample(head.x + turn * WAVELENGTH_STEP);
+#repeat VECTORS v
+#endif
         var throughput_$v = first_throughput(quad_$v, s);
         var radiance_$v = vec4<f32>(0.0);
 #end
 #include common/records.wgsl
+#if WAVELENGTHS
+#repeat VECTORS v
+        sum_$v += radiance_$v;
+#end
+        }
+#repeat VECTORS v
+        let radiance_$v = sum_$v / f32(WAVELENGTHS);
+#end
+#endif
 
 #repeat VECTORS v
         if (channels_$v > 0u) {

@@ -15,17 +15,36 @@ fn evaluate_spectral(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workg
     let slot = wave.pixel_begin + local_slot;
     let path = local_slot * wave.samples + step.sample;
     let head = heads[path];
+#if WAVELENGTHS
+#else
     let s = spectral_sample(head.x);
+#endif
     let used = head.y & 0xffffu;
     let first_record = path * frame.max_records;
     let index = wave.sample_begin + step.sample + 1u;
     var bad = BadSamples(0u, 0u, 0u);
 #repeat VECTORS v
     let quad_$v = min(first_quad + $vu, QUADS - 1u);
+#if WAVELENGTHS
+    var sum_$v = vec4<f32>(0.0);
+#end
+    for (var turn = 0u; turn < WAVELENGTHS; turn += 1u) {
+    let s = spectral_sample(head.x + turn * WAVELENGTH_STEP);
+#repeat VECTORS v
+#endif
     var throughput_$v = first_throughput(quad_$v, s);
     var radiance_$v = vec4<f32>(0.0);
 #end
 #include common/records.wgsl
+#if WAVELENGTHS
+#repeat VECTORS v
+    sum_$v += radiance_$v;
+#end
+    }
+#repeat VECTORS v
+    let radiance_$v = sum_$v / f32(WAVELENGTHS);
+#end
+#endif
 
 #repeat VECTORS v
     if (first_quad + $vu < QUADS) {

@@ -20,8 +20,17 @@ fn fold_paths(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         let index = wave.sample_begin + i + 1u;
 #repeat VECTORS v
         if (first_quad + $vu < QUADS) {
+#if WAVELENGTHS
+            var sum_$v = vec4<f32>(0.0);
+            for (var turn = 0u; turn < WAVELENGTHS; turn += 1u) {
+                let state_$v = ((path * WAVELENGTHS + turn) * QUADS + first_quad + $vu) * STATE_QUADS;
+                sum_$v += spectral_states[state_$v + STATE_RADIANCE] + spectral_states[state_$v + STATE_DIRECT];
+            }
+            let radiance_$v = sum_$v / f32(WAVELENGTHS);
+#else
             let state_$v = (path * QUADS + first_quad + $vu) * STATE_QUADS;
             let radiance_$v = spectral_states[state_$v + STATE_RADIANCE] + spectral_states[state_$v + STATE_DIRECT];
+#endif
             let quad_$v = first_quad + $vu;
             let out_$v = slot * CHANNELS + 4u * quad_$v;
             refine_mean(out_$v, min(4u, CHANNELS - 4u * quad_$v), checked(radiance_$v, index, &bad), index);

@@ -27,13 +27,24 @@ fn update_path(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         path = queue[(step.bounce & 1u) * wave.path_count + place];
     }
     let head = heads[path];
+#if WAVELENGTHS
+#else
     let s = spectral_sample(head.x);
+#endif
     // Of this bounce alone.
     let used = head.y & 0xffffu;
     let first_record = path * frame.max_records;
+#if WAVELENGTHS
+    for (var turn = 0u; turn < WAVELENGTHS; turn += 1u) {
+    let s = spectral_sample(head.x + turn * WAVELENGTH_STEP);
+#endif
 #repeat VECTORS v
     let quad_$v = min(first_quad + $vu, QUADS - 1u);
+#if WAVELENGTHS
+    let state_$v = ((path * WAVELENGTHS + turn) * QUADS + quad_$v) * STATE_QUADS;
+#else
     let state_$v = (path * QUADS + quad_$v) * STATE_QUADS;
+#endif
     var throughput_$v = first_throughput(quad_$v, s);
     var before_$v = vec4<f32>(0.0);
     if (step.bounce > 0u) {
@@ -51,4 +62,7 @@ fn update_path(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         spectral_states[state_$v + STATE_DIRECT] = radiance_$v;
     }
 #end
+#if WAVELENGTHS
+    }
+#endif
 }

@@ -52,6 +52,7 @@ pub const PARTS: &[&Part] = &[
     &paths::ROULETTE,
     &paths::SOBOL,
     &spectra::STRATA,
+    &spectra::SEVERAL,
     &spectra::WARP,
     &spectra::RESPONSES,
     &spectra::KNOTS,

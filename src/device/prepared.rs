@@ -89,6 +89,8 @@ pub struct Prepared {
     pub channels: usize,
     /// How the scene's channels are made of those; `None` where they are the same.
     pub integration: Option<Integration>,
+    /// At how many wavelengths of each channel a path is evaluated.
+    pub wavelengths_per_channel: u32,
     /// Where in the channels wavelengths are drawn.
     pub warp: Warp,
     /// The device id of the spectrum with which a path's throughput begins, where it is not 1: weights of responses and of
@@ -178,6 +180,7 @@ impl Prepared {
             factors: ids.factors.len(),
             sources: ids.sources.len(),
             channels: scene.channels.len(),
+            wavelengths_per_channel: scene.integrator.wavelengths_per_channel,
             path_weight: ids.path_weight.map(|position| tables.ids[position]),
             integration,
             warp,
@@ -204,7 +207,7 @@ impl Prepared {
         if self.path_iterations() > LOOP_LIMIT {
             let message = format!(
                 "a path of {bounces} bounces may go through {} voxels on each of its ways, more than one evaluation can: lower \
-                 integrator.max_bounces or use coarser grids",
+                 integrator.max_bounces or integrator.wavelengths_per_channel, or use coarser grids",
                 self.media.as_ref().map_or(0, |media| media.cells)
             );
             return Err(Error::input(&scene.file, message));
@@ -227,11 +230,13 @@ impl Prepared {
         if self.evaluator == Evaluator::Pt { 1 } else { self.frame.max_bounces }
     }
 
-    /// Iterations that evaluation may take for one path: its records, and the voxels on its ways with the absorbers in each.
+    /// Iterations that evaluation may take for one path, at each of its wavelengths: its records, and the voxels on its ways with the
+    /// absorbers in each.
     pub fn path_iterations(&self) -> u32 {
         let cells = self.media.as_ref().map_or(0, |media| media.cells.saturating_mul(1 + media.most_absorbers));
         let ways = self.vertices_at_once().saturating_mul(2) + 1;
-        (self.frame.max_records + 1).saturating_add(ways.saturating_mul(cells))
+        let walk = (self.frame.max_records + 1).saturating_add(ways.saturating_mul(cells));
+        walk.saturating_mul(self.wavelengths_per_channel)
     }
 
     /// Most records of a path that are kept at once: at each vertex what it emits and what next-event estimation found.
@@ -241,7 +246,8 @@ impl Prepared {
 
     /// Bytes of the state that all channels of a path have between two bounces: none where they are evaluated at its end.
     pub fn spectral_state_bytes(&self) -> u32 {
-        if self.evaluator == Evaluator::Pt { 16 * self.tables.channels_padded as u32 } else { 0 }
+        let each = 16 * self.tables.channels_padded as u32;
+        if self.evaluator == Evaluator::Pt { each * self.wavelengths_per_channel } else { 0 }
     }
 
     /// Bytes of a record.

@@ -147,6 +147,7 @@ mod tests {
                 russian_roulette_start: 1,
                 sampler: Sampler::Independent,
                 wavelengths: Wavelengths::Uniform,
+                wavelengths_per_channel: 1,
                 evaluator: Evaluator::Auto,
                 epoch: 64,
             },

@@ -59,7 +59,7 @@ pub struct WavePlan {
     pub max_records: u32,
     /// Bytes of a path's state and of a record.
     pub state_size: u32,
-    /// Loop iterations that evaluating a path may take.
+    /// Loop iterations that evaluating a path may take, at all its wavelengths.
     pub path_iterations: u32,
     pub record_size: u32,
     /// Bytes of the state of all channels of a path (`pt`), or 0.
@@ -122,7 +122,10 @@ impl WavePlan {
             Some(memory) if memory < plan.device_bytes() => return Err(plan.too_large_for(memory)),
             Some(memory) => memory - buffer::WGPU_BYTES - plan.scene_bytes - plan.wave_bytes(),
         };
-        let wanted = budget.paths.map_or_else(|| wanted_paths(limits.software, channels, records), u64::from);
+        let wanted = budget.paths.map_or_else(
+            || wanted_paths(limits.software, channels * u64::from(prepared.wavelengths_per_channel), records),
+            u64::from,
+        );
         let more_paths = wanted.min(most).saturating_sub(u64::from(plan.paths)).min(left / plan.path_bytes());
         // In fours, so that every buffer grows by exactly what its paths take, alignment included.
         let more_paths = more_paths - more_paths % 4;

@@ -154,7 +154,15 @@ impl Hash {
     }
 
     fn integrator(&mut self, integrator: &Integrator) {
-        let Integrator { max_bounces, russian_roulette_start, sampler, wavelengths, evaluator, epoch } = integrator;
+        let Integrator {
+            max_bounces,
+            russian_roulette_start,
+            sampler,
+            wavelengths,
+            wavelengths_per_channel,
+            evaluator,
+            epoch,
+        } = integrator;
         self.counts([max_bounces, russian_roulette_start]);
         self.tag(match sampler {
             Sampler::Sobol => 0,
@@ -166,6 +174,11 @@ impl Hash {
         });
         self.text(evaluator.name());
         self.counts([epoch]);
+        // Nothing of one, so that other scenes keep their digests.
+        if *wavelengths_per_channel > 1 {
+            self.text("wavelengths per channel");
+            self.counts([wavelengths_per_channel]);
+        }
     }
 
     fn curve(&mut self, curve: &Curve) {

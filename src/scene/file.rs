@@ -24,6 +24,7 @@ use crate::error::{Error, Problem, Result};
 /// the most that every driver runs.
 const MAX_BOUNCES: u32 = 16_383;
 const MAX_EPOCH: u32 = 1024;
+const MOST_WAVELENGTHS: u32 = 16;
 
 /// Reads the scene in `file`. `overrides` are the `--set` arguments: a dotted key and the text of a TOML value; a bare
 /// word is a string.
@@ -148,6 +149,7 @@ impl Default for Integrator {
             russian_roulette_start: 0,
             sampler: Sampler::Sobol,
             wavelengths: Wavelengths::Emission,
+            wavelengths_per_channel: 1,
             evaluator: Evaluator::Auto,
             epoch: 64,
         }
@@ -171,27 +173,31 @@ fn decode_integrator(item: &Item) -> Option<Integrator> {
         Some(item) => item.choice(&[("emission", Wavelengths::Emission), ("uniform", Wavelengths::Uniform)]),
         None => Some(default.wavelengths),
     };
+    let power_of_two = |key: &str, most: u32, default: u32| match fields.get(key) {
+        Some(item) => item.whole(1..=most).filter(|value| {
+            if !value.is_power_of_two() {
+                item.error_help(
+                    format!("must be a power of two up to {most}, but is {value}"),
+                    format!("use {} or {}", value.next_power_of_two() / 2, value.next_power_of_two()),
+                );
+            }
+            value.is_power_of_two()
+        }),
+        None => Some(default),
+    };
+    let wavelengths_per_channel =
+        power_of_two("wavelengths_per_channel", MOST_WAVELENGTHS, default.wavelengths_per_channel);
     let evaluator = match fields.get("evaluator") {
         Some(item) => item.choice(&Evaluator::ALL.map(|evaluator| (evaluator.name(), evaluator))),
         None => Some(default.evaluator),
     };
-    let epoch = match fields.get("epoch") {
-        Some(item) => item.whole(1..=MAX_EPOCH).filter(|epoch| {
-            if !epoch.is_power_of_two() {
-                item.error_help(
-                    format!("must be a power of two up to {MAX_EPOCH}, but is {epoch}"),
-                    format!("use {} or {}", epoch.next_power_of_two() / 2, epoch.next_power_of_two()),
-                );
-            }
-            epoch.is_power_of_two()
-        }),
-        None => Some(default.epoch),
-    };
+    let epoch = power_of_two("epoch", MAX_EPOCH, default.epoch);
     Some(Integrator {
         max_bounces: max_bounces?,
         russian_roulette_start: russian_roulette_start?,
         sampler: sampler?,
         wavelengths: wavelengths?,
+        wavelengths_per_channel: wavelengths_per_channel?,
         evaluator: evaluator?,
         epoch: epoch?,
     })

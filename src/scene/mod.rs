@@ -143,6 +143,8 @@ pub struct Integrator {
     pub russian_roulette_start: u32,
     pub sampler: Sampler,
     pub wavelengths: Wavelengths,
+    /// At how many wavelengths of each channel a path is evaluated, a power of two up to 16.
+    pub wavelengths_per_channel: u32,
     pub evaluator: Evaluator,
     /// Samples per pixel of a full epoch, a power of two up to 1,024.
     pub epoch: u32,

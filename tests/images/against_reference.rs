@@ -29,7 +29,7 @@ struct Effort {
     image: f64,
 }
 
-const USUAL: Effort = Effort { epochs: 20, reference: 1_280, pixel: 0.25, image: 0.006 };
+const USUAL: Effort = Effort { epochs: 20, reference: 2_560, pixel: 0.25, image: 0.006 };
 
 fn compare(what: &str, scene: &Scene, effort: &Effort) {
     let ours = render(scene, effort.epochs, 64, Settings { seed: 11, tile: [8, 8], ..Settings::default() });

@@ -83,16 +83,22 @@ fn the_same_paths_give_the_same_means() {
         scene.integrator.sampler = Sampler::Independent;
         scene
     };
+    let several = |mut scene: Scene| {
+        scene.integrator.wavelengths_per_channel = 4;
+        scene
+    };
     let mut far = 0.0f64;
     let scenes = [
         ("everything", general(4).build()),
+        ("plain, several wavelengths", several(plain(7).build())),
         ("plain", plain(6).build()),
         ("plain, independent, many channels", independent(plain(170).build())),
         ("no bounces", plain(5).bounces(0).build()),
         ("plain, one channel", plain(1).build()),
         ("infrared", general(37).channels(Channels::equal(1500.0, 5500.0, 37)).build()),
+        ("everything, several wavelengths", several(general(4).build())),
     ];
-    for (what, scene) in size::first(4, scenes) {
+    for (what, scene) in size::first(5, scenes) {
         let samples = 64;
         let settings = Settings { seed: 3, ..Settings::default() };
         let expected = render(&with(&scene, Evaluator::DpeptPixel), 2, samples, settings);

@@ -421,7 +421,7 @@ fn a_constant_texture_is_no_texture() {
         ]
     };
     for (i, (textured, plain)) in size::first(2, scenes(true).iter().zip(&scenes(false))).enumerate() {
-        let [a, b] = [textured, plain].map(|scene| of_device(scene, 16, 80, 51));
+        let [a, b] = [textured, plain].map(|scene| of_device(scene, 16, 64, 51));
         let scale: Vec<f64> = b.iter().map(|e| e.mean).collect();
         assert_agreement(&format!("scene {i}"), &a, &b, &scale, Bound { resolution: 0.1, allowance: 1e-4 });
         let [a, b] = [textured, plain].map(|scene| of_reference(scene, 1000, 52));

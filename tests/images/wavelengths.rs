@@ -102,6 +102,70 @@ fn a_lamp_of_lines_in_few_channels() {
     against_reference("8 channels", &lit_room(visible(8)).build(), [64, 8192], 0.1);
 }
 
+fn several(scene: &Scene, count: u32) -> Scene {
+    let mut scene = scene.clone();
+    scene.integrator.wavelengths_per_channel = count;
+    scene
+}
+
+/// Four wavelengths a channel and one: the same means. Gives the ratios of their variances, one over four.
+fn compare_several(what: &str, scene: &Scene, epochs: u32, resolution: f64) -> Vec<f64> {
+    let of = |count, seed| {
+        let rendered = render(&several(scene, count), epochs, 64, Settings { seed, ..Settings::default() });
+        rendered.assert_clean();
+        rendered.image_means()
+    };
+    let (one, four) = (of(1, 1), of(4, 2));
+    let scale: Vec<f64> = four.iter().map(|e| e.mean).collect();
+    assert_agreement(what, &one, &four, &scale, Bound { resolution, allowance: 1e-3 });
+    let ratios: Vec<f64> = one.iter().zip(&four).map(|(a, b)| (a.error / b.error).powi(2)).collect();
+    println!("{what}: variance, one wavelength over four: {ratios:.2?}");
+    ratios
+}
+
+/// Spiky lamps and paints in registers and in tables, responses, and glass behind whose dispersion only a path's own wavelength counts.
+#[test]
+fn several_wavelengths_a_channel_have_the_same_means() {
+    let room = with(&lit_room(visible(4)).build(), Wavelengths::Uniform);
+    let ratios = compare_several("a room", &room, 64, 0.2);
+    // Nothing but wavelengths differs much: in channels with a line at least half of four is won.
+    assert!(ratios.iter().copied().fold(0.0, f64::max) > 2.0, "{ratios:?}");
+
+    let sensor = Response::new(vec![480.0, 550.0, 600.0], vec![0.0, 1.0, 0.0]).expect("a response");
+    let channels = Channels::from_responses(vec![("green".into(), sensor)], None);
+    compare_several("a response", &lit_room(channels).build(), 64, 0.2);
+
+    for roughness in size::first(2, [0.0, 0.02, 0.15]) {
+        let ball = surfaces::dispersive_ball(Channels::equal(400.0, 700.0, 4), roughness);
+        compare_several(&format!("glass of roughness {roughness}"), &ball, 64, 0.06);
+    }
+}
+
+/// The equivalent width of a Lorentz line in a channel of 200 half widths, in the mean of 256 samples of a pixel: known within 1e-3 with
+/// 16 wavelengths a sample, and far from that with one.
+#[test]
+fn a_line_in_a_wide_channel() {
+    for (x, published) in [(1.0, 4.23279359), (10.0, 15.6511644)] {
+        let (line, channels, expected) = heat::lorentz_line(x, published);
+        let lamp = |b: Builder| b.lamp(disk(DVec3::ZERO, DVec3::Z, 2.0), 1.0, Sides::Front);
+        let mut scene = heat::slab(0.0, None, |b| lamp(b.channels(channels))).build();
+        scene.spectra[scene.media[0].absorbers[0].columns[0].1].curve = line;
+        scene.film.width = 16;
+        scene.film.height = 16;
+        scene.film.crop = [0, 0, 16, 16];
+        // Root mean square of the pixels' errors, of the width.
+        let error = |count| {
+            let rendered = render(&several(&scene, count), 1, 256, Settings { seed: 9, ..Settings::default() });
+            rendered.assert_clean();
+            let errors = rendered.means[0].iter().map(|v| f64::from(*v) - expected);
+            (errors.map(|e| e * e).sum::<f64>() / 256.0).sqrt() / (1.0 - expected)
+        };
+        let (one, many) = (error(1), error(16));
+        println!("x = {x}: error of the width {one:.1e} with one wavelength a channel, {many:.1e} with 16");
+        assert!(many < 1e-3 && many < 0.2 * one, "{one} {many}");
+    }
+}
+
 /// More spectra than registers hold, and lookups by strata or knots; responses as well.
 #[test]
 fn tables_and_responses() {

@@ -92,6 +92,7 @@ fn compose_plain() -> Vec<(String, Source)> {
         prepared.evaluator = if features.registers { Evaluator::DpeptPixel } else { EVALUATORS[i % EVALUATORS.len()] };
         prepared.features = features;
         prepared.tables.kinks = if features.registers && !features.strata { i as u32 % 3 } else { 0 };
+        prepared.wavelengths_per_channel = [1, 1, 4][i % 3];
         // Windows and workgroups take turns among the combinations, and all are seen with all features off and on.
         let windows = windows(1 + i as u32 % 4, 1 + i as u32 / 4 % 4);
         let shape = EvaluateShape { batches: Some(2), ..shapes[i % shapes.len()] };

@@ -27,7 +27,7 @@ fn a_report_of_evaluators() {
     let scene = cornell();
     // Each has kernels of its own, which take longer to compile than to run.
     let (channels, evaluators) =
-        if size::is_full() { ("4,64", "dpept-pixel,dpept-path,dpept-spectral,pt") } else { ("4", "pt") };
+        if size::is_full() { ("4,64", "dpept-pixel,dpept-path,dpept-spectral,pt") } else { ("4", "dpept-pixel") };
     let options = ["-o", "report", "--pools", "1024", "--frames", "32,64", "--rounds", "1", "--json"];
     let small = ["--channels", channels, "--evaluators", evaluators];
     let output = bench(folder.path(), &[&[scene.to_str().expect("UTF-8")], &options[..], &small].concat());

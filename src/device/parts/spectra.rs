@@ -13,6 +13,22 @@ pub const STRATA: Part = Part {
     ..Part::NOTHING
 };
 
+pub const SEVERAL: Part = Part {
+    name: "several wavelengths a channel",
+    used: |scene| scene.wavelengths_per_channel > 1,
+    effect: |scene| format!("every path is evaluated at {}", scene.wavelengths_per_channel),
+    is_planned: true,
+    defines: |scene, work, defines| {
+        if work == Work::Evaluate {
+            let count = scene.wavelengths_per_channel;
+            defines.constant("WAVELENGTHS", count);
+            // As far apart as the whole of μ, 2^32, allows.
+            defines.constant("WAVELENGTH_STEP", (u32::MAX / count) + 1);
+        }
+    },
+    ..Part::NOTHING
+};
+
 pub const WARP: Part = Part {
     name: "wavelengths by emission",
     used: |scene| scene.warp.bits() > 0,

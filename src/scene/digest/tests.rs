@@ -90,6 +90,7 @@ fn full() -> Scene {
             russian_roulette_start: 3,
             sampler: Sampler::Sobol,
             wavelengths: Wavelengths::Uniform,
+            wavelengths_per_channel: 1,
             evaluator: Evaluator::Auto,
             epoch: 64,
         },
@@ -145,6 +146,7 @@ fn digests_are_those_of_earlier_versions() {
                     russian_roulette_start: 0,
                     sampler: Sampler::Independent,
                     wavelengths: Wavelengths::Emission,
+                    wavelengths_per_channel: 1,
                     evaluator: Evaluator::Pt,
                     epoch: 128,
                 };

@@ -437,6 +437,15 @@ pub static INTEGRATOR: Section = Section {
              ([METHOD.md](METHOD.md#wavelengths-by-emission)).",
         ),
         Key::default(
+            "wavelengths_per_channel",
+            Whole,
+            "1",
+            "At how many wavelengths of every channel a path is evaluated, evenly spread: less noise where spectra vary within a \
+             channel (lines of gases, narrow reflectances), for as much more time in evaluation \
+             ([METHOD.md](METHOD.md#several-wavelengths-a-channel)).",
+        )
+        .range("[1, 16], a power of two"),
+        Key::default(
             "evaluator",
             Choice(&["auto", "dpept-pixel", "dpept-path", "dpept-spectral", "pt"]),
             "\"auto\"",
@@ -461,6 +470,7 @@ max_bounces = 16
 russian_roulette_start = 4
 sampler = "independent"
 wavelengths = "uniform"
+wavelengths_per_channel = 4
 evaluator = "dpept-spectral"
 epoch = 16
 "#],

@@ -28,6 +28,7 @@ impl Builder {
                 russian_roulette_start: 0,
                 sampler: Sampler::Independent,
                 wavelengths: Wavelengths::Emission,
+                wavelengths_per_channel: 1,
                 evaluator: Evaluator::Auto,
                 epoch: 64,
             },
