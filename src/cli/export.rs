@@ -8,13 +8,14 @@ use serde_json::{Value, json};
 use super::Output;
 use super::bands::Bands;
 use super::output::say;
-use crate::cube::{Cube, Quantity, Rect, View};
+use crate::cube::{Cube, Quantity, Rect, View, White};
 use crate::export::{self, Shown};
 use crate::format::envi::Interleave;
 use crate::format::png::PICTURE;
+use crate::spectral::Channels;
 use crate::spectral::colour::{Observer, Projection};
 use crate::spectral::tone::Tone;
-use crate::{Error, Result, files};
+use crate::{Error, Result, files, scene};
 
 /// Write a cube, or a picture of it, in another format
 ///
@@ -72,6 +73,15 @@ pub struct Args {
     /// For a PNG: of the chosen bands together, in a perceptually uniform colour map.
     #[arg(long, conflicts_with_all = ["integrated", "xyz", "standard_error"])]
     pub temperature: bool,
+
+    /// Reflectance factors instead of radiances, relative to WHITE
+    ///
+    /// WHITE is a cube of the same view and channels in which what is seen is diffuse and white (reflectance 1): the factor is the
+    /// radiance over that of the white, at each pixel. Or it is an irradiance E: a file, am0, am1.5, a number or a table as in
+    /// scenes, such as '{ file = "sun.csv", column = "global" }'; the factor is then pi L / E. Both are hemispherical-directional
+    /// reflectance factors. NaN where the white is black.
+    #[arg(long, value_name = "WHITE", conflicts_with_all = ["integrated", "xyz", "temperature", "standard_error"])]
+    pub reflectance: Option<String>,
 
     /// X, Y and Z instead of the bands, for the standard observer of this year
     ///
@@ -180,7 +190,18 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         PICTURE.check_target(&args.output)?;
         return write_png(args, &cube, output);
     }
-    let view = view(args, &cube, output)?;
+    let mut view = view(args, &cube, output)?;
+    let white_cube;
+    if let Some(written) = &args.reflectance {
+        let path = Path::new(written);
+        let white = if path.is_dir() || path.extension().is_some_and(|e| e == "zarr") {
+            white_cube = Cube::open(path)?;
+            White::Cube(&white_cube)
+        } else {
+            White::Irradiance(irradiances(written, cube.channels(), output)?)
+        };
+        view = view.with_reflectance(white)?;
+    }
     let format = match format {
         Format::Envi => export::Format::Envi { interleave: interleave(args)? },
         Format::Exr => {
@@ -238,6 +259,7 @@ impl Said<'_> {
 fn check_options(args: &Args, format: Format) -> Result<()> {
     let given = [
         ("--interleave", args.interleave.is_some(), vec![Format::Envi]),
+        ("--reflectance", args.reflectance.is_some(), vec![Format::Envi, Format::Zarr, Format::Csv]),
         ("--exr-split", args.exr_split.is_some(), vec![Format::Exr]),
         ("--exr-strict-units", args.exr_strict_units, vec![Format::Exr]),
         ("--zarr-no-shards", args.zarr_no_shards, vec![Format::Zarr]),
@@ -259,6 +281,23 @@ fn check_options(args: &Args, format: Format) -> Result<()> {
             Err(Error::Usage(format!("{option} goes with {}, not with {}", formats.join(", "), name(format))))
         }
     }
+}
+
+/// The means of an irradiance over the channels; where nothing arrives is said.
+fn irradiances(written: &str, channels: &Channels, output: &Said) -> Result<Vec<f64>> {
+    let (curve, warnings) = scene::irradiance("--reflectance", written, channels)?;
+    warnings.iter().try_for_each(|warning| output.output.warn(warning))?;
+    let means: Vec<f64> = (0..channels.len()).map(|k| channels.mean_of(k, &curve)).collect();
+    let dark = means.iter().filter(|mean| **mean <= 0.0).count();
+    if dark == means.len() {
+        let what = format!("--reflectance {written}: nothing arrives in any channel of the cube");
+        return Err(Error::Usage(what));
+    }
+    if dark > 0 {
+        let what = format!("--reflectance {written}: nothing arrives in {dark} of {} channels: NaN there", means.len());
+        output.output.warn(&what)?;
+    }
+    Ok(means)
 }
 
 /// The channels that are asked for; what might have been meant otherwise is said.

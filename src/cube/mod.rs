@@ -48,7 +48,7 @@ pub use sensor::{Findings, integrate};
 pub use state::{CubeState, RegionMean, Seen, Window};
 pub use store::{Cube, Progress};
 pub use verify::Verification;
-pub use view::{Quantity, Reader, Strides, View};
+pub use view::{Quantity, Reader, Strides, View, White};
 pub use writer::Writer;
 
 /// Side, in pixels, of the blocks whose means make up `overview`.

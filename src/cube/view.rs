@@ -1,6 +1,7 @@
 //! A part of a cube, read in rectangles: some of its channels, in the order wanted, of some of its pixels.
 
 use std::collections::BTreeMap;
+use std::f64::consts::PI;
 use std::ops::Range;
 
 use super::grid::Rect;
@@ -20,8 +21,36 @@ pub enum Quantity {
     Integrated,
     /// The temperature, K, of a black body with this radiance in the channel.
     Temperature,
+    /// The hemispherical-directional reflectance factor: of [`White`].
+    Reflectance,
     /// X, Y and Z, W m⁻² sr⁻¹ nm⁻¹: divided by ∫ȳ dλ, so that a constant 1 has Y = 1.
     Xyz(Observer),
+}
+
+/// What a reflectance factor is relative to: what an ideal white diffuse surface would send there.
+pub enum White<'a> {
+    /// π L / E: an irradiance, its mean over each channel of the cube, W m⁻² nm⁻¹.
+    Irradiance(Vec<f64>),
+    /// L / L of the white: a cube of the same pixels and channels, in which what is seen is white.
+    Cube(&'a Cube),
+}
+
+/// [`White`] of some channels and pixels.
+#[derive(Clone)]
+enum Divisor<'a> {
+    /// By channel of the cube.
+    Irradiance(Vec<f64>),
+    Cube(Box<View<'a>>),
+}
+
+impl<'a> Divisor<'a> {
+    /// With other bands or pixels of a white cube.
+    fn map(self, change: impl FnOnce(View<'a>) -> Result<View<'a>>) -> Result<Divisor<'a>> {
+        match self {
+            Divisor::Irradiance(means) => Ok(Divisor::Irradiance(means)),
+            Divisor::Cube(view) => Ok(Divisor::Cube(Box::new(change(*view)?))),
+        }
+    }
 }
 
 /// Some channels of some pixels of a cube.
@@ -33,6 +62,8 @@ pub struct View<'a> {
     channels: Channels,
     rect: Rect,
     quantity: Quantity,
+    /// Of reflectance factors.
+    divisor: Option<Divisor<'a>>,
     /// Standard errors instead of values.
     errors: bool,
 }
@@ -55,6 +86,7 @@ impl<'a> View<'a> {
             channels: cube.channels().clone(),
             rect: Rect { x0: 0, y0: 0, x1, y1 },
             quantity: Quantity::Radiance,
+            divisor: None,
             errors: false,
         }
     }
@@ -69,7 +101,9 @@ impl<'a> View<'a> {
         if bands.is_empty() {
             return Err(Error::Usage(format!("{}: no band is chosen", self.cube.path().display())));
         }
-        Ok(View { channels: self.cube.channels().select(&bands), bands, ..self })
+        let divisor =
+            self.divisor.clone().map(|divisor| divisor.map(|white| white.with_bands(bands.clone()))).transpose()?;
+        Ok(View { channels: self.cube.channels().select(&bands), bands, divisor, ..self })
     }
 
     /// Only the pixels in `rect`, in the coordinates of the cube.
@@ -80,7 +114,8 @@ impl<'a> View<'a> {
             let what = format!("{x0},{y0},{x1},{y1} is no part of the picture, which has {width} x {height} pixels");
             return Err(Error::Usage(format!("{}: {what}", self.cube.path().display())));
         }
-        Ok(View { rect, ..self })
+        let divisor = self.divisor.clone().map(|divisor| divisor.map(|white| white.with_rect(rect))).transpose()?;
+        Ok(View { rect, divisor, ..self })
     }
 
     /// As another quantity. X, Y and Z are of all channels, and three bands.
@@ -91,6 +126,40 @@ impl<'a> View<'a> {
             return Err(Error::Usage(format!("{}: {what}", self.cube.path().display())));
         }
         Ok(View { quantity, bands: vec![0, 1, 2], channels: observer.channels(), ..self })
+    }
+
+    /// Reflectance factors of the bands and pixels chosen so far. Errors: a white cube of other pixels or channels.
+    pub fn with_reflectance(self, white: White<'a>) -> Result<View<'a>> {
+        let divisor = match white {
+            White::Irradiance(means) => Divisor::Irradiance(means),
+            White::Cube(white) => {
+                let (here, there) = (self.cube.header(), white.header());
+                let differ = |what: &str, here: String, there: String| {
+                    let (cube, white) = (self.cube.path().display(), white.path().display());
+                    Err(Error::Usage(format!("the white reference {white} has {what} {there}, and {cube} has {here}")))
+                };
+                if (here.size, here.origin) != (there.size, there.origin) {
+                    let pixels = |[w, h]: [u32; 2], [x, y]: [u32; 2]| format!("{w} x {h} from column {x}, row {y}");
+                    return differ("the pixels", pixels(here.size, here.origin), pixels(there.size, there.origin));
+                }
+                if (&here.channels.bounds, &here.channels.responses)
+                    != (&there.channels.bounds, &there.channels.responses)
+                {
+                    let channels = |channels: &Channels| match channels.hull() {
+                        Some([from, to]) => format!("{} from {from} to {to} nm", channels.len()),
+                        None => "none".to_owned(),
+                    };
+                    return differ("other channels,", channels(&here.channels), channels(&there.channels));
+                }
+                Divisor::Cube(Box::new(View { cube: white, ..self.clone() }))
+            }
+        };
+        Ok(View { quantity: Quantity::Reflectance, divisor: Some(divisor), ..self })
+    }
+
+    /// Whether these are reflectance factors by a white cube.
+    pub fn is_by_white_cube(&self) -> bool {
+        matches!(self.divisor, Some(Divisor::Cube(_)))
     }
 
     /// The standard errors instead of the values.
@@ -147,8 +216,21 @@ impl<'a> View<'a> {
     }
 
     pub fn reader(&self) -> Reader<'_> {
+        let mut white = None;
         let convert = match self.quantity {
             Quantity::Radiance => Convert::None,
+            Quantity::Reflectance => match &self.divisor {
+                Some(Divisor::Irradiance(means)) => {
+                    // Nothing can be told where nothing arrives.
+                    let factor = |&k: &usize| if means[k] > 0.0 { PI / means[k] } else { f64::NAN };
+                    Convert::Factors(self.bands.iter().map(factor).collect())
+                }
+                Some(Divisor::Cube(view)) => {
+                    white = Some(Box::new(view.reader()));
+                    Convert::None
+                }
+                None => unreachable!("reflectance has a divisor"),
+            },
             Quantity::Integrated => {
                 Convert::Factors((0..self.channels.len()).map(|k| self.channels.integral(k)).collect())
             }
@@ -157,7 +239,7 @@ impl<'a> View<'a> {
                 (0..self.channels.len()).map(|k| BandTemperature::of(&self.channels, k)).collect(),
             ),
         };
-        Reader { view: self, convert, chunks: BTreeMap::new() }
+        Reader { view: self, convert, chunks: BTreeMap::new(), white }
     }
 }
 
@@ -175,6 +257,8 @@ pub struct Reader<'a> {
     view: &'a View<'a>,
     convert: Convert,
     chunks: BTreeMap<u32, Option<Chunk>>,
+    /// What values are divided by.
+    white: Option<Box<Reader<'a>>>,
 }
 
 /// Pixels whose values of one band are copied together.
@@ -230,7 +314,26 @@ impl Reader<'_> {
                     }
                 }
             }
-        })
+        })?;
+        self.divide_by_white(rect, bands, strides, out)
+    }
+
+    /// NaN where the white is black, or not rendered yet.
+    fn divide_by_white(&mut self, rect: Rect, bands: Range<usize>, strides: Strides, out: &mut [f32]) -> Result<()> {
+        let Some(white) = &mut self.white else { return Ok(()) };
+        let mut of_white = vec![0.0f32; out.len()];
+        let count = bands.len();
+        white.read(rect, bands, strides, &mut of_white)?;
+        for y in 0..rect.height() as usize {
+            for x in 0..rect.width() as usize {
+                for b in 0..count {
+                    let at = y * strides.row + x * strides.pixel + b * strides.band;
+                    let white = f64::from(of_white[at]);
+                    out[at] = if white > 0.0 { (f64::from(out[at]) / white) as f32 } else { f32::NAN };
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Calls `each` with column, row and all channels of the cube of every pixel in `rect` that is rendered, tile by tile.

@@ -101,6 +101,7 @@ pub fn write(view: &View, path: &Path, interleave: Interleave, progress: &mut Pr
             Quantity::Radiance | Quantity::Xyz(_) => "W m^-2 sr^-1 nm^-1",
             Quantity::Integrated => "W m^-2 sr^-1",
             Quantity::Temperature => "K",
+            Quantity::Reflectance => "reflectance",
         },
         ignore: MISSING,
         origin: view.origin(),

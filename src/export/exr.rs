@@ -46,8 +46,8 @@ pub fn write(
     split: Option<usize>,
     progress: &mut Progress,
 ) -> Result<Vec<PathBuf>> {
-    if matches!(view.quantity(), Quantity::Temperature | Quantity::Xyz(_)) {
-        let what = "spectral OpenEXR holds spectra only; export temperatures and colours to another format";
+    if !matches!(view.quantity(), Quantity::Radiance | Quantity::Integrated) {
+        let what = "spectral OpenEXR holds spectra of light only; export temperatures, reflectances and colours to another format";
         return Err(Error::Usage(format!("{}: {what}", path.display())));
     }
     let channels = view.channels();

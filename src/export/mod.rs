@@ -103,6 +103,7 @@ fn units(view: &View) -> &'static str {
         Quantity::Radiance | Quantity::Xyz(_) => "W m-2 sr-1 nm-1",
         Quantity::Integrated => "W m-2 sr-1",
         Quantity::Temperature => "K",
+        Quantity::Reflectance => "1",
     }
 }
 
@@ -115,6 +116,12 @@ fn long_name(view: &View) -> &'static str {
         Quantity::Radiance => "mean spectral radiance over the channel",
         Quantity::Integrated => "radiance of the channel",
         Quantity::Temperature => "brightness temperature in the channel",
+        Quantity::Reflectance if view.is_by_white_cube() => {
+            "hemispherical-directional reflectance factor: radiance over that of a rendered white reference"
+        }
+        Quantity::Reflectance => {
+            "hemispherical-directional reflectance factor: pi times radiance over the irradiance given"
+        }
     }
 }
 

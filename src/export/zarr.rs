@@ -200,6 +200,7 @@ fn variable(view: &View) -> &'static str {
         _ if view.is_of_errors() => "standard_error",
         Quantity::Radiance | Quantity::Integrated => "radiance",
         Quantity::Temperature => "brightness_temperature",
+        Quantity::Reflectance => "reflectance",
         Quantity::Xyz(_) => "xyz",
     }
 }

@@ -84,8 +84,8 @@ fn placed_sun(fields: &Fields) -> Option<Sun> {
         );
         return None;
     }
-    let axes = [("north", DVec3::NEG_Z), ("up", DVec3::Y)]
-        .map(|(key, default)| fields.get(key).map_or(Some(default), |item| item.direction()));
+    let axis = |key: &str| fields.get(key).map(|item| item.direction());
+    let (north, up) = (axis("north"), axis("up").unwrap_or(Some(DVec3::Y)));
     let (azimuth, elevation, distance) = match ways {
         [_, Some(_), _] => {
             let azimuth = fields.require("azimuth", "azimuth = 135, in degrees from north over east");
@@ -110,7 +110,9 @@ fn placed_sun(fields: &Fields) -> Option<Sun> {
             }
         }
         _ => {
-            let given = direction(fields);
+            let help = "azimuth = 135 and elevation = 40; or date, latitude and longitude; or direction = [0, -1, 0], in which its light \
+                        travels";
+            let given = fields.require("direction", help).and_then(|item| item.direction());
             if let Some(item) = first_of(&["north", "up"]) {
                 item.error_help("says nothing beside `direction`", "remove it, or give `azimuth` and `elevation`");
                 return None;
@@ -118,13 +120,16 @@ fn placed_sun(fields: &Fields) -> Option<Sun> {
             return given.map(|direction| Sun { direction, distance: None });
         }
     };
-    let [north, up] = axes;
-    let Some(direction) = sun::travels(azimuth, elevation, north?, up?) else {
+    let up = up?;
+    // Where up is z, maps have their north at the top: +y.
+    let north = match north {
+        Some(north) => north?,
+        None if up.z.abs() > 0.999_999 => DVec3::Y,
+        None => DVec3::NEG_Z,
+    };
+    let Some(direction) = sun::travels(azimuth, elevation, north, up) else {
         let item = first_of(&["north", "up"])?;
-        item.error_help(
-            "`north` and `up` must not be parallel",
-            "where up is +z, write up = [0, 0, 1] and north = [0, 1, 0]",
-        );
+        item.error_help("`north` and `up` must not be parallel", "write e.g. up = [0, 0, 1] and north = [0, 1, 0]");
         return None;
     };
     if elevation < 0.0 {

@@ -32,7 +32,7 @@ use glam::{DAffine3, DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 pub use file::{load, parse};
-pub use spectrum::Quantity;
+pub use spectrum::{Quantity, irradiance};
 
 use crate::spectral::{Channels, Curve};
 

@@ -4,15 +4,16 @@ mod quantity;
 mod written;
 
 use std::collections::HashMap;
+use std::path::Path;
 
 pub use self::quantity::Quantity;
 pub use self::written::report_in_file;
 use self::written::{Data, Source, TableFile, column_kelvin, source, table_data};
 use super::context::Context;
 use super::decode::{Item, did_you_mean, list};
-use super::tree::Value;
+use super::tree::{Value, parse_document};
 use super::{Spectrum, SpectrumId};
-use crate::error::Problem;
+use crate::error::{Error, Problem};
 use crate::format::noise;
 use crate::format::refractive;
 use crate::format::text::{self, SpectrumTable};
@@ -30,6 +31,35 @@ fn standard(name: &str) -> Option<Curve> {
     let column = STANDARDS.iter().position(|known| *known == name)?;
     let (nm, value) = columns::<3>(SOLAR).map(|row| (row[0], row[1 + column])).unzip();
     Some(Curve::Linear { nm, value, outside: Outside::Zero })
+}
+
+/// An irradiance that is not part of a scene, written as the `irradiance` of its sun is: a number, `am0` or `am1.5`, a table such as
+/// `{ file = "sun.csv", column = "direct" }`; or a file alone. With what is to be said about it over `channels`. `option` names it in
+/// messages.
+///
+/// # Errors
+/// As a scene file that has it.
+pub fn irradiance(option: &str, written: &str, channels: &Channels) -> crate::Result<(Curve, Vec<String>)> {
+    let is_toml = written.trim_start().starts_with(['{', '"', '\'']) || written.trim().parse::<f64>().is_ok();
+    let value = match written.trim() {
+        value if is_toml => value.to_owned(),
+        name if STANDARDS.contains(&name) => format!("\"{name}\""),
+        file => format!("{{ file = \"{}\" }}", file.escape_default()),
+    };
+    let text = format!("irradiance = {value}\n");
+    let cx = Context::new(Path::new(option), &text, &[]);
+    let root = parse_document(&text).map_err(|_| Error::Usage(format!("{option} {written}: is not valid TOML")))?;
+    let curve = {
+        let entry = &root[0];
+        let item = Item { cx: &cx, node: &entry.node, path: entry.key.clone(), at: &entry.node.origin };
+        let mut spectra = Spectra::new(&cx, None, Some(channels.clone()));
+        let found = spectra.resolve(&item, Quantity::Irradiance).map(|handle| spectra.take(handle));
+        found.map(|id| spectra.finish().swap_remove(id).curve)
+    };
+    match (curve, cx.finish()) {
+        (Some(curve), (problems, warnings)) if problems.is_empty() => Ok((curve, warnings)),
+        (_, (problems, _)) => Err(Error::Input(problems)),
+    }
 }
 
 /// A table that is checked, and what it is called.

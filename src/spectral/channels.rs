@@ -188,6 +188,29 @@ impl Channels {
         Channels { bounds, names, false_colour, responses }
     }
 
+    /// The mean of `curve` over channel `k`, weighted by its response where it has one.
+    pub fn mean_of(&self, k: usize, curve: &Curve) -> f64 {
+        let [from, to] = self.bounds[k];
+        let Some(response) = self.responses.get(k) else { return curve.mean(from, to) };
+        // Both are linear between nodes of either; a smooth curve nearly so.
+        let smooth = || (0..=1000).map(|i| from + (to - from) * f64::from(i) / 1000.0).collect();
+        let nodes = |curve: &Curve| -> Vec<f64> {
+            curve.linear_pieces(from, to).map_or_else(smooth, |nodes| nodes.iter().map(|node| node.0).collect())
+        };
+        let mut nm = [nodes(curve), nodes(response.curve())].concat();
+        nm.sort_by(f64::total_cmp);
+        nm.dedup();
+        let ends = |curve: &Curve, a: f64, b: f64| match curve.linear_pieces(a, b) {
+            Some(nodes) => [nodes[0].1, nodes[nodes.len() - 1].1],
+            None => [curve.eval(a), curve.eval(b)],
+        };
+        let piece = |w: &[f64]| {
+            let ([p, q], [r, s]) = (ends(curve, w[0], w[1]), ends(response.curve(), w[0], w[1]));
+            (w[1] - w[0]) / 6.0 * (2.0 * p * r + p * s + q * r + 2.0 * q * s)
+        };
+        nm.windows(2).map(piece).sum::<f64>() / response.integral()
+    }
+
     /// Those of `bands`, in that order.
     pub fn select(&self, bands: &[usize]) -> Self {
         let responses = bands.iter().filter_map(|&k| self.responses.get(k).cloned()).collect();

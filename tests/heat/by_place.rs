@@ -198,7 +198,7 @@ fn isothermal_cavities_of_the_reference() {
 /// Without energy compensation a brushed metal keeps what its facets have lost.
 #[test]
 fn cavity_of_single_scattering_by_brushed_metal() {
-    let mut scene = cavity(|b, s| b.conductor(s, 5.0, 12.0, [0.9, 0.4]).at_kelvin(300.0));
+    let mut scene = cavity(|b, s| b.conductor(s, 5.0, 12.0, [0.5, 0.1]).at_kelvin(300.0));
     let spectile::scene::Bsdf::Conductor { energy_compensation, .. } = &mut scene.materials[1].bsdf else { panic!() };
     *energy_compensation = false;
     let bound = Bound { resolution: 0.01, allowance: 10.0 * ORIGIN_OFFSET + 1e-4 };

@@ -6,6 +6,7 @@ mod json;
 mod memory;
 mod out_of_core;
 mod outcome;
+mod reflectance;
 mod responses;
 mod resume;
 mod running;

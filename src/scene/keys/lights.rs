@@ -111,14 +111,14 @@ pub static SUN: Section = Section {
             .unit("degrees")
             .range("[-180, 180]")
             .unless(OTHERWISE_PLACED),
-        Key::default(
+        Key::optional(
             "north",
             Direction,
-            "[0, 0, -1]",
+            "`[0, 0, -1]`, or `[0, 1, 0]` where `up` is +z or -z",
             "Where north is in the scene; what is not level of it is left out.",
         )
         .range("not parallel to `up`"),
-        Key::default("up", Direction, "[0, 1, 0]", "Where the zenith is. Where it is +z, `north` must be said too."),
+        Key::default("up", Direction, "[0, 1, 0]", "Where the zenith is."),
         Key::optional(
             "angular_radius",
             Number,
