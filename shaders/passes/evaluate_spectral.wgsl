@@ -25,13 +25,15 @@ fn evaluate_spectral(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workg
     var bad = BadSamples(0u, 0u, 0u);
 #repeat VECTORS v
     let quad_$v = min(first_quad + $vu, QUADS - 1u);
+#end
 #if WAVELENGTHS
+#repeat VECTORS v
     var sum_$v = vec4<f32>(0.0);
 #end
     for (var turn = 0u; turn < WAVELENGTHS; turn += 1u) {
     let s = spectral_sample(head.x + turn * WAVELENGTH_STEP);
-#repeat VECTORS v
 #endif
+#repeat VECTORS v
     var throughput_$v = first_throughput(quad_$v, s);
     var radiance_$v = vec4<f32>(0.0);
 #end

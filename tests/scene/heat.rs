@@ -59,8 +59,8 @@ fn wrong_emissivities() {
     let cases: &[(&str, &str, &[&str])] = &[
         ("emissivity = 1.2 #!", "emissivity", &["an emissivity must lie in [0, 1]", "1.2"]),
         ("emissivity = 0.5\nreflectance = 0.5 #!", "reflectance", &["complement of `emissivity`"]),
-        ("emissivity = { rgb = [1, 0, 0] } #!", "emissivity", &["a colour"]),
-        ("emissivity = { blackbody = 300 } #!", "emissivity", &["a black body"]),
+        ("emissivity = { rgb = [1, 0, 0] } #!", "emissivity.rgb", &["a colour"]),
+        ("emissivity = { blackbody = 300 } #!", "emissivity.blackbody", &["a black body"]),
         ("emissivity = { samples = [[400, 1], [700, 1]], outside = \"zero\" } #!", "emissivity", &["outside = \"hold\""]),
     ];
     for (text, key, words) in cases {

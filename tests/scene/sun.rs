@@ -82,8 +82,8 @@ fn dates_without_quotes_and_own_irradiances() {
         + "\n[spectra.am0]\nconstant = 2\n";
     assert_eq!(*sun(&good(&own, &[], &[])).2, Curve::Constant(2.0));
     let noon = good(&with("azimuth = 180, elevation = 50, irradiance = \"am1.5\""), &[], &[]);
-    // 1.3376 W m⁻² nm⁻¹ direct and circumsolar at 550 nm.
-    assert!((sun(&noon).2.eval(550.0) / 1.3376 - 1.0).abs() < 1e-3, "{}", sun(&noon).2.eval(550.0));
+    // ASTM G173-03, direct and circumsolar.
+    assert!((sun(&noon).2.eval(550.0) / 1.3648 - 1.0).abs() < 1e-9, "{}", sun(&noon).2.eval(550.0));
 }
 
 #[test]
