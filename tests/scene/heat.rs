@@ -61,7 +61,7 @@ fn wrong_emissivities() {
         ("emissivity = 0.5\nreflectance = 0.5 #!", "reflectance", &["complement of `emissivity`"]),
         ("emissivity = { rgb = [1, 0, 0] } #!", "emissivity.rgb", &["a colour"]),
         ("emissivity = { blackbody = 300 } #!", "emissivity.blackbody", &["a black body"]),
-        ("emissivity = { samples = [[400, 1], [700, 1]], outside = \"zero\" } #!", "emissivity", &["outside = \"hold\""]),
+        ("emissivity = { samples = [[400, 1], [700, 1]], outside = \"zero\" } #!", "emissivity.samples", &["outside = \"hold\""]),
     ];
     for (text, key, words) in cases {
         check_wrong(
