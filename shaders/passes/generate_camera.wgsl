@@ -79,7 +79,14 @@ fn generate_camera(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 #endif
 #endif
 
+#if WAVELENGTH_BITS
+    // Where all of the path's wavelengths stand in their parts of the channel, and by the last bits, which are in no order, in which
+    // part its own is: so those of all samples together are as evenly spread as so many samples' would be.
+    let drawn = random_pair_bits(key, DIMENSION_WAVELENGTH, index, wave.epoch_mask).x;
+    let mu = (drawn >> WAVELENGTH_BITS) | (drawn << (32u - WAVELENGTH_BITS));
+#else
     let mu = random_pair_bits(key, DIMENSION_WAVELENGTH, index, wave.epoch_mask).x;
+#endif
     heads[path] = vec2<u32>(mu, 0u);
 #if GENERAL
     states[STATE_WORDS * path] = bitcast<vec4<u32>>(vec4<f32>(origin, -1.0));

@@ -24,12 +24,13 @@ use crate::render::pool::MERGE_THREADS;
 use crate::render::wave::{Budget, WavePlan};
 use crate::render::worker::Worker;
 use crate::scene::Scene;
+use crate::spectral::table::Bounds;
 use crate::{Error, Result};
 
 /// Say what rendering a scene would take, without rendering it
 ///
-/// Reads and checks SCENE and prints the features it uses and what is left out for it, tiles and waves, the memory on
-/// every device, the size of the cube on disk, and the time to expect.
+/// Reads and checks SCENE and prints the time to expect, the memory on every device, the size of the cube on disk, the
+/// evaluator chosen, the features it uses and what is left out for it.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = "\
 Examples:
@@ -54,6 +55,10 @@ pub struct Args {
     /// Samples per pixel to predict the time for, rounded up as by `render`
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
     pub spp: u32,
+
+    /// Say also what each thing that is left out would cost, and how exact the tables of each spectrum are
+    #[arg(long)]
+    pub verbose: bool,
 
     /// Print the table of all parts of the renderer too: what each adds to kernels, buffers, records and paths
     #[arg(long)]
@@ -252,6 +257,7 @@ impl Plan<'_> {
         kernels.all().filter_map(|source| storage_buffers(source).ok()).max().unwrap_or(0)
     }
 
+    /// First what users ask: how long, how much memory and disk, what was chosen. Then what the scene needs, and what not.
     fn describe(&self) -> String {
         let (p, header) = (self.prepared, &self.header);
         let [width, height] = header.size;
@@ -262,6 +268,10 @@ impl Plan<'_> {
             header.tile[0],
             header.tile[1]
         );
+        text += &self.describe_time();
+        text += &self.describe_memory();
+        text += &format!("disk      {}\n", format_bytes(header.store_bytes()));
+        text += &format!("evaluator {}\n", p.evaluator.name());
         text += &format!(
             "geometry  {} primitives, {} BVH nodes in {} levels, {} emitters\n",
             p.accel.primitives.len(),
@@ -269,21 +279,42 @@ impl Plan<'_> {
             p.accel.depth,
             p.emitters.len()
         );
-        text += &format!("evaluator {}\n", p.evaluator.name());
-        text += &format!("kernels   bind {} storage buffers at most\n", self.storage_buffers());
         let lines = facts::parts(&self.on_device());
-        for (title, used) in [("used", true), ("left out", false)] {
-            for (i, line) in lines.iter().filter(|l| l.used == used).enumerate() {
-                text += &format!("{:9} {} ({})\n", if i == 0 { title } else { "" }, line.name, line.effect);
-            }
+        let in_full = |title: &str, used: bool| -> String {
+            let lines = lines.iter().filter(|l| l.used == used).enumerate();
+            lines.map(|(i, l)| format!("{:9} {} ({})\n", if i == 0 { title } else { "" }, l.name, l.effect)).collect()
+        };
+        text += &in_full("used", true);
+        if self.args.verbose {
+            text += &in_full("left out", false);
+        } else {
+            let names: Vec<&str> = lines.iter().filter(|l| !l.used).map(|l| l.name).collect();
+            text += &wrapped("left out", &format!("{} (--verbose says what each would cost)", names.join(", ")));
         }
-        for (i, (name, b)) in p.spectrum_names.iter().zip(&p.tables.bounds).skip(1).enumerate() {
-            let title = if i == 0 { "spectra" } else { "" };
-            text += &format!(
-                "{title:9} {name}: within {:.1e} of the channel's peak, means within {:.1e}\n",
-                b.pointwise, b.mean
-            );
+        text += &self.describe_spectra();
+        if self.args.verbose {
+            text += &format!("kernels   bind {} storage buffers at most\n", self.storage_buffers());
         }
+        if self.args.parts {
+            text += "parts     used; what each adds to kernels, stages of generate, buffers, records of a path, words of its state\n";
+            facts::table(&self.on_device()).iter().for_each(|row| text += &row.line());
+        }
+        text
+    }
+
+    fn describe_time(&self) -> String {
+        let (Some(paths_per_s), Some(seconds)) = (self.paths_per_s(), self.predicted_s()) else {
+            return "time      unknown without a device\n".to_owned();
+        };
+        let devices = match self.measured.as_slice() {
+            [only] => only.device.clone(),
+            several => format!("{} devices", several.len()),
+        };
+        let about = short(Duration::from_secs_f64(seconds));
+        format!("time      {about} for {} samples per pixel on {devices} ({paths_per_s:.0} paths/s)\n", self.samples)
+    }
+
+    fn describe_memory(&self) -> String {
         let budget =
             self.args.memory.map_or_else(|| "without a budget".to_owned(), |b| format!("of {}", format_bytes(b)));
         let device = |name: &str, w: &WavePlan| {
@@ -299,38 +330,49 @@ impl Plan<'_> {
                 format_bytes(w.staging_bytes())
             )
         };
-        for m in &self.measured {
-            text += &device(&m.device, &m.waves);
-        }
+        let mut text: String = self.measured.iter().map(|m| device(&m.device, &m.waves)).collect();
         if self.measured.is_empty() {
             text += &device("a common GPU", &self.waves);
         }
-        let host = plan::host_memory(p, header);
-        text += &format!(
+        let host = plan::host_memory(self.prepared, &self.header);
+        text + &format!(
             "host      {} for the scene, {} a thread that merges (a GPU has up to {}); units are merged from the devices' transfers\n",
             format_bytes(host.scene),
             format_bytes(host.merge),
             MERGE_THREADS
-        );
-        text += &format!("disk      {}\n", format_bytes(header.store_bytes()));
-        match (self.paths_per_s(), self.predicted_s()) {
-            (Some(paths_per_s), Some(seconds)) => {
-                text += &format!(
-                    "time      {} for {} samples per pixel on {} ({paths_per_s:.0} paths/s)\n",
-                    short(Duration::from_secs_f64(seconds)),
-                    self.samples,
-                    match self.measured.as_slice() {
-                        [only] => only.device.clone(),
-                        several => format!("{} devices", several.len()),
-                    },
-                );
-            }
-            _ => text += "time      unknown without a device\n",
-        }
-        if self.args.parts {
-            text += "parts     used; what each adds to kernels, stages of generate, buffers, records of a path, words of its state\n";
-            facts::table(&self.on_device()).iter().for_each(|row| text += &row.line());
-        }
-        text
+        )
     }
+
+    /// How far tables are off: the largest of all, or each.
+    fn describe_spectra(&self) -> String {
+        let tables = || self.prepared.spectrum_names.iter().zip(&self.prepared.tables.bounds).skip(1);
+        let line = |title: &str, name: &str, pointwise: f64, mean: f64| {
+            format!("{title:9} {name}: within {pointwise:.1e} of the channel's peak, means within {mean:.1e}\n")
+        };
+        if self.args.verbose {
+            let each = tables().enumerate();
+            let title = |i: usize| if i == 0 { "spectra" } else { "" };
+            return each.map(|(i, (name, b))| line(title(i), name, b.pointwise, b.mean)).collect();
+        }
+        let largest = |value: fn(&Bounds) -> f64| tables().map(|(_, bounds)| value(bounds)).fold(0.0, f64::max);
+        let name = format!("{} in tables (--verbose lists them)", tables().count());
+        line("spectra", &name, largest(|b| b.pointwise), largest(|b| b.mean))
+    }
+}
+
+/// Words under a title, in lines of a width that terminals have.
+fn wrapped(title: &str, words: &str) -> String {
+    const WIDTH: usize = 110;
+    let mut lines = vec![String::new()];
+    for word in words.split(' ') {
+        let line = lines.last_mut().expect("one line at least");
+        if !line.is_empty() && line.chars().count() + 1 + word.chars().count() > WIDTH {
+            lines.push(word.to_owned());
+        } else {
+            *line += if line.is_empty() { "" } else { " " };
+            *line += word;
+        }
+    }
+    let title = |i: usize| if i == 0 { title } else { "" };
+    lines.iter().enumerate().map(|(i, line)| format!("{:9} {line}\n", title(i))).collect()
 }

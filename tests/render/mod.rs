@@ -198,6 +198,13 @@ fn plan_says_what_a_render_takes() {
     {
         assert!(text.contains(expected), "{expected}: {text}");
     }
+    // What users ask comes first, details where they are asked for.
+    let places = ["\ntime", "\ndevice", "\nhost", "\ndisk", "\nevaluator", "\nused", "\nleft out", "\nspectra"]
+        .map(|title| text.find(title).unwrap_or_else(|| panic!("{title}: {text}")));
+    assert!(places.is_sorted() && text.lines().all(|line| line.chars().count() < 220), "{text}");
+    let verbose = place.success(&["plan", "scene.toml", "--verbose"]).0;
+    let details = ["thin lens (a pair of random numbers a path)", "lamp: within", "storage buffers at most"];
+    assert!(details.iter().all(|detail| verbose.contains(detail) && !text.contains(detail)), "{verbose}");
     let done =
         place.events(&["plan", "scene.toml", "--size", "64x32", "--tile", "16", "--spp", "8"]).pop().expect("done");
     assert_eq!((&done["tiles"], &done["samples"]), (&Value::from(8), &Value::from(8)));

@@ -48,21 +48,21 @@ fn factors(place: &Place, more: &[&str]) -> Vec<Vec<f64>> {
 #[test]
 fn a_painted_ground_has_the_reflectance_of_its_paint() {
     let place = Place::of(GROUND);
-    place.render("paint.zarr", &["--spp", "16"]);
-    place.render("white.zarr", &[&["--spp", "16"][..], &WHITE].concat());
+    place.render("paint.zarr", &["--spp", "64"]);
+    place.render("white.zarr", &[&["--spp", "64"][..], &WHITE].concat());
     for white in ["white.zarr", "am1.5", "{ file = \"sun.csv\", column = \"direct\", scale = 0.5 }"] {
         if white.starts_with('{') {
             // Twice the sun, in another unit, as a file of one's own.
             let text = "wavelength_nm,other,direct (W m-2 um-1)\n300,1,2000\n900,1,2000\n";
             fs::write(place.path().join("sun.csv"), text).expect("written");
-            place.render("paint.zarr", &["--spp", "16", "--overwrite", "--set", "lights.0.directional.irradiance=1"]);
+            place.render("paint.zarr", &["--spp", "64", "--overwrite", "--set", "lights.0.directional.irradiance=1"]);
         }
         let pixels = factors(&place, &["--reflectance", white]);
         assert_eq!(pixels.len(), 45);
         for factor in &pixels {
             assert_eq!(factor.len(), 4, "{factor:?}");
             for (got, want) in factor.iter().zip(PAINT) {
-                // By irradiance, what wavelengths of 16 samples miss of the sun's lines in a channel of 100 nm.
+                // By irradiance, what wavelengths of 64 samples miss of the sun's lines in a channel of 100 nm.
                 let bound = if white == "am1.5" { 0.03 } else { 1e-4 };
                 assert!((got / want - 1.0).abs() < bound, "{white}: {factor:?}");
             }
@@ -70,7 +70,7 @@ fn a_painted_ground_has_the_reflectance_of_its_paint() {
     }
     // Of some bands and pixels, in other formats.
     let part = ["--reflectance", "white.zarr", "--bands", "3,1", "--crop", "2,1,5,3"];
-    place.render("paint.zarr", &["--spp", "16", "--overwrite"]);
+    place.render("paint.zarr", &["--spp", "64", "--overwrite"]);
     let pixels = factors(&place, &part);
     assert!(
         pixels.len() == 6 && pixels.iter().all(|p| (p[0] - 0.7).abs() < 1e-4 && (p[1] - 0.3).abs() < 1e-4),

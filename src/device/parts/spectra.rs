@@ -19,11 +19,14 @@ pub const SEVERAL: Part = Part {
     effect: |scene| format!("every path is evaluated at {}", scene.wavelengths_per_channel),
     is_planned: true,
     defines: |scene, work, defines| {
-        if work == Work::Evaluate {
-            let count = scene.wavelengths_per_channel;
-            defines.constant("WAVELENGTHS", count);
-            // As far apart as the whole of μ, 2^32, allows.
-            defines.constant("WAVELENGTH_STEP", (u32::MAX / count) + 1);
+        let count = scene.wavelengths_per_channel;
+        match work {
+            Work::Generate => _ = defines.constant("WAVELENGTH_BITS", count.ilog2()),
+            Work::Evaluate => {
+                defines.constant("WAVELENGTHS", count);
+                // As far apart as the whole of μ, 2^32, allows.
+                defines.constant("WAVELENGTH_STEP", (u32::MAX / count) + 1);
+            }
         }
     },
     ..Part::NOTHING

@@ -37,7 +37,7 @@ sun = { direction = [0.5, 0, -0.866], angular_radius = 0.2665, irradiance = { fi
 "#;
 const A_HIGH_SUN: &str = r#"
 [[lights]]
-sun = { azimuth = 135, elevation = 40, north = [0, 1, 0], up = [0, 0, 1], irradiance = "am1.5" }
+sun = { azimuth = 135, elevation = 40, north = [1, 0, 0], up = [0, 0, 1], irradiance = "am1.5" }
 "#;
 const A_SUN_OF_A_DAY: &str = r#"
 [[lights]]
