@@ -321,7 +321,7 @@ fn what_cannot_be_exported_is_refused() {
     for (arguments, words) in [
         (vec!["-o", "a.img", "--bands", "4"], "the bands of this cube are 0..4"),
         (vec!["-o", "a.img", "--bands", "1,0..3"], "the band 1 twice"),
-        (vec!["-o", "a.img", "--bands", "9um"], "no band holds 9000 nm"),
+        (vec!["-o", "a.img", "--bands", "9um"], "9000 nm lies outside of all bands"),
         (vec!["-o", "a.img", "--crop", "0,0,71,37"], "70 x 37 pixels"),
         (vec!["-o", "a.img", "--crop", "5,0,5,37"], "X0 < X1"),
         (vec!["-o", "a.bsq", "--interleave", "bip"], "contradicts"),
