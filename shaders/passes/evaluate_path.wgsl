@@ -28,27 +28,13 @@ fn evaluate_path(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
         let out_$v = slot * CHANNELS + 4u * quad_$v;
         let channels_$v = select(0u, min(4u, CHANNELS - 4u * quad_$v), b * VECTORS + $vu < QUADS);
 #end
-#if WAVELENGTHS
-#repeat VECTORS v
-        var sum_$v = vec4<f32>(0.0);
-#end
-        for (var turn = 0u; turn < WAVELENGTHS; turn += 1u) {
-        let s = spectral_sample(head.x + turn * WAVELENGTH_STEP);
-#endif
+#include common/each_wavelength.wgsl
 #repeat VECTORS v
         var throughput_$v = first_throughput(quad_$v, s);
         var radiance_$v = vec4<f32>(0.0);
 #end
 #include common/records.wgsl
-#if WAVELENGTHS
-#repeat VECTORS v
-        sum_$v += radiance_$v;
-#end
-        }
-#repeat VECTORS v
-        let radiance_$v = sum_$v / f32(WAVELENGTHS);
-#end
-#endif
+#include common/mean_over_wavelengths.wgsl
 
 #repeat VECTORS v
         if (channels_$v > 0u) {

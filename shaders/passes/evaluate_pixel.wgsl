@@ -57,13 +57,7 @@ fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
         // Records in the low half; in the high one the wave, once the path has ended.
         let used = head.y & 0xffffu;
         foreign |= head.y ^ mark;
-#if WAVELENGTHS
-#repeat VECTORS v
-        var sum_$v = vec4<f32>(0.0);
-#end
-        for (var turn = 0u; turn < WAVELENGTHS; turn += 1u) {
-        let s = spectral_sample(head.x + turn * WAVELENGTH_STEP);
-#endif
+#include common/each_wavelength.wgsl
 #if REGISTERS
 #repeat VECTORS v
 #repeat HELD i
@@ -91,15 +85,7 @@ fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
 #end
         let first_record = path * frame.max_records;
 #include common/records.wgsl
-#if WAVELENGTHS
-#repeat VECTORS v
-        sum_$v += radiance_$v;
-#end
-        }
-#repeat VECTORS v
-        let radiance_$v = sum_$v / f32(WAVELENGTHS);
-#end
-#endif
+#include common/mean_over_wavelengths.wgsl
 
         let index = wave.sample_begin + i + 1u;
 #repeat VECTORS v

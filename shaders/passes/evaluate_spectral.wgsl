@@ -26,27 +26,13 @@ fn evaluate_spectral(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workg
 #repeat VECTORS v
     let quad_$v = min(first_quad + $vu, QUADS - 1u);
 #end
-#if WAVELENGTHS
-#repeat VECTORS v
-    var sum_$v = vec4<f32>(0.0);
-#end
-    for (var turn = 0u; turn < WAVELENGTHS; turn += 1u) {
-    let s = spectral_sample(head.x + turn * WAVELENGTH_STEP);
-#endif
+#include common/each_wavelength.wgsl
 #repeat VECTORS v
     var throughput_$v = first_throughput(quad_$v, s);
     var radiance_$v = vec4<f32>(0.0);
 #end
 #include common/records.wgsl
-#if WAVELENGTHS
-#repeat VECTORS v
-    sum_$v += radiance_$v;
-#end
-    }
-#repeat VECTORS v
-    let radiance_$v = sum_$v / f32(WAVELENGTHS);
-#end
-#endif
+#include common/mean_over_wavelengths.wgsl
 
 #repeat VECTORS v
     if (first_quad + $vu < QUADS) {

@@ -43,7 +43,11 @@ macro_rules! module {
 pub(crate) use module;
 
 /// Files that kernels include.
-const INCLUDED: [Module; 1] = [module!("common/records.wgsl")];
+const INCLUDED: [Module; 3] = [
+    module!("common/each_wavelength.wgsl"),
+    module!("common/mean_over_wavelengths.wgsl"),
+    module!("common/records.wgsl"),
+];
 
 /// Names with values: switches for `#if`, counts for `#repeat`, texts for `$NAME`.
 #[derive(Debug, Clone, Default, PartialEq)]
