@@ -4,6 +4,11 @@
 // [pixel slot of the wave's units][channel].
 @group(1) @binding(9) var<storage, read_write> means: array<f32>;
 
+#if THINNED
+// What roulette on evaluation left (passes/thin_paths.wgsl).
+@group(1) @binding(15) var<storage, read> chances: array<vec2<u32>>;
+#endif
+
 fn load_mean(at: u32, channels: u32) -> vec4<f32> {
     var m = vec4<f32>(0.0);
     if (channels > 0u) { m.x = means[at]; }

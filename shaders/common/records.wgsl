@@ -13,8 +13,24 @@
 #endif
 #end
 #endif
+#if THINNED
+    // What is seen before scattering apart from the rest, which roulette has a say in.
+#repeat VECTORS v
+    var seen_$v = vec4<f32>(0.0);
+#end
+    var counts = 1.0;
+#endif
     for (var r = first_record; r < first_record + used; r += 1u) {
         let record = records[r];
+#if THINNED
+        if (r == first_record + seen_records) {
+            counts = kept;
+#repeat VECTORS v
+            seen_$v = radiance_$v;
+            radiance_$v = vec4<f32>(0.0);
+#end
+        }
+#endif
 #if GENERAL
 #if RAW_RECORDS
         var raw = vec4<f32>(0.0);
@@ -169,3 +185,8 @@
 #end
 #endif
     }
+#if THINNED
+#repeat VECTORS v
+    radiance_$v = seen_$v + counts * radiance_$v;
+#end
+#endif

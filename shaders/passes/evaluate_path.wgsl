@@ -17,7 +17,7 @@ fn evaluate_path(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
 #else
     let s = spectral_sample(head.x);
 #endif
-    let used = head.y & 0xffffu;
+#include common/path_chance.wgsl
     let first_record = path * frame.max_records;
     let index = wave.sample_begin + step.sample + 1u;
     var bad = BadSamples(0u, 0u, 0u);
@@ -42,6 +42,10 @@ fn evaluate_path(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
         }
 #end
     }
+#if THINNED
+    prove(1u, (head.y | chance.x) ^ (wave.sequence << 16u), local_slot == 0u && id.z == 0u);
+#else
     prove(1u, head.y ^ (wave.sequence << 16u), local_slot == 0u && id.z == 0u);
+#endif
     report(bad, slot);
 }

@@ -26,22 +26,7 @@ fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
     }
 #end
 
-#if REGISTERS
-#if STRATA
-#else
-    // One stratum: every spectrum of these channels stays in registers.
-#repeat VECTORS v
-#repeat HELD i
-    let held_value_$i_$v = spectra[table_index(0u, $(1+i)u, quad_$v)];
-    let held_slope_$i_$v = spectra[table_index(0u, $(1+i)u, quad_$v) + 1u];
-#repeat KINKS j
-    let held_kink_$j_$i_$v = spectra[table_index(0u, $(1+i)u, quad_$v) + 2u + $ju];
-    let held_bend_$j_$i_$v = spectra[table_index(0u, $(1+i)u, quad_$v) + 2u + KINKS + $ju];
-#end
-#end
-#end
-#endif
-#endif
+#include common/hold_spectra.wgsl
 
     var bad = BadSamples(0u, 0u, 0u);
     // Bits in which the mark of a path's end differs from this wave's.
@@ -55,29 +40,20 @@ fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
         let s = spectral_sample(head.x);
 #endif
         // Records in the low half; in the high one the wave, once the path has ended.
-        let used = head.y & 0xffffu;
+#include common/path_chance.wgsl
         foreign |= head.y ^ mark;
-#include common/each_wavelength.wgsl
-#if REGISTERS
+#if THINNED
+        foreign |= chance.x ^ mark;
+        if (used == 0u) {
+            // Most paths that roulette drops: nothing is looked up for them.
 #repeat VECTORS v
-#repeat HELD i
-#if STRATA
-        let held_at_$i_$v = table_index(s.stratum, $(1+i)u, quad_$v);
-        let held_$i_$v = spectra[held_at_$i_$v] + s.place * spectra[held_at_$i_$v + 1u];
-#else
-#if KINKS
-        var held_$i_$v = held_value_$i_$v + s.place * held_slope_$i_$v;
-#repeat KINKS j
-        held_$i_$v += held_bend_$j_$i_$v * max(s.place - held_kink_$j_$i_$v, vec4<f32>(0.0));
+            mean_$v += (vec4<f32>(0.0) - mean_$v) / f32(wave.sample_begin + i + 1u);
 #end
-        held_$i_$v = max(held_$i_$v, vec4<f32>(0.0));
-#else
-        let held_$i_$v = held_value_$i_$v + s.place * held_slope_$i_$v;
+            continue;
+        }
 #endif
-#endif
-#end
-#end
-#endif
+#include common/each_wavelength.wgsl
+#include common/held_spectra.wgsl
 
 #repeat VECTORS v
         var throughput_$v = first_throughput(quad_$v, s);

@@ -19,7 +19,7 @@ fn evaluate_spectral(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workg
 #else
     let s = spectral_sample(head.x);
 #endif
-    let used = head.y & 0xffffu;
+#include common/path_chance.wgsl
     let first_record = path * frame.max_records;
     let index = wave.sample_begin + step.sample + 1u;
     var bad = BadSamples(0u, 0u, 0u);
@@ -41,7 +41,11 @@ fn evaluate_spectral(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workg
     }
 #end
     if (thread % LANES == 0u) {
+#if THINNED
+        prove(1u, (head.y | chance.x) ^ (wave.sequence << 16u), local_slot == 0u && group.z == 0u);
+#else
         prove(1u, head.y ^ (wave.sequence << 16u), local_slot == 0u && group.z == 0u);
+#endif
     }
     report(bad, slot);
 }

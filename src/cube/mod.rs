@@ -11,6 +11,7 @@
 //! Invariant: nothing outside this module maps memory.
 
 mod checksums;
+mod choices;
 mod compare;
 mod create;
 mod epochs;
@@ -35,6 +36,7 @@ mod verify;
 mod view;
 mod writer;
 
+pub use choices::Choices;
 pub use compare::{ChannelMetrics, Comparison, ZTest, compare};
 pub use create::{Existing, check_target, make};
 pub use epochs::{epoch_samples, epochs_in, samples_before, whole_epochs};

@@ -21,6 +21,16 @@ pub fn resolve(scene: &Scene, software: bool) -> Evaluator {
     }
 }
 
+/// What evaluating a path in all channels costs, over generating it.
+pub fn evaluation_cost(scene: &Prepared, software: bool) -> f64 {
+    let per_channel = match software {
+        false => 2.5e-3,
+        true if scene.features.registers => 2e-3,
+        true => 1.5e-2,
+    };
+    per_channel * scene.channels as f64 * f64::from(scene.wavelengths_per_channel)
+}
+
 /// Threads of one workgroup of what evaluates: `lanes` threads for each of `pixels` pixels, `vectors` quads of channels
 /// a thread.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -53,6 +53,9 @@ const PIXEL: &[Text] = &[FOLD, Of(module!("passes/evaluate_pixel.wgsl"))];
 const PATH: &[Text] = &[FOLD, Of(module!("passes/evaluate_path.wgsl"))];
 const SPECTRAL: &[Text] = &[FOLD, Of(module!("passes/evaluate_spectral.wgsl"))];
 
+/// Roulette on evaluation, before it.
+const THIN: &[Text] = &[RNG, Of(module!("passes/thin_paths.wgsl"))];
+
 /// The conventional path tracer: after every bounce, and when all paths of a wave have ended.
 const UPDATE: &[Text] = &[SPECTRAL_STATE, Of(module!("passes/update_path.wgsl"))];
 const FOLD_PATHS: &[Text] = &[TYPES, SAVED_PATHS, SPECTRAL_STATE, FOLD, Of(module!("passes/fold_paths.wgsl"))];
@@ -65,13 +68,15 @@ pub struct Kernels {
     pub bounce: Source,
     /// What happens to all channels after each bounce, in the conventional path tracer.
     pub update: Option<Source>,
+    /// Chooses the paths that are evaluated, where it is not all of them.
+    pub thin: Option<Source>,
     /// Leaves the means of a wave's pixels: it evaluates all saved paths, or folds what `update` made of them.
     pub evaluate: Source,
 }
 
 impl Kernels {
     pub fn all(&self) -> impl Iterator<Item = &Source> {
-        [&self.camera, &self.bounce].into_iter().chain(&self.update).chain([&self.evaluate])
+        [&self.camera, &self.bounce].into_iter().chain(&self.update).chain(&self.thin).chain([&self.evaluate])
     }
 }
 
@@ -85,12 +90,17 @@ impl OnDevice<'_> {
             true => [TRACING, STAGES].map(|texts| self.modules(texts)).concat(),
             false => [&self.modules(TRACING)[..], &[BOUNCE]].concat(),
         };
-        let evaluating =
-            |last: &[Text]| compose(&[EVALUATING, last].map(|texts| self.modules(texts)).concat(), &evaluate);
+        let mut try_paths = self.defines(Work::Evaluate);
+        try_paths.constant("VECTORS", 1);
+        let text = |last: &[Text], defines: &Defines| {
+            compose(&[EVALUATING, last].map(|texts| self.modules(texts)).concat(), defines)
+        };
+        let evaluating = |last: &[Text]| text(last, &evaluate);
         Kernels {
             camera: compose(&self.modules(CAMERA), &generate),
             bounce: compose(&bounce, &generate),
             update: (self.evaluator == Evaluator::Pt).then(|| evaluating(UPDATE)),
+            thin: self.thinning.is_some().then(|| text(THIN, &try_paths)),
             evaluate: match self.evaluator {
                 Evaluator::Auto | Evaluator::DpeptPixel => evaluating(PIXEL),
                 Evaluator::DpeptPath => evaluating(PATH),

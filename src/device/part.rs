@@ -78,6 +78,7 @@ pub const PARTS: &[&Part] = &[
     &media::PLANCK,
     &surfaces::DISPERSION,
     &surfaces::KNOTS_OF_ONE_CHANNEL,
+    &paths::ROULETTE_ON_EVALUATION,
     &geometry::WINDOWS,
     &spectra::BOUNCE_BY_BOUNCE,
     &spectra::LAYOUT,

@@ -13,6 +13,7 @@ use crate::device::parts::geometry;
 use crate::device::parts::heat::{self, Heat};
 use crate::device::parts::lights::{LightPicks, STEPS, light_picks};
 use crate::device::parts::media::Media;
+use crate::device::parts::paths::Thinning;
 use crate::device::parts::radiators::Radiators;
 use crate::device::parts::sky::SkyMap;
 use crate::device::parts::surfaces::{Needed, Surfaces};
@@ -91,6 +92,8 @@ pub struct Prepared {
     pub integration: Option<Integration>,
     /// At how many wavelengths of each channel a path is evaluated.
     pub wavelengths_per_channel: u32,
+    /// Which paths are evaluated, where it is not all of them: what a few samples of the scene decide.
+    pub thinning: Option<Thinning>,
     /// Where in the channels wavelengths are drawn.
     pub warp: Warp,
     /// The device id of the spectrum with which a path's throughput begins, where it is not 1: weights of responses and of
@@ -183,6 +186,7 @@ impl Prepared {
             wavelengths_per_channel: scene.integrator.wavelengths_per_channel,
             path_weight: ids.path_weight.map(|position| tables.ids[position]),
             integration,
+            thinning: None,
             warp,
             accel,
             tables,

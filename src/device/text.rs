@@ -43,9 +43,12 @@ macro_rules! module {
 pub(crate) use module;
 
 /// Files that kernels include.
-const INCLUDED: [Module; 3] = [
+const INCLUDED: [Module; 6] = [
     module!("common/each_wavelength.wgsl"),
+    module!("common/held_spectra.wgsl"),
+    module!("common/hold_spectra.wgsl"),
     module!("common/mean_over_wavelengths.wgsl"),
+    module!("common/path_chance.wgsl"),
     module!("common/records.wgsl"),
 ];
 

@@ -24,8 +24,13 @@ impl NamedBuffers {
         Ok(NamedBuffers { named })
     }
 
+    /// The buffer of the variable `name`.
+    pub fn buffer(&self, name: &str) -> Option<&wgpu::Buffer> {
+        self.named.iter().find(|(n, _)| n == name).map(|(_, b)| b)
+    }
+
     /// The binding for the variable `name`, if it is one of these.
     pub fn find(&self, name: &str) -> Option<wgpu::BufferBinding<'_>> {
-        self.named.iter().find(|(n, _)| n == name).map(|(_, b)| b.as_entire_buffer_binding())
+        self.buffer(name).map(|buffer| buffer.as_entire_buffer_binding())
     }
 }

@@ -123,7 +123,8 @@ mod tests {
 
     use super::*;
     use crate::scene::{
-        Camera, Environment, Evaluator, Film, Filter, Integrator, Projection, Sampler, Shape, Spectrum, Wavelengths,
+        Camera, Environment, Evaluation, Evaluator, Film, Filter, Integrator, Projection, Sampler, Shape, Spectrum,
+        Wavelengths,
     };
     use crate::spectral::{Channels, Curve, Outside};
 
@@ -148,6 +149,7 @@ mod tests {
                 sampler: Sampler::Independent,
                 wavelengths: Wavelengths::Uniform,
                 wavelengths_per_channel: 1,
+                evaluation: Evaluation::All,
                 evaluator: Evaluator::Auto,
                 epoch: 64,
             },

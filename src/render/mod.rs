@@ -4,6 +4,7 @@
 mod fault_tests;
 pub mod interrupt;
 pub mod job;
+pub mod pilot;
 pub mod plan;
 pub mod pool;
 pub mod queue;

@@ -8,17 +8,18 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 use signal_hook::consts::SIGINT;
 
-use crate::cube::{Run, RunFile, Writer, check_target, epoch_samples, epochs_in, reduction, samples_before};
+use crate::cube::{Choices, Run, RunFile, Writer, check_target, epoch_samples, epochs_in, reduction, samples_before};
 use crate::device::prepared::Prepared;
 use crate::gpu::adapter::Gpu;
 use crate::preview::{Control, DeviceStatus, Status};
 use crate::render::interrupt::Interrupt;
 use crate::render::job::{Job, SURE_EPOCHS};
-use crate::render::plan;
 use crate::render::pool::{Merged, Pool, Report, Tally};
 use crate::render::queue::Queue;
 use crate::render::watch::{Heard, Reports, Requests};
 use crate::render::worker::Profile;
+use crate::render::{pilot, plan};
+use crate::scene::Evaluation;
 use crate::{Error, Result, preview};
 
 /// The preview file is rewritten at most this often, and takes at most this share of the time.
@@ -68,7 +69,7 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
     if let Some(preview) = &job.preview {
         preview::PICTURE.check_target(&preview.file)?;
     }
-    let gpus = Gpu::open_all(&job.devices)?;
+    let mut gpus = Gpu::open_all(&job.devices)?;
     for gpu in &gpus {
         observe(Event::Device(&gpu.name))?;
     }
@@ -80,7 +81,9 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
     let software = gpus[0].is_software;
     let evaluator = plan::evaluator(&job.scene, there.as_ref(), software)?;
     plan::record_evaluator(&mut header, evaluator);
-    let prepared = Arc::new(Prepared::for_evaluator(&job.scene, job.seed, evaluator)?);
+    let prepared = Prepared::for_evaluator(&job.scene, job.seed, evaluator)?;
+    let there = there.map(|_| Choices::read(&job.output)).transpose()?.flatten();
+    let (prepared, choices) = decide(job, there, prepared, &mut gpus, interrupt, observe)?;
     if prepared.accel.degenerate > 0 {
         let what =
             format!("{} triangles without area in f32 were left out: no ray can meet them", prepared.accel.degenerate);
@@ -111,6 +114,12 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
         // Another process may have made it since, on a device of another kind.
         if plan::evaluator(&job.scene, Some(opened.cube().header()), software)? != evaluator {
             let what = "was made by another process with another evaluator a moment ago: run the same command again";
+            return Err(Error::storage(opened.cube().path(), what));
+        }
+        if let Some(choices) = &choices
+            && *choices != choices.clone().record(opened.cube())?
+        {
+            let what = "was made by another process that chose otherwise which paths are evaluated: run the same command again";
             return Err(Error::storage(opened.cube().path(), what));
         }
         run = Some(RunFile::create(opened.cube().path(), Run::begin(&opened.tiles(), samples_limit))?);
@@ -159,6 +168,52 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
         tally: render.tally,
         status: render.status,
     })
+}
+
+/// The scene as devices get it, with what was chosen for it: by the cube that is gone on with, else by samples on the first device
+/// that can take them. Devices that cannot leave, as long as there are others.
+fn decide(
+    job: &Job,
+    there: Option<Choices>,
+    prepared: Prepared,
+    gpus: &mut Vec<Gpu>,
+    interrupt: &Arc<Interrupt>,
+    observe: &mut dyn FnMut(Event) -> Result<()>,
+) -> Result<(Arc<Prepared>, Option<Choices>)> {
+    let mut prepared = Arc::new(prepared);
+    if !pilot::is_needed(&job.scene, &prepared) {
+        return Ok((prepared, None));
+    }
+    let known = there.or_else(|| pilot::without_samples(&job.scene, &prepared, gpus[0].is_software));
+    let choices = match known {
+        Some(choices) => choices,
+        None => loop {
+            let gpu = Arc::new(gpus.remove(0));
+            let chosen = pilot::choose(&gpu, &prepared, &job.scene, job.memory, interrupt);
+            match chosen {
+                Ok(choices) => {
+                    gpus.insert(0, Arc::into_inner(gpu).ok_or_else(no_device_back)?);
+                    break choices;
+                }
+                Err(error) if error.may_be_of_one_device() && !gpus.is_empty() => {
+                    observe(Event::Warning(format!("a device is left out: {error}")))?;
+                }
+                Err(error) => return Err(error),
+            }
+        },
+    };
+    if job.scene.integrator.evaluation == Evaluation::Roulette && choices.scale.is_none() {
+        observe(Event::Warning(format!(
+            "integrator.evaluation = \"roulette\": all paths are evaluated: {}",
+            choices.reason
+        )))?;
+    }
+    pilot::apply(&choices, Arc::get_mut(&mut prepared).ok_or_else(no_device_back)?)?;
+    Ok((prepared, Some(choices)))
+}
+
+fn no_device_back() -> Error {
+    Error::Internal("the pilot kept what it was lent".into())
 }
 
 fn no_cube() -> Error {

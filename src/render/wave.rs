@@ -14,6 +14,8 @@ use crate::{Error, Result};
 const HEAD_BYTES: u64 = 8;
 const QUEUE_BYTES: u64 = 8;
 const THROUGHPUT_BYTES: u64 = 4;
+/// Of each path where some are evaluated only.
+const CHANCE_BYTES: u64 = 8;
 /// Bytes of a unit's rectangle.
 const UNIT_BYTES: u64 = 16;
 
@@ -67,6 +69,8 @@ pub struct WavePlan {
     /// Whether evaluation has a dispatch a sample.
     pub sample_by_sample: bool,
     pub roulette: bool,
+    /// Whether roulette decides which paths are evaluated.
+    pub thinned: bool,
     pub limits: DeviceLimits,
     /// The scene on the device, bytes.
     pub scene_bytes: u64,
@@ -113,6 +117,7 @@ impl WavePlan {
             spectral_state_size: prepared.spectral_state_bytes(),
             sample_by_sample: prepared.evaluator.takes_one_sample(),
             roulette: prepared.features.roulette,
+            thinned: prepared.thinning.is_some(),
             limits,
             scene_bytes: facts::scene_bytes(&on_device, buffer::allocated),
         };
@@ -194,6 +199,10 @@ impl WavePlan {
         if self.roulette { u64::from(self.paths) * THROUGHPUT_BYTES } else { 0 }
     }
 
+    pub fn chance_bytes(&self) -> u64 {
+        if self.thinned { u64::from(self.paths) * CHANCE_BYTES } else { 0 }
+    }
+
     pub fn spectral_state_bytes(&self) -> u64 {
         u64::from(self.paths) * u64::from(self.spectral_state_size)
     }
@@ -243,9 +252,10 @@ impl WavePlan {
         let by_paths = [self.state_bytes(), self.head_bytes(), self.record_bytes(), self.queue_bytes()];
         let by_units = [self.unit_list_bytes(), self.mean_bytes(), self.staging_bytes(), self.staging_bytes()];
         let throughputs = self.roulette.then(|| self.throughput_bytes());
+        let chances = self.thinned.then(|| self.chance_bytes());
         let spectral = (self.spectral_state_size > 0).then(|| self.spectral_state_bytes());
         let sizes = [fixed, by_paths, by_units];
-        sizes.iter().flatten().copied().chain(throughputs).chain(spectral).map(buffer::allocated).sum()
+        sizes.iter().flatten().copied().chain(throughputs).chain(chances).chain(spectral).map(buffer::allocated).sum()
     }
 
     /// The most that a device holds at any moment: the scene, and then the waves' buffers; before those are there, what
@@ -261,6 +271,7 @@ impl WavePlan {
             + QUEUE_BYTES
             + u64::from(self.record_size) * u64::from(self.max_records)
             + self.throughput_bytes().min(THROUGHPUT_BYTES)
+            + self.chance_bytes().min(CHANCE_BYTES)
             + u64::from(self.spectral_state_size)
     }
 
@@ -337,6 +348,7 @@ mod tests {
             spectral_state_size: 0,
             sample_by_sample: false,
             roulette: false,
+            thinned: false,
             limits: LIMITS,
             scene_bytes: 0,
         }

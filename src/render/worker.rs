@@ -9,7 +9,7 @@ use crate::device::facts;
 use crate::device::part::OnDevice;
 use crate::device::prepared::Prepared;
 use crate::device::windows::Windows;
-use crate::device::words::{Counters, Proof, Wave};
+use crate::device::words::{Counters, Frame, Proof, Wave};
 use crate::gpu::adapter::Gpu;
 use crate::gpu::buffer;
 #[cfg(test)]
@@ -62,9 +62,13 @@ pub struct Worker {
     bounce: Stage,
     /// After every bounce, in the conventional path tracer.
     update: Option<Stage>,
+    /// Before evaluation, where not all paths are evaluated.
+    thin: Option<Stage>,
     evaluate: Stage,
     shape: EvaluateShape,
     path_buffers: PathBuffers,
+    frame: wgpu::Buffer,
+    max_bounces: u32,
     timestamps: Option<Timestamps>,
     /// Whether passes are measured by waiting for them.
     clocked: bool,
@@ -172,10 +176,13 @@ impl Worker {
         let camera = stage(&kernels.camera)?;
         let bounce = stage(&kernels.bounce)?;
         let update = kernels.update.as_ref().map(stage).transpose()?;
+        let thin = kernels.thin.as_ref().map(stage).transpose()?;
         let evaluate = stage(&kernels.evaluate)?;
         gpu.check()?;
         let profile = Profile::default();
         let timestamps = None;
+        let frame = scene.buffer("frame").expect("every scene has one").clone();
+        let max_bounces = prepared.frame.max_bounces;
         Ok(Worker {
             gpu,
             plan,
@@ -184,9 +191,12 @@ impl Worker {
             camera,
             bounce,
             update,
+            thin,
             evaluate,
             shape,
             path_buffers,
+            frame,
+            max_bounces,
             timestamps,
             clocked: false,
             slots,
@@ -207,6 +217,13 @@ impl Worker {
         let passes = if self.update.is_some() { 2 * self.bounces() } else { 2 };
         self.timestamps = self.gpu.timestamps.then(|| Timestamps::new(&self.gpu, passes));
         self.clocked = !self.gpu.timestamps;
+    }
+
+    /// Ends paths after `bounces` scattering events from now on, fewer than the scene allows.
+    pub fn limit_bounces(&mut self, bounces: u32) {
+        self.max_bounces = bounces.min(self.prepared.frame.max_bounces);
+        let frame = Frame { max_bounces: self.max_bounces, ..self.prepared.frame };
+        self.gpu.queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
     }
 
     /// Ends the work of [`Worker::submit`] with an error as soon as `interrupt` is set.
@@ -407,6 +424,9 @@ impl Worker {
             self.lap(&mut encoder, 0)?;
             pass = self.begin(&mut encoder, "evaluate", 1);
         }
+        if let Some(thin) = &self.thin {
+            thin.dispatch(&mut pass, &[], all, 1);
+        }
         if self.plan.sample_by_sample {
             for sample in 0..wave.samples {
                 self.evaluate.dispatch(&mut pass, &step(sample), pixels, blocks);
@@ -443,7 +463,7 @@ impl Worker {
 
     /// Bounces, and what the last direction meets.
     fn bounces(&self) -> u32 {
-        self.prepared.frame.max_bounces + 1
+        self.max_bounces + 1
     }
 
     fn begin<'e>(

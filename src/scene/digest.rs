@@ -7,9 +7,9 @@ use glam::DVec3;
 use sha2::{Digest, Sha256};
 
 use super::{
-    Absorber, Attributes, Bsdf, Camera, Emission, Environment, EnvironmentMap, Field, Film, Filter, Grid, Integrator,
-    Interior, Light, Material, Medium, Mesh, Object, Projection, Reflectance, Sampler, Scene, Shape, Sides, Spectrum,
-    Temperature, Texels, Texture, TextureKind, Wavelengths, Weight,
+    Absorber, Attributes, Bsdf, Camera, Emission, Environment, EnvironmentMap, Evaluation, Field, Film, Filter, Grid,
+    Integrator, Interior, Light, Material, Medium, Mesh, Object, Projection, Reflectance, Sampler, Scene, Shape, Sides,
+    Spectrum, Temperature, Texels, Texture, TextureKind, Wavelengths, Weight,
 };
 use crate::spectral::{Channels, Curve, Outside};
 
@@ -160,6 +160,7 @@ impl Hash {
             sampler,
             wavelengths,
             wavelengths_per_channel,
+            evaluation,
             evaluator,
             epoch,
         } = integrator;
@@ -178,6 +179,10 @@ impl Hash {
         if *wavelengths_per_channel > 1 {
             self.text("wavelengths per channel");
             self.counts([wavelengths_per_channel]);
+        }
+        if *evaluation != Evaluation::All {
+            self.text("evaluation");
+            self.text(evaluation.name());
         }
     }
 

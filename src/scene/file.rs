@@ -17,7 +17,7 @@ use super::object::Objects;
 use super::overrides;
 use super::spectrum::Spectra;
 use super::tree::{self, Entry, Origin};
-use super::{Evaluator, Integrator, Sampler, Scene, Wavelengths};
+use super::{Evaluation, Evaluator, Integrator, Sampler, Scene, Wavelengths};
 use crate::error::{Error, Problem, Result};
 
 /// Evaluations walk all records of a path, two a bounce and one more, in one loop of at most 32,768 iterations,
@@ -150,6 +150,7 @@ impl Default for Integrator {
             sampler: Sampler::Sobol,
             wavelengths: Wavelengths::Emission,
             wavelengths_per_channel: 1,
+            evaluation: Evaluation::All,
             evaluator: Evaluator::Auto,
             epoch: 64,
         }
@@ -187,6 +188,10 @@ fn decode_integrator(item: &Item) -> Option<Integrator> {
     };
     let wavelengths_per_channel =
         power_of_two("wavelengths_per_channel", MOST_WAVELENGTHS, default.wavelengths_per_channel);
+    let evaluation = match fields.get("evaluation") {
+        Some(item) => item.choice(&Evaluation::ALL.map(|evaluation| (evaluation.name(), evaluation))),
+        None => Some(default.evaluation),
+    };
     let evaluator = match fields.get("evaluator") {
         Some(item) => item.choice(&Evaluator::ALL.map(|evaluator| (evaluator.name(), evaluator))),
         None => Some(default.evaluator),
@@ -198,6 +203,7 @@ fn decode_integrator(item: &Item) -> Option<Integrator> {
         sampler: sampler?,
         wavelengths: wavelengths?,
         wavelengths_per_channel: wavelengths_per_channel?,
+        evaluation: evaluation?,
         evaluator: evaluator?,
         epoch: epoch?,
     })

@@ -145,9 +145,35 @@ pub struct Integrator {
     pub wavelengths: Wavelengths,
     /// At how many wavelengths of each channel a path is evaluated, a power of two up to 16.
     pub wavelengths_per_channel: u32,
+    /// Which of a scene's paths are evaluated.
+    pub evaluation: Evaluation,
     pub evaluator: Evaluator,
     /// Samples per pixel of a full epoch, a power of two up to 1,024.
     pub epoch: u32,
+}
+
+/// Which paths are evaluated: all have the same means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Evaluation {
+    /// What pays, as a few samples of the scene tell before it is rendered.
+    Auto,
+    All,
+    /// Those of little energy by chance.
+    Roulette,
+}
+
+impl Evaluation {
+    pub const ALL: [Evaluation; 3] = [Evaluation::Auto, Evaluation::All, Evaluation::Roulette];
+
+    /// As scene files have it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Evaluation::Auto => "auto",
+            Evaluation::All => "all",
+            Evaluation::Roulette => "roulette",
+        }
+    }
 }
 
 /// How channels are evaluated along paths. All trace the same paths and differ in rounding only.

@@ -446,6 +446,15 @@ pub static INTEGRATOR: Section = Section {
         )
         .range("[1, 16], a power of two"),
         Key::default(
+            "evaluation",
+            Choice(&["auto", "all", "roulette"]),
+            "\"all\"",
+            "Whether all paths are evaluated, or those that carry little energy by chance only, and then for more: the means are the \
+             same, and time goes where it brings most ([METHOD.md](METHOD.md#roulette-on-evaluation)). How many are worth it is \
+             found by a few samples before the render begins, and stays with the cube. `auto` does it where that is expected to \
+             pay. `pt` evaluates all.",
+        ),
+        Key::default(
             "evaluator",
             Choice(&["auto", "dpept-pixel", "dpept-path", "dpept-spectral", "pt"]),
             "\"auto\"",
@@ -471,6 +480,7 @@ russian_roulette_start = 4
 sampler = "independent"
 wavelengths = "uniform"
 wavelengths_per_channel = 4
+evaluation = "roulette"
 evaluator = "dpept-spectral"
 epoch = 16
 "#],

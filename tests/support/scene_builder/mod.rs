@@ -6,8 +6,8 @@ pub mod surfaces;
 
 use glam::{DMat3, DVec2, DVec3};
 use spectile::scene::{
-    Attributes, Bsdf, Camera, Emission, Environment, EnvironmentMap, Evaluator, Film, Filter, Integrator, Light,
-    Material, Mesh, Object, Projection, Reflectance, Sampler, Scene, Shape, Sides, Spectrum, Texels, Texture,
+    Attributes, Bsdf, Camera, Emission, Environment, EnvironmentMap, Evaluation, Evaluator, Film, Filter, Integrator,
+    Light, Material, Mesh, Object, Projection, Reflectance, Sampler, Scene, Shape, Sides, Spectrum, Texels, Texture,
     TextureKind, Wavelengths, Weight,
 };
 use spectile::spectral::{Channels, Curve, upsample};
@@ -29,6 +29,7 @@ impl Builder {
                 sampler: Sampler::Independent,
                 wavelengths: Wavelengths::Emission,
                 wavelengths_per_channel: 1,
+                evaluation: Evaluation::All,
                 evaluator: Evaluator::Auto,
                 epoch: 64,
             },

@@ -1,0 +1,53 @@
+// Roulette on evaluation: between generating paths and evaluating them. What a path's scattered light brings is tried in a few
+// channels that represent all; it is evaluated with the probability p = min(1, s f), f the most that it brings to one of them over
+// the mean of that channel in the picture, and then counts for 1/p in every channel (docs/METHOD.md).
+
+@group(1) @binding(1) var<storage, read> units: array<vec4<u32>>;
+// Records of what is seen before scattering, in the low half, and in the high one the wave, once it is decided; what the rest counts
+// for, 0 where it does not.
+@group(1) @binding(15) var<storage, read_write> chances: array<vec2<u32>>;
+// Of each representative quad of channels: s over the channel's mean, 0 for channels that do not count.
+@group(1) @binding(16) var<storage, read> importances: array<vec4<f32>>;
+
+// So that no path counts for more than 64.
+const LEAST_CHANCE: f32 = 0.015625;
+
+@compute @workgroup_size(64)
+fn thin_paths(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let path = id.x + id.y * groups.x * 64u;
+    if (path >= wave.path_count) {
+        return;
+    }
+    let head = heads[path];
+    let used = head.y & 0xffffu;
+    let seen_records = min(chances[path].x & 0xffffu, used);
+    var kept = 1.0;
+    if (used > seen_records) {
+        // At the first of its wavelengths.
+        let s = spectral_sample(head.x);
+#if WAVELENGTHS
+        let turn = 0u;
+#endif
+        let first_record = path * frame.max_records;
+        var most = 0.0;
+        for (var representative = 0u; representative < REPRESENTATIVES; representative += 1u) {
+            let quad_0 = ((2u * representative + 1u) * QUADS) / (2u * REPRESENTATIVES);
+#include common/hold_spectra.wgsl
+#include common/held_spectra.wgsl
+            var throughput_0 = first_throughput(quad_0, s);
+            var radiance_0 = vec4<f32>(0.0);
+#include common/records.wgsl
+            let brought = abs(radiance_0 - seen_0) * importances[representative];
+            most = max(most, max(max(brought.x, brought.y), max(brought.z, brought.w)));
+        }
+        let slot = wave.pixel_begin + path / wave.samples;
+        let in_tile = slot % wave.tile_pixels;
+        let pixel = units[slot / wave.tile_pixels].xy + vec2<u32>(in_tile % wave.tile_width, in_tile / wave.tile_width);
+        let key = pixel_key(frame.seed_low, frame.seed_high, pixel.x, pixel.y, wave.epoch);
+        // The second number of the pair whose first is the wavelength's: one of the sampler's own dimensions.
+        let u = random_pair(key, DIMENSION_WAVELENGTH, wave.sample_begin + path % wave.samples, wave.epoch_mask).y;
+        let p = clamp(most, LEAST_CHANCE, 1.0);
+        kept = select(0.0, 1.0 / p, u < p);
+    }
+    chances[path] = vec2<u32>(seen_records | (wave.sequence << 16u), bitcast<u32>(kept));
+}

@@ -1,0 +1,78 @@
+//! What a few samples decided before a render began: which paths of it are evaluated. It stays with the cube, so that whoever joins
+//! or goes on renders the same.
+
+use std::fs;
+use std::io::ErrorKind;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::store::{Cube, PRIVATE};
+use crate::scene::Evaluation;
+use crate::{Error, Result, files};
+
+const FILE: &str = "choices.json";
+
+/// Written once, in `.spectile/choices.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Choices {
+    /// Never [`Evaluation::Auto`].
+    pub evaluation: Evaluation,
+    /// Why, in words.
+    pub reason: String,
+    /// What a path's energy is multiplied with to be its chance of being evaluated; `None` where all are.
+    pub scale: Option<f64>,
+    /// Share of the paths that is expected to be evaluated.
+    pub evaluated: f64,
+    /// Efficiency (1 / (time x variance), mean over channels) over that of evaluating all paths, as expected.
+    pub gain: f64,
+    /// Variance of the channel that suffers most, over that with all paths, as expected.
+    pub variance: f64,
+    /// Samples of the pilot, all pixels together; 0 where none was needed.
+    pub samples: u32,
+    /// Mean radiance of the picture in every channel that devices render, W m⁻² sr⁻¹ nm⁻¹, as far as the pilot knows.
+    pub mean_radiance: Vec<f64>,
+}
+
+impl Choices {
+    /// Those of the cube at `path`, if it has any.
+    pub fn read(path: &Path) -> Result<Option<Choices>> {
+        let file = path.join(PRIVATE).join(FILE);
+        let text = match fs::read(&file) {
+            Ok(text) => text,
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+            Err(error) => return Err(Error::storage(&file, format!("cannot be read: {error}"))),
+        };
+        let what = "is damaged: render the scene into a new cube, or put the file back";
+        serde_json::from_slice(&text).map(Some).map_err(|error| Error::storage(&file, format!("{what} ({error})")))
+    }
+
+    /// Writes them into the cube, unless it has some: those that it has then.
+    pub fn record(self, cube: &Cube) -> Result<Choices> {
+        let file = cube.private().join(FILE);
+        let aside = files::sibling(&file, "creating");
+        let failed = |error: std::io::Error| Error::storage(&file, format!("cannot be written: {error}"));
+        let text = serde_json::to_string_pretty(&self).expect("plain values");
+        files::write_durably(&aside, text.as_bytes()).map_err(failed)?;
+        // The first one stays, whole: a link fails where there is something.
+        let linked = fs::hard_link(&aside, &file);
+        let _ = fs::remove_file(&aside);
+        match linked {
+            Ok(()) => {
+                files::sync_folder(files::parent(&file)).map_err(failed)?;
+                Ok(self)
+            }
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {
+                Choices::read(cube.path())?.ok_or_else(|| failed(ErrorKind::NotFound.into()))
+            }
+            // No links here: whoever of two is second replaces the first one's, which says the same where they are of one kind.
+            Err(_) => {
+                if let Some(there) = Choices::read(cube.path())? {
+                    return Ok(there);
+                }
+                files::write_atomically(&file, text.as_bytes())?;
+                Ok(self)
+            }
+        }
+    }
+}

@@ -1,0 +1,295 @@
+//! What a few samples of a scene decide before it is rendered: which of its paths are worth being evaluated in every channel.
+//!
+//! The theory is in docs/METHOD.md, Roulette on evaluation. Nothing here looks at a clock: what paths cost is known by the kind of
+//! device, how they vary is measured on paths that are never counted in the picture, so that the choice is the same every time.
+
+use std::sync::Arc;
+
+use crate::cube::Choices;
+use crate::device::evaluator::evaluation_cost;
+use crate::device::parts::paths::{Thinning, representatives};
+use crate::device::prepared::Prepared;
+use crate::gpu::adapter::Gpu;
+use crate::render::interrupt::Interrupt;
+use crate::render::wave::Budget;
+use crate::render::worker::{UnitRect, Worker};
+use crate::scene::{Evaluation, Evaluator, Film, Scene};
+use crate::{Error, Result};
+
+/// Pixels of the pilot, all over the film.
+const PIXELS: u32 = 256;
+/// Epochs of one sample: independent paths, each with its values.
+const SINGLES: u32 = 32;
+/// Samples of two epochs whose difference tells how much less than single paths the sampler's nets vary.
+const NET: u32 = 16;
+/// The pilot's epochs have numbers that no render comes to.
+const FIRST_EPOCH: u32 = 1 << 31;
+/// Channels whose variance is predicted, at most: evenly among all.
+const MOST_CHANNELS: usize = 256;
+
+/// Chances never fall below, so that no path counts for more than 64 (shaders/passes/thin_paths.wgsl).
+const LEAST_CHANCE: f64 = 1.0 / 64.0;
+/// Variance that any channel may gain, over that of evaluating all paths.
+const MOST_VARIANCE: f64 = 1.1;
+/// What `auto` takes must be expected to bring so much.
+const LEAST_GAIN: f64 = 1.1;
+/// Below this share of evaluating a path in generating it no roulette can bring [`LEAST_GAIN`]: 1 + 0.1 at most.
+const LEAST_COST: f64 = 0.1;
+
+/// What is decided for `scene` before any sample of it: `None` where there is nothing to decide.
+pub fn without_samples(scene: &Scene, prepared: &Prepared, software: bool) -> Option<Choices> {
+    let cost = evaluation_cost(prepared, software);
+    let reason = match scene.integrator.evaluation {
+        Evaluation::All => return None,
+        _ if prepared.evaluator == Evaluator::Pt => return None,
+        Evaluation::Auto if cost < LEAST_COST => {
+            format!("evaluating a path costs {cost:.2} of generating it, too little to save")
+        }
+        Evaluation::Auto | Evaluation::Roulette => return None,
+    };
+    Some(all(reason, 0, Vec::new()))
+}
+
+/// Whether samples must decide.
+pub fn is_needed(scene: &Scene, prepared: &Prepared) -> bool {
+    scene.integrator.evaluation != Evaluation::All && prepared.evaluator != Evaluator::Pt
+}
+
+fn all(reason: String, samples: u32, mean_radiance: Vec<f64>) -> Choices {
+    Choices {
+        evaluation: Evaluation::All,
+        reason,
+        scale: None,
+        evaluated: 1.0,
+        gain: 1.0,
+        variance: 1.0,
+        samples,
+        mean_radiance,
+    }
+}
+
+/// Lets `prepared` evaluate what was chosen.
+pub fn apply(choices: &Choices, prepared: &mut Prepared) -> Result<()> {
+    if choices.mean_radiance.len() != prepared.channels && choices.scale.is_some() {
+        return Err(Error::Internal("choices of a cube are for other channels than it has".into()));
+    }
+    prepared.thinning = choices.scale.map(|scale| Thinning::new(prepared, scale, &choices.mean_radiance));
+    Ok(())
+}
+
+/// Follows the paths of the pilot on `gpu` and chooses.
+pub fn choose(
+    gpu: &Arc<Gpu>,
+    prepared: &Arc<Prepared>,
+    scene: &Scene,
+    memory: Option<u64>,
+    interrupt: &Arc<Interrupt>,
+) -> Result<Choices> {
+    let budget = Budget { memory, paths: None };
+    let mut worker = Worker::new(Arc::clone(gpu), Arc::clone(prepared), [1, 1], budget)?;
+    worker.watch(interrupt);
+    let trial = Trial::run(&mut worker, prepared, &scene.film)?;
+    let cost = evaluation_cost(prepared, gpu.is_software);
+    Ok(trial.choose(cost, scene.integrator.evaluation == Evaluation::Roulette))
+}
+
+/// The pilot's pixels, in the coordinates of the full film: all where they are few, else points of Roberts' R2 sequence
+/// (Martin Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018).
+fn pixels(film: &Film) -> Vec<UnitRect> {
+    let [x0, y0, ..] = film.crop;
+    let [width, height] = film.cube_size();
+    let unit = |x: u32, y: u32| [x, y, x + 1, y + 1];
+    if u64::from(width) * u64::from(height) <= u64::from(PIXELS) {
+        return (0..height).flat_map(|y| (0..width).map(move |x| unit(x0 + x, y0 + y))).collect();
+    }
+    // 1/g and 1/g² for the real root g of g³ = g + 1.
+    const STEPS: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
+    let place = |i: u32, step: f64, size: u32| ((0.5 + f64::from(i) * step).fract() * f64::from(size)) as u32;
+    (0..PIXELS).map(|i| unit(x0 + place(i, STEPS[0], width), y0 + place(i, STEPS[1], height))).collect()
+}
+
+/// The pilot's paths.
+struct Trial {
+    /// Mean of the picture in every channel.
+    means: Vec<f64>,
+    /// Channels whose values are kept.
+    channels: Vec<usize>,
+    /// [path][channel kept]: radiance, and what of it was scattered.
+    radiance: Vec<f32>,
+    scattered: Vec<f32>,
+    /// Of each path: the most that its scattered light brings to a representative channel, over that one's mean.
+    energy: Vec<f64>,
+    pixels: usize,
+    /// Variance of the sampler's nets over that of independent paths, per sample: 1 at most.
+    net: f64,
+    samples: u32,
+}
+
+impl Trial {
+    fn run(worker: &mut Worker, prepared: &Prepared, film: &Film) -> Result<Trial> {
+        let (units, count) = (pixels(film), prepared.channels);
+        let representatives: Vec<usize> = representatives(prepared).collect();
+        let even = (0..count.min(MOST_CHANNELS)).map(|i| i * count / count.min(MOST_CHANNELS));
+        let mut channels: Vec<usize> = even.chain(representatives.iter().copied()).collect();
+        channels.sort_unstable();
+        channels.dedup();
+        let kept = |values: &[f32]| -> Vec<f32> {
+            values.chunks(count).flat_map(|pixel| channels.iter().map(|&k| pixel[k])).collect()
+        };
+        let mut means = vec![0.0; count];
+        let mut add = |values: &[f32]| {
+            for pixel in values.chunks(count) {
+                means.iter_mut().zip(pixel).for_each(|(mean, &value)| *mean += f64::from(value));
+            }
+        };
+        let (mut radiance, mut scattered) = (Vec::new(), Vec::new());
+        for epoch in 0..SINGLES {
+            let values = values(worker, &units, FIRST_EPOCH + epoch, 1)?;
+            add(&values);
+            radiance.extend(kept(&values));
+        }
+        let nets = [0, 1].map(|i| values(worker, &units, FIRST_EPOCH + SINGLES + i, NET).map(|values| kept(&values)));
+        let [first, second] = nets;
+        let (first, second) = (first?, second?);
+        // The same paths, ended where they are scattered first.
+        worker.limit_bounces(0);
+        for epoch in 0..SINGLES {
+            let seen = kept(&values(worker, &units, FIRST_EPOCH + epoch, 1)?);
+            let all = &radiance[epoch as usize * seen.len()..];
+            scattered.extend(all.iter().zip(&seen).map(|(all, seen)| all - seen));
+        }
+        means.iter_mut().for_each(|mean| *mean /= f64::from(SINGLES) * units.len() as f64);
+        let at: Vec<(usize, f64)> = (channels.iter().enumerate())
+            .filter(|(_, k)| representatives.contains(k) && means[**k] > 0.0)
+            .map(|(i, &k)| (i, means[k]))
+            .collect();
+        let energy = scattered
+            .chunks(channels.len())
+            .map(|path| at.iter().map(|&(i, mean)| (f64::from(path[i]) / mean).abs()).fold(0.0, f64::max));
+        let energy = energy.collect();
+        let pixels = units.len();
+        let mut trial = Trial {
+            means,
+            channels,
+            radiance,
+            scattered,
+            energy,
+            pixels,
+            net: 1.0,
+            samples: pixels as u32 * (SINGLES + 2 * NET),
+        };
+        trial.net = trial.net_share(&first, &second);
+        Ok(trial)
+    }
+
+    /// Variance of each kept channel's samples around their pixel's mean, mean over the pixels.
+    fn variances(&self) -> Vec<f64> {
+        let kept = self.channels.len();
+        let row = self.pixels * kept;
+        let mut variances = vec![0.0; kept];
+        for pixel in 0..self.pixels {
+            for (k, variance) in variances.iter_mut().enumerate() {
+                let samples = || self.radiance.chunks(row).map(|epoch| f64::from(epoch[pixel * kept + k]));
+                let n = samples().count() as f64;
+                let mean = samples().sum::<f64>() / n;
+                *variance += samples().map(|x| (x - mean) * (x - mean)).sum::<f64>() / (n - 1.0) / self.pixels as f64;
+            }
+        }
+        variances
+    }
+
+    /// From two means of nets in every pixel: their variance, times the samples of a net, over that of single paths; the mean over
+    /// the channels, since each alone is known badly.
+    fn net_share(&self, first: &[f32], second: &[f32]) -> f64 {
+        let kept = self.channels.len();
+        let mut squares = vec![0.0; kept];
+        for (a, b) in first.chunks(kept).zip(second.chunks(kept)) {
+            for (square, (a, b)) in squares.iter_mut().zip(a.iter().zip(b)) {
+                *square += 0.5 * f64::from(a - b).powi(2) * f64::from(NET) / self.pixels as f64;
+            }
+        }
+        let shares: Vec<f64> =
+            squares.iter().zip(self.variances()).filter(|(_, of_paths)| *of_paths > 0.0).map(|(s, v)| s / v).collect();
+        if shares.is_empty() { 1.0 } else { (shares.iter().sum::<f64>() / shares.len() as f64).clamp(0.01, 1.0) }
+    }
+
+    /// The scale that is expected to bring most, where evaluating a path in all channels costs `cost` of generating it. All paths are
+    /// evaluated where nothing brings enough, unless it `must` be.
+    fn choose(self, cost: f64, must: bool) -> Choices {
+        if let Some(dark) = self.means.iter().position(|mean| !(*mean > 0.0)) {
+            // Its light may come along paths that bring nothing elsewhere.
+            let reason = format!("channel {dark} was dark in all samples of the pilot, and roulette could starve it");
+            return all(reason, self.samples, self.means);
+        }
+        let variances: Vec<f64> = self.variances().iter().map(|variance| variance * self.net).collect();
+        // Powers of the square root of two: so that what differs in the last bits chooses the same.
+        let scales = (-24..=24).map(|i| 2f64.powf(0.5 * f64::from(i)));
+        let expected = scales.map(|scale| (scale, self.expect(scale, cost, &variances)));
+        let fair = expected.filter(|(_, expected)| expected.variance <= MOST_VARIANCE);
+        let best = fair.max_by(|(_, a), (_, b)| a.rounded_gain().total_cmp(&b.rounded_gain()));
+        match best {
+            None => all("some channel's noise would grow by more than a tenth".into(), self.samples, self.means),
+            Some((_, expected)) if !must && expected.gain < LEAST_GAIN => {
+                all(format!("roulette would bring {:.2}, too little", expected.gain), self.samples, self.means)
+            }
+            Some((scale, expected)) => Choices {
+                evaluation: Evaluation::Roulette,
+                reason: format!("evaluating a path costs {cost:.2} of generating it"),
+                scale: Some(scale),
+                evaluated: expected.evaluated,
+                gain: expected.gain,
+                variance: expected.variance,
+                samples: self.samples,
+                mean_radiance: self.means,
+            },
+        }
+    }
+
+    /// What roulette with `scale` is expected to do. Dropping a path with the chance 1 - p and counting it for 1/p adds
+    /// (1/p - 1) S² to the variance of what it scatters.
+    fn expect(&self, scale: f64, cost: f64, variances: &[f64]) -> Expected {
+        let kept = self.channels.len();
+        let paths = self.energy.len() as f64;
+        let (mut evaluated, mut added) = (0.0, vec![0.0; kept]);
+        for (path, energy) in self.scattered.chunks(kept).zip(&self.energy) {
+            // What scatters nothing is not evaluated either way.
+            if path.iter().all(|x| *x == 0.0) {
+                continue;
+            }
+            let p = (scale * energy).clamp(LEAST_CHANCE, 1.0);
+            evaluated += p / paths;
+            if p < 1.0 {
+                let more = (1.0 / p - 1.0) / paths;
+                added.iter_mut().zip(path).for_each(|(sum, &x)| *sum += more * f64::from(x).powi(2));
+            }
+        }
+        let grown =
+            added.iter().zip(variances).filter(|(added, _)| **added > 0.0).map(|(added, of_all)| 1.0 + added / of_all);
+        let (sum, variance) =
+            grown.fold((0.0, 1.0), |(sum, most): (f64, f64), grown| (sum + grown - 1.0, most.max(grown)));
+        let mean = 1.0 + sum / kept as f64;
+        Expected { evaluated, variance, gain: (1.0 + cost) / (1.0 + cost * evaluated) / mean }
+    }
+}
+
+struct Expected {
+    evaluated: f64,
+    variance: f64,
+    gain: f64,
+}
+
+impl Expected {
+    fn rounded_gain(&self) -> f64 {
+        (self.gain * 100.0).round() / 100.0
+    }
+}
+
+/// [unit][channel]: means of `samples` samples of every pixel in `units`.
+fn values(worker: &mut Worker, units: &[UnitRect], epoch: u32, samples: u32) -> Result<Vec<f32>> {
+    let mut values = Vec::new();
+    for units in units.chunks(worker.plan.units_at_once(samples)) {
+        worker.submit(units, epoch, samples)?;
+        values.extend(worker.collect()?.iter().flat_map(|collected| collected.means().to_vec()));
+    }
+    Ok(values)
+}
