@@ -29,24 +29,27 @@ fn thin_paths(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgro
         let turn = 0u;
 #endif
         let first_record = path * frame.max_records;
-        var most = 0.0;
-        for (var representative = 0u; representative < REPRESENTATIVES; representative += 1u) {
-            let quad_0 = ((2u * representative + 1u) * QUADS) / (2u * REPRESENTATIVES);
+#repeat VECTORS v
+        let quad_$v = ((2u * $vu + 1u) * QUADS) / (2u * VECTORS);
+#end
 #include common/hold_spectra.wgsl
 #include common/held_spectra.wgsl
-            var throughput_0 = first_throughput(quad_0, s);
-            var radiance_0 = vec4<f32>(0.0);
+#repeat VECTORS v
+        var throughput_$v = first_throughput(quad_$v, s);
+        var radiance_$v = vec4<f32>(0.0);
+#end
 #include common/records.wgsl
-            let brought = abs(radiance_0 - seen_0) * importances[representative];
-            most = max(most, max(max(brought.x, brought.y), max(brought.z, brought.w)));
-        }
+        var brought = vec4<f32>(0.0);
+#repeat VECTORS v
+        brought = max(brought, abs(radiance_$v - seen_$v) * importances[$vu]);
+#end
         let slot = wave.pixel_begin + path / wave.samples;
         let in_tile = slot % wave.tile_pixels;
         let pixel = units[slot / wave.tile_pixels].xy + vec2<u32>(in_tile % wave.tile_width, in_tile / wave.tile_width);
         let key = pixel_key(frame.seed_low, frame.seed_high, pixel.x, pixel.y, wave.epoch);
         // The second number of the pair whose first is the wavelength's: one of the sampler's own dimensions.
         let u = random_pair(key, DIMENSION_WAVELENGTH, wave.sample_begin + path % wave.samples, wave.epoch_mask).y;
-        let p = clamp(most, LEAST_CHANCE, 1.0);
+        let p = clamp(max(max(brought.x, brought.y), max(brought.z, brought.w)), LEAST_CHANCE, 1.0);
         kept = select(0.0, 1.0 / p, u < p);
     }
     chances[path] = vec2<u32>(seen_records | (wave.sequence << 16u), bitcast<u32>(kept));

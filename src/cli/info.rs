@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use super::Output;
 use super::tile_states::{TileStates, list};
-use crate::cube::{Cube, Progress, Verification};
+use crate::cube::{Choices, Cube, Progress, Verification};
 use crate::files::shown;
 use crate::spectral::Channels;
 use crate::spectral::colour::ProjectionKind;
@@ -82,7 +82,8 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     };
     let work = TileStates::of(&cube, &samples)?;
     let lost = cube.lost(&samples);
-    let found = Found { progress: Progress::of(&samples), estimate, work, verified, lost, cube };
+    let choices = Choices::read(cube.path())?;
+    let found = Found { progress: Progress::of(&samples), estimate, work, verified, lost, choices, cube };
     output.event("done", found.facts())?;
     output.text(&found.describe())?;
     match &found.verified {
@@ -100,6 +101,8 @@ struct Found {
     verified: Option<Verification>,
     /// Tiles that were rendered and lack a file.
     lost: Vec<Range<u32>>,
+    /// What was decided before it was rendered, where something was.
+    choices: Option<Choices>,
 }
 
 /// Says how the tiles stand, again and again until all are done.
@@ -176,6 +179,7 @@ impl Found {
             "error_estimate_is_rough": epochs(cube, progress) < ROUGH_BELOW,
             "store_bytes": header.store_bytes(),
             "uncertainty": header.has_uncertainty(),
+            "choices": self.choices,
             "preview": shows(cube),
             "attributes": header.attributes,
             "channels": each.collect::<Vec<_>>(),
@@ -220,6 +224,9 @@ impl Found {
                 n => format!("of every pixel and channel, from {n} epochs (Student's t, {} degrees of freedom)", n - 1),
             };
             row("standard error", what);
+        }
+        if let Some(choices) = &self.choices {
+            row("evaluation", choices.describe());
         }
         row("preview", shows(cube));
         row("on disk", format!("{} when all tiles are begun", crate::files::format_bytes(header.store_bytes())));

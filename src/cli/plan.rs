@@ -9,7 +9,7 @@ use super::Output;
 use super::output::say;
 use super::progress::short;
 use super::scene::SceneArgs;
-use crate::cube::Header;
+use crate::cube::{Choices, Header};
 use crate::device::evaluator::EvaluateShape;
 use crate::device::facts;
 use crate::device::part::OnDevice;
@@ -19,10 +19,10 @@ use crate::files::{format_bytes, shown};
 use crate::gpu::adapter::{Gpu, Selection};
 use crate::gpu::pass::storage_buffers;
 use crate::render::job::StopRule;
-use crate::render::plan;
 use crate::render::pool::MERGE_THREADS;
 use crate::render::wave::{Budget, WavePlan};
 use crate::render::worker::Worker;
+use crate::render::{pilot, plan};
 use crate::scene::Scene;
 use crate::spectral::table::Bounds;
 use crate::{Error, Result};
@@ -35,6 +35,7 @@ use crate::{Error, Result};
 #[command(after_long_help = "\
 Examples:
   spectile plan scene.toml
+  spectile plan scene.toml --pilot
   spectile plan scene.toml --parts
   spectile plan scene.toml --size 4096x4096 --set channels.equal.count=2000 --spp 256
   spectile plan scene.toml --devices 2 --memory 512MiB")]
@@ -56,6 +57,12 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
     pub spp: u32,
 
+    /// Decide by samples what `render` decides before it begins: which paths are worth evaluating
+    ///
+    /// Where `integrator.evaluation` asks for it. Without this, the plan is that of evaluating all paths.
+    #[arg(long)]
+    pub pilot: bool,
+
     /// Say also what each thing that is left out would cost, and how exact the tables of each spectrum are
     #[arg(long)]
     pub verbose: bool,
@@ -74,7 +81,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     plan::check(&scene)?;
     scene.warnings.iter().try_for_each(|warning| warn(output, warning))?;
     // Without a device there is no prediction, but still a plan.
-    let gpus = match Gpu::open_all(&args.devices) {
+    let mut gpus = match Gpu::open_all(&args.devices) {
         Ok(gpus) => gpus,
         Err(error @ Error::NoDevice(_)) => {
             say(&format!("warning: {error}"));
@@ -83,7 +90,14 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         Err(error) => return Err(error),
     };
     let evaluator = plan::evaluator(&scene, None, gpus.first().is_some_and(|gpu| gpu.is_software))?;
-    let prepared = Arc::new(Prepared::for_evaluator(&scene, 0, evaluator)?);
+    let prepared = Prepared::for_evaluator(&scene, 0, evaluator)?;
+    let (prepared, choices) = match args.pilot {
+        false => (Arc::new(prepared), None),
+        true if gpus.is_empty() => return Err(Error::NoDevice("--pilot follows paths, and there is no device".into())),
+        true => pilot::decide(&scene, prepared, None, &mut gpus, args.memory, &Arc::default(), &mut |what| {
+            warn(output, &what)
+        })?,
+    };
     let stop = StopRule { samples: Some(args.spp), ..StopRule::default() };
     let samples = stop.samples_limit(scene.integrator.epoch, false)?.unwrap_or(args.spp);
     let tile = plan::tile_size(&scene, args.scene.tile);
@@ -94,7 +108,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         Some(m) => m.waves,
         None => plan::waves_without_device(&prepared, tile, budget)?,
     };
-    let plan = Plan { args, samples, prepared: &prepared, header, waves, measured };
+    let plan = Plan { args, scene: &scene, samples, prepared: &prepared, choices, header, waves, measured };
     output.event("done", plan.facts())?;
     output.text(&plan.describe())
 }
@@ -173,7 +187,10 @@ struct Plan<'a> {
     args: &'a Args,
     /// Per pixel, at the end of an epoch.
     samples: u32,
+    scene: &'a Scene,
     prepared: &'a Prepared,
+    /// What the pilot decided, if it was asked.
+    choices: Option<Choices>,
     header: Header,
     /// Of the first device, or of one that is not there.
     waves: WavePlan,
@@ -223,6 +240,8 @@ impl Plan<'_> {
             "tile": self.header.tile,
             "tiles": self.header.grid().count(),
             "evaluator": self.prepared.evaluator.name(),
+            "evaluation": self.scene.integrator.evaluation.name(),
+            "choices": self.choices,
             "features": features.collect::<Vec<_>>(),
             "spectra": facts::table_bounds(self.prepared),
             "storage_buffers": self.storage_buffers(),
@@ -272,6 +291,11 @@ impl Plan<'_> {
         text += &self.describe_memory();
         text += &format!("disk      {}\n", format_bytes(header.store_bytes()));
         text += &format!("evaluator {}\n", p.evaluator.name());
+        text += &match &self.choices {
+            Some(choices) => wrapped("paths", &choices.describe()),
+            None if pilot::is_needed(self.scene, p) => wrapped("paths", UNDECIDED),
+            None => String::new(),
+        };
         text += &format!(
             "geometry  {} primitives, {} BVH nodes in {} levels, {} emitters\n",
             p.accel.primitives.len(),
@@ -359,6 +383,9 @@ impl Plan<'_> {
         line("spectra", &name, largest(|b| b.pointwise), largest(|b| b.mean))
     }
 }
+
+const UNDECIDED: &str = "which are worth evaluating is decided by samples when the cube is made (--pilot does it now); this is the plan of \
+                         evaluating all";
 
 /// Words under a title, in lines of a width that terminals have.
 fn wrapped(title: &str, words: &str) -> String {

@@ -35,6 +35,22 @@ pub struct Choices {
 }
 
 impl Choices {
+    /// In a line, for people.
+    pub fn describe(&self) -> String {
+        match self.scale {
+            None => format!("all paths: {}", self.reason),
+            Some(scale) => format!(
+                "roulette: a path that brings the mean is evaluated with {:.2}, {:.1} % of all are; {:.2} times the efficiency of all \
+                 paths expected, at most {:.2} times the variance ({})",
+                scale.min(1.0),
+                100.0 * self.evaluated,
+                self.gain,
+                self.variance,
+                self.reason
+            ),
+        }
+    }
+
     /// Those of the cube at `path`, if it has any.
     pub fn read(path: &Path) -> Result<Option<Choices>> {
         let file = path.join(PRIVATE).join(FILE);

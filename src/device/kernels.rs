@@ -91,7 +91,9 @@ impl OnDevice<'_> {
             false => [&self.modules(TRACING)[..], &[BOUNCE]].concat(),
         };
         let mut try_paths = self.defines(Work::Evaluate);
-        try_paths.constant("VECTORS", 1);
+        if let Some(thinning) = &self.thinning {
+            try_paths.constant("VECTORS", thinning.importances.len() as u32);
+        }
         let text = |last: &[Text], defines: &Defines| {
             compose(&[EVALUATING, last].map(|texts| self.modules(texts)).concat(), defines)
         };

@@ -36,23 +36,64 @@ const LEAST_GAIN: f64 = 1.1;
 /// Below this share of evaluating a path in generating it no roulette can bring [`LEAST_GAIN`]: 1 + 0.1 at most.
 const LEAST_COST: f64 = 0.1;
 
-/// What is decided for `scene` before any sample of it: `None` where there is nothing to decide.
-pub fn without_samples(scene: &Scene, prepared: &Prepared, software: bool) -> Option<Choices> {
-    let cost = evaluation_cost(prepared, software);
-    let reason = match scene.integrator.evaluation {
-        Evaluation::All => return None,
-        _ if prepared.evaluator == Evaluator::Pt => return None,
-        Evaluation::Auto if cost < LEAST_COST => {
-            format!("evaluating a path costs {cost:.2} of generating it, too little to save")
-        }
-        Evaluation::Auto | Evaluation::Roulette => return None,
-    };
-    Some(all(reason, 0, Vec::new()))
-}
-
-/// Whether samples must decide.
+/// Whether there is something to decide: `pt` evaluates while it traces.
 pub fn is_needed(scene: &Scene, prepared: &Prepared) -> bool {
     scene.integrator.evaluation != Evaluation::All && prepared.evaluator != Evaluator::Pt
+}
+
+/// `prepared` with what was chosen for `scene`: by the cube that is gone on with (`there`), else by rule, else by samples on the first of
+/// `gpus` that can take them. Those that cannot leave the list, which is warned of, as long as there are others.
+pub fn decide(
+    scene: &Scene,
+    prepared: Prepared,
+    there: Option<Choices>,
+    gpus: &mut Vec<Gpu>,
+    memory: Option<u64>,
+    interrupt: &Arc<Interrupt>,
+    warn: &mut dyn FnMut(String) -> Result<()>,
+) -> Result<(Arc<Prepared>, Option<Choices>)> {
+    let mut prepared = Arc::new(prepared);
+    if !is_needed(scene, &prepared) {
+        return Ok((prepared, None));
+    }
+    let choices = match there.or_else(|| by_rule(scene, &prepared, gpus[0].is_software)) {
+        Some(choices) => choices,
+        None => loop {
+            let gpu = Arc::new(gpus.remove(0));
+            match choose(&gpu, &prepared, scene, memory, interrupt) {
+                Ok(choices) => {
+                    gpus.insert(0, Arc::into_inner(gpu).ok_or_else(kept)?);
+                    break choices;
+                }
+                Err(error) if error.may_be_of_one_device() && !gpus.is_empty() => {
+                    warn(format!("a device is left out: {error}"))?;
+                }
+                Err(error) => return Err(error),
+            }
+        },
+    };
+    if scene.integrator.evaluation == Evaluation::Roulette && choices.scale.is_none() {
+        warn(format!("integrator.evaluation = \"roulette\", but all paths are evaluated: {}", choices.reason))?;
+    }
+    if let Some(scale) = choices.scale {
+        if choices.mean_radiance.len() != prepared.channels {
+            return Err(Error::Internal("what was chosen for the cube is for other channels than it has".into()));
+        }
+        let thinning = Thinning::new(&prepared, scale, &choices.mean_radiance);
+        Arc::get_mut(&mut prepared).ok_or_else(kept)?.thinning = Some(thinning);
+    }
+    Ok((prepared, Some(choices)))
+}
+
+fn kept() -> Error {
+    Error::Internal("the pilot kept what it was lent".into())
+}
+
+/// Where no sample needs to be asked.
+fn by_rule(scene: &Scene, prepared: &Prepared, software: bool) -> Option<Choices> {
+    let cost = evaluation_cost(prepared, software);
+    (scene.integrator.evaluation == Evaluation::Auto && cost < LEAST_COST)
+        .then(|| all(format!("evaluating a path costs {cost:.2} of generating it, too little to save"), 0, Vec::new()))
 }
 
 fn all(reason: String, samples: u32, mean_radiance: Vec<f64>) -> Choices {
@@ -66,15 +107,6 @@ fn all(reason: String, samples: u32, mean_radiance: Vec<f64>) -> Choices {
         samples,
         mean_radiance,
     }
-}
-
-/// Lets `prepared` evaluate what was chosen.
-pub fn apply(choices: &Choices, prepared: &mut Prepared) -> Result<()> {
-    if choices.mean_radiance.len() != prepared.channels && choices.scale.is_some() {
-        return Err(Error::Internal("choices of a cube are for other channels than it has".into()));
-    }
-    prepared.thinning = choices.scale.map(|scale| Thinning::new(prepared, scale, &choices.mean_radiance));
-    Ok(())
 }
 
 /// Follows the paths of the pilot on `gpu` and chooses.
@@ -128,7 +160,7 @@ struct Trial {
 impl Trial {
     fn run(worker: &mut Worker, prepared: &Prepared, film: &Film) -> Result<Trial> {
         let (units, count) = (pixels(film), prepared.channels);
-        let representatives: Vec<usize> = representatives(prepared).collect();
+        let representatives = representatives(prepared);
         let even = (0..count.min(MOST_CHANNELS)).map(|i| i * count / count.min(MOST_CHANNELS));
         let mut channels: Vec<usize> = even.chain(representatives.iter().copied()).collect();
         channels.sort_unstable();

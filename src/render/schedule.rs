@@ -19,7 +19,6 @@ use crate::render::queue::Queue;
 use crate::render::watch::{Heard, Reports, Requests};
 use crate::render::worker::Profile;
 use crate::render::{pilot, plan};
-use crate::scene::Evaluation;
 use crate::{Error, Result, preview};
 
 /// The preview file is rewritten at most this often, and takes at most this share of the time.
@@ -83,7 +82,10 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
     plan::record_evaluator(&mut header, evaluator);
     let prepared = Prepared::for_evaluator(&job.scene, job.seed, evaluator)?;
     let there = there.map(|_| Choices::read(&job.output)).transpose()?.flatten();
-    let (prepared, choices) = decide(job, there, prepared, &mut gpus, interrupt, observe)?;
+    let (prepared, choices) =
+        pilot::decide(&job.scene, prepared, there, &mut gpus, job.memory, interrupt, &mut |what| {
+            observe(Event::Warning(what))
+        })?;
     if prepared.accel.degenerate > 0 {
         let what =
             format!("{} triangles without area in f32 were left out: no ray can meet them", prepared.accel.degenerate);
@@ -168,52 +170,6 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
         tally: render.tally,
         status: render.status,
     })
-}
-
-/// The scene as devices get it, with what was chosen for it: by the cube that is gone on with, else by samples on the first device
-/// that can take them. Devices that cannot leave, as long as there are others.
-fn decide(
-    job: &Job,
-    there: Option<Choices>,
-    prepared: Prepared,
-    gpus: &mut Vec<Gpu>,
-    interrupt: &Arc<Interrupt>,
-    observe: &mut dyn FnMut(Event) -> Result<()>,
-) -> Result<(Arc<Prepared>, Option<Choices>)> {
-    let mut prepared = Arc::new(prepared);
-    if !pilot::is_needed(&job.scene, &prepared) {
-        return Ok((prepared, None));
-    }
-    let known = there.or_else(|| pilot::without_samples(&job.scene, &prepared, gpus[0].is_software));
-    let choices = match known {
-        Some(choices) => choices,
-        None => loop {
-            let gpu = Arc::new(gpus.remove(0));
-            let chosen = pilot::choose(&gpu, &prepared, &job.scene, job.memory, interrupt);
-            match chosen {
-                Ok(choices) => {
-                    gpus.insert(0, Arc::into_inner(gpu).ok_or_else(no_device_back)?);
-                    break choices;
-                }
-                Err(error) if error.may_be_of_one_device() && !gpus.is_empty() => {
-                    observe(Event::Warning(format!("a device is left out: {error}")))?;
-                }
-                Err(error) => return Err(error),
-            }
-        },
-    };
-    if job.scene.integrator.evaluation == Evaluation::Roulette && choices.scale.is_none() {
-        observe(Event::Warning(format!(
-            "integrator.evaluation = \"roulette\": all paths are evaluated: {}",
-            choices.reason
-        )))?;
-    }
-    pilot::apply(&choices, Arc::get_mut(&mut prepared).ok_or_else(no_device_back)?)?;
-    Ok((prepared, Some(choices)))
-}
-
-fn no_device_back() -> Error {
-    Error::Internal("the pilot kept what it was lent".into())
 }
 
 fn no_cube() -> Error {

@@ -7,5 +7,6 @@ mod invariance;
 mod lights;
 mod materials;
 mod media;
+mod roulette;
 mod textures;
 mod wavelengths;

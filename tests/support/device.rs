@@ -2,9 +2,11 @@
 
 use std::sync::{Arc, OnceLock};
 
+use spectile::device::parts::paths::Thinning;
 use spectile::device::prepared::Prepared;
 use spectile::device::words::Counters;
 use spectile::gpu::adapter::Gpu;
+use spectile::render::pilot;
 use spectile::render::wave::Budget;
 use spectile::render::worker::{UnitRect, Worker};
 use spectile::scene::Scene;
@@ -26,6 +28,8 @@ pub struct Settings {
     pub checked: bool,
     /// Pretend that the device binds at most so many bytes.
     pub binding: Option<u64>,
+    /// Roulette on evaluation: what the energy of a path, over the mean of the picture, is multiplied with to be its chance.
+    pub scale: Option<f64>,
 }
 
 impl Default for Settings {
@@ -37,6 +41,7 @@ impl Default for Settings {
             units: usize::MAX,
             checked: false,
             binding: None,
+            scale: None,
         }
     }
 }
@@ -82,7 +87,12 @@ fn device(settings: Settings) -> Arc<Gpu> {
 /// Renders `epochs` epochs of `samples` samples per pixel (a power of two) of the film's crop.
 pub fn render(scene: &Scene, epochs: u32, samples: u32, settings: Settings) -> Epochs {
     let [x0, y0, x1, y1] = scene.film.crop;
-    let prepared = Arc::new(Prepared::new(scene, settings.seed).expect("a scene that fits"));
+    let mut prepared = Arc::new(Prepared::new(scene, settings.seed).expect("a scene that fits"));
+    if let Some(scale) = settings.scale {
+        let pilot = pilot::choose(&device(settings), &prepared, scene, None, &Arc::default()).expect("a pilot");
+        let thinning = Thinning::new(&prepared, scale, &pilot.mean_radiance);
+        Arc::get_mut(&mut prepared).expect("nobody else's").thinning = Some(thinning);
+    }
     let integration = prepared.integration.clone();
     let mut worker = timed(Part::Compilation, || {
         let mut worker = Worker::new(device(settings), prepared, settings.tile, settings.budget).expect("a worker");
