@@ -7,6 +7,13 @@
 #if THINNED
 // What roulette on evaluation left (passes/thin_paths.wgsl).
 @group(1) @binding(15) var<storage, read> chances: array<vec2<u32>>;
+
+// Whether anything of a path is evaluated: what it sees before it is scattered always is.
+fn evaluates(path: u32) -> bool {
+    let records = heads[path].y & 0xffffu;
+    let chance = chances[path];
+    return records > 0u && (chance.y != 0u || (chance.x & 0xffffu) > 0u);
+}
 #endif
 
 fn load_mean(at: u32, channels: u32) -> vec4<f32> {

@@ -33,6 +33,22 @@ fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
     var foreign = 0u;
     let mark = wave.sequence << 16u;
     for (var i = 0u; i < wave.samples; i += 1u) {
+#if THINNED
+        // Paths of which nothing is evaluated, in a loop of their own: software devices go through all of a loop's body that is skipped.
+        for (; i < wave.samples; i += 1u) {
+            let skipped = local_slot * wave.samples + i;
+            if (evaluates(skipped)) {
+                break;
+            }
+            foreign |= (heads[skipped].y | chances[skipped].x) ^ mark;
+#repeat VECTORS v
+            mean_$v += (vec4<f32>(0.0) - mean_$v) / f32(wave.sample_begin + i + 1u);
+#end
+        }
+        if (i >= wave.samples) {
+            break;
+        }
+#endif
         let path = local_slot * wave.samples + i;
         let head = heads[path];
 #if WAVELENGTHS
@@ -44,13 +60,6 @@ fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
         foreign |= head.y ^ mark;
 #if THINNED
         foreign |= chance.x ^ mark;
-        if (used == 0u) {
-            // Most paths that roulette drops: nothing is looked up for them.
-#repeat VECTORS v
-            mean_$v += (vec4<f32>(0.0) - mean_$v) / f32(wave.sample_begin + i + 1u);
-#end
-            continue;
-        }
 #endif
 #include common/each_wavelength.wgsl
 #include common/held_spectra.wgsl
