@@ -43,7 +43,7 @@ fn evaluate_path(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
 #end
     }
 #if THINNED
-    prove(1u, (head.y | chance.x) ^ (wave.sequence << 16u), local_slot == 0u && id.z == 0u);
+    prove(1u, (head.y ^ (wave.sequence << 16u)) | (chance.x ^ (wave.sequence << 16u)), local_slot == 0u && id.z == 0u);
 #else
     prove(1u, head.y ^ (wave.sequence << 16u), local_slot == 0u && id.z == 0u);
 #endif

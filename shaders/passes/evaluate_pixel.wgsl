@@ -40,7 +40,7 @@ fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
             if (evaluates(skipped)) {
                 break;
             }
-            foreign |= (heads[skipped].y | chances[skipped].x) ^ mark;
+            foreign |= (heads[skipped].y ^ mark) | (chances[skipped].x ^ mark);
 #repeat VECTORS v
             mean_$v += (vec4<f32>(0.0) - mean_$v) / f32(wave.sample_begin + i + 1u);
 #end

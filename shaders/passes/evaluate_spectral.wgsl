@@ -42,7 +42,7 @@ fn evaluate_spectral(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workg
 #end
     if (thread % LANES == 0u) {
 #if THINNED
-        prove(1u, (head.y | chance.x) ^ (wave.sequence << 16u), local_slot == 0u && group.z == 0u);
+        prove(1u, (head.y ^ (wave.sequence << 16u)) | (chance.x ^ (wave.sequence << 16u)), local_slot == 0u && group.z == 0u);
 #else
         prove(1u, head.y ^ (wave.sequence << 16u), local_slot == 0u && group.z == 0u);
 #endif
