@@ -12,6 +12,7 @@ use super::Output;
 use super::tile_states::{TileStates, list};
 use crate::cube::{Choices, Cube, Progress, Verification};
 use crate::files::shown;
+use crate::scene::{Evaluation, Evaluator};
 use crate::spectral::Channels;
 use crate::spectral::colour::ProjectionKind;
 use crate::{Error, Result};
@@ -186,6 +187,14 @@ impl Found {
         })
     }
 
+    /// Whether nobody has decided yet which paths are evaluated.
+    fn is_pending(&self) -> bool {
+        let attributes = &self.cube.header().attributes;
+        let setting = attributes.get("settings").and_then(|settings| settings["integrator"]["evaluation"].as_str());
+        let by_itself = attributes.get("evaluator").is_some_and(|evaluator| evaluator == Evaluator::Pt.name());
+        !by_itself && self.progress.samples[1] == 0 && setting.is_some_and(|setting| setting != Evaluation::All.name())
+    }
+
     fn describe(&self) -> String {
         let Found { cube, progress, estimate, .. } = self;
         let header = cube.header();
@@ -227,6 +236,11 @@ impl Found {
         }
         if let Some(choices) = &self.choices {
             row("evaluation", choices.describe());
+        } else if self.is_pending() {
+            row(
+                "evaluation",
+                "pending: samples decide which paths are evaluated, when the first device renders".into(),
+            );
         }
         row("preview", shows(cube));
         row("on disk", format!("{} when all tiles are begun", crate::files::format_bytes(header.store_bytes())));

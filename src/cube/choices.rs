@@ -8,19 +8,18 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::store::{Cube, PRIVATE};
-use crate::scene::Evaluation;
 use crate::{Error, Result, files};
 
 const FILE: &str = "choices.json";
 
 /// Written once, in `.spectile/choices.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Choices {
-    /// Never [`Evaluation::Auto`].
-    pub evaluation: Evaluation,
     /// Why, in words.
     pub reason: String,
     /// What a path's energy is multiplied with to be its chance of being evaluated; `None` where all are.
+    #[serde(deserialize_with = "Option::deserialize")] // Not `None` where it is missing.
     pub scale: Option<f64>,
     /// Share of the paths that is expected to be evaluated.
     pub evaluated: f64,
@@ -68,7 +67,7 @@ impl Choices {
         let file = cube.private().join(FILE);
         let aside = files::sibling(&file, "creating");
         let failed = |error: std::io::Error| Error::storage(&file, format!("cannot be written: {error}"));
-        let text = serde_json::to_string_pretty(&self).expect("plain values");
+        let text = serde_json::to_string(&self).expect("plain values");
         files::write_durably(&aside, text.as_bytes()).map_err(failed)?;
         // The first one stays, whole: a link fails where there is something.
         let linked = fs::hard_link(&aside, &file);

@@ -129,8 +129,14 @@ impl Header {
         let coordinates = 32 * channels + 8 * (u64::from(self.size[0]) + u64::from(self.size[1]));
         // The record has the names and nodes again, and bounds as text.
         let record = in_blocks(names + 64 * channels);
-        let metadata =
-            FIXED_BLOCKS * BLOCK_BYTES + in_blocks(names) + record + in_blocks(coordinates) + 5 * rows * BLOCK_BYTES;
+        // A number as text for each channel that devices render.
+        let choices = in_blocks(1024 + 25 * channels);
+        let metadata = FIXED_BLOCKS * BLOCK_BYTES
+            + in_blocks(names)
+            + record
+            + choices
+            + in_blocks(coordinates)
+            + 5 * rows * BLOCK_BYTES;
         tile.saturating_mul(tiles).saturating_add(metadata)
     }
 

@@ -33,8 +33,9 @@ const LEAST_CHANCE: f64 = 1.0 / 64.0;
 const MOST_VARIANCE: f64 = 1.1;
 /// What `auto` takes must be expected to bring so much.
 const LEAST_GAIN: f64 = 1.1;
-/// Below this share of evaluating a path in generating it no roulette can bring [`LEAST_GAIN`]: 1 + 0.1 at most.
-const LEAST_COST: f64 = 0.1;
+/// Where evaluating a path costs less than this share of generating it, `auto` asks no samples: roulette would bring a quarter more at
+/// the very most, and usually nothing.
+const LEAST_COST: f64 = 0.25;
 
 /// Whether there is something to decide: `pt` evaluates while it traces.
 pub fn is_needed(scene: &Scene, prepared: &Prepared) -> bool {
@@ -97,16 +98,7 @@ fn by_rule(scene: &Scene, prepared: &Prepared, software: bool) -> Option<Choices
 }
 
 fn all(reason: String, samples: u32, mean_radiance: Vec<f64>) -> Choices {
-    Choices {
-        evaluation: Evaluation::All,
-        reason,
-        scale: None,
-        evaluated: 1.0,
-        gain: 1.0,
-        variance: 1.0,
-        samples,
-        mean_radiance,
-    }
+    Choices { reason, scale: None, evaluated: 1.0, gain: 1.0, variance: 1.0, samples, mean_radiance }
 }
 
 /// Follows the paths of the pilot on `gpu` and chooses.
@@ -265,7 +257,6 @@ impl Trial {
                 all(format!("roulette would bring {:.2}, too little", expected.gain), self.samples, self.means)
             }
             Some((scale, expected)) => Choices {
-                evaluation: Evaluation::Roulette,
                 reason: format!("evaluating a path costs {cost:.2} of generating it"),
                 scale: Some(scale),
                 evaluated: expected.evaluated,

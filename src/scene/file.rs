@@ -150,7 +150,7 @@ impl Default for Integrator {
             sampler: Sampler::Sobol,
             wavelengths: Wavelengths::Emission,
             wavelengths_per_channel: 1,
-            evaluation: Evaluation::All,
+            evaluation: Evaluation::Auto,
             evaluator: Evaluator::Auto,
             epoch: 64,
         }

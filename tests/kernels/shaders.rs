@@ -8,6 +8,7 @@ use naga::valid::{Capabilities, ValidationFlags, Validator};
 use spectile::device::evaluator::EvaluateShape;
 use spectile::device::example::{with_everything, with_parts};
 use spectile::device::part::{OnDevice, PARTS};
+use spectile::device::parts::paths::Thinning;
 use spectile::device::prepared::{Features, Prepared};
 use spectile::device::windows::{WindowList, Windows};
 use spectile::gpu::pass::storage_buffers;
@@ -46,6 +47,11 @@ fn plain_scene() -> Scene {
 
 fn windows(nodes: u32, primitives: u32) -> Windows {
     Windows { nodes: WindowList { count: nodes, size: 1000 }, primitives: WindowList { count: primitives, size: 2000 } }
+}
+
+/// Roulette on evaluation, whatever a pilot would say.
+fn some_paths(prepared: &Prepared) -> Thinning {
+    Thinning::new(prepared, 1.0, &vec![1.0; prepared.channels])
 }
 
 /// The passes of `prepared`, as the worker composes them.
@@ -93,6 +99,7 @@ fn compose_plain() -> Vec<(String, Source)> {
         prepared.features = features;
         prepared.tables.kinks = if features.registers && !features.strata { i as u32 % 3 } else { 0 };
         prepared.wavelengths_per_channel = [1, 1, 4][i % 3];
+        prepared.thinning = (i % 5 == 2 && prepared.evaluator != Evaluator::Pt).then(|| some_paths(&prepared));
         // Windows and workgroups take turns among the combinations, and all are seen with all features off and on.
         let windows = windows(1 + i as u32 % 4, 1 + i as u32 / 4 % 4);
         let shape = EvaluateShape { batches: Some(2), ..shapes[i % shapes.len()] };
@@ -403,7 +410,8 @@ fn general_sources() -> &'static [(String, Source)] {
 fn compose_general() -> Vec<(String, Source)> {
     let mut found = std::collections::HashMap::new();
     for (i, (what, scene)) in general_scenes().into_iter().enumerate() {
-        let prepared = Prepared::for_evaluator(&scene, 0, EVALUATORS[i % EVALUATORS.len()]).unwrap();
+        let mut prepared = Prepared::for_evaluator(&scene, 0, EVALUATORS[i % EVALUATORS.len()]).unwrap();
+        prepared.thinning = (i % 3 == 1 && prepared.evaluator != Evaluator::Pt).then(|| some_paths(&prepared));
         let windows = windows(1 + i as u32 % 4, 1 + i as u32 / 4 % 4);
         for source in passes(&prepared, &windows, EvaluateShape::of(&prepared, i % 2 == 0)) {
             found.entry(source.text.clone()).or_insert_with(|| (format!("{} for {what}", source.label), source));

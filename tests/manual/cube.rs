@@ -117,6 +117,18 @@ fn the_page_is_what_renders_write() {
     files_are_those_of_the_page(&cubes);
     journals_are_laid_out_as_the_page_says(&cubes);
     runs_have_the_facts_of_the_page(&cubes);
+    choices_have_the_fields_of_the_page(&cubes);
+}
+
+fn choices_have_the_fields_of_the_page(cubes: &Cubes) {
+    let found = json(&cubes.path("plain").join(".spectile/choices.json"));
+    let documented = rows("Choices");
+    for row in &documented {
+        let (name, kind) = (code(&row[0]), &row[1]);
+        assert!(is_a(&found[name], kind), "{name} is {}, in docs/cube.md {kind}", found[name]);
+    }
+    let there: BTreeSet<&String> = found.as_object().expect("an object").keys().collect();
+    assert_eq!(there.len(), documented.len(), "{there:?}");
 }
 
 fn arrays_are_those_of_the_page(cubes: &Cubes) {
@@ -304,7 +316,7 @@ fn files_are_those_of_the_page(cubes: &Cubes) {
         let seen: BTreeSet<&String> = files_of(&cubes.path(name)).iter().map(|file| &of(file).0).collect();
         for (pattern, there) in documented.iter().filter(|(_, there)| there == "always" || there == name) {
             // What was made of another cube was not rendered.
-            let no_run = name == "sensor" && pattern.contains("/run-");
+            let no_run = name == "sensor" && ["/run-", "/choices"].iter().any(|file| pattern.contains(file));
             assert!(
                 seen.contains(pattern) || no_run,
                 "{name}.zarr has no `{pattern}`, which docs/cube.md says is there {there}"

@@ -2,6 +2,7 @@
 //! there.
 
 mod accuracy;
+mod evaluation;
 mod json;
 mod memory;
 mod out_of_core;

@@ -448,7 +448,7 @@ pub static INTEGRATOR: Section = Section {
         Key::default(
             "evaluation",
             Choice(&["auto", "all", "roulette"]),
-            "\"all\"",
+            "\"auto\"",
             "Whether all paths are evaluated, or those that carry little energy by chance only, and then for more: the means are the \
              same, and time goes where it brings most ([METHOD.md](METHOD.md#roulette-on-evaluation)). How many are worth it is \
              found by a few samples before the render begins, and stays with the cube. `auto` does it where that is expected to \

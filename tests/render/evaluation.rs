@@ -1,0 +1,86 @@
+//! Which paths are evaluated: decided once, kept with the cube, adopted by whoever goes on.
+
+use std::fs;
+
+use serde_json::Value;
+
+use super::{Place, arrays, text};
+
+/// So many channels that it is worth a thought.
+const MANY: &[&str] = &["--tile", "8", "--set", "channels.equal.count=120"];
+const ROULETTE: &[&str] = &["--set", "integrator.evaluation=roulette"];
+
+fn choices(place: &Place, name: &str) -> Option<Value> {
+    let file = fs::read(place.path().join(name).join(".spectile/choices.json")).ok()?;
+    Some(serde_json::from_slice(&file).expect("JSON"))
+}
+
+/// Stopped and gone on with, by several devices, by processes with some of the tiles each: the same choice and the same bytes, which
+/// are not those of all paths.
+#[test]
+fn what_is_chosen_stays_with_the_cube() {
+    let place = Place::new();
+    let args = |more: &[&'static str]| [MANY, ROULETTE, more].concat();
+    let straight = arrays(&place.render("straight.zarr", &args(&["--spp", "64"])));
+    let chosen = choices(&place, "straight.zarr").expect("a choice");
+    assert!(chosen["scale"].as_f64() > Some(0.0) && chosen["mean_radiance"].as_array().map(Vec::len) == Some(120));
+    assert!(arrays(&place.render("all.zarr", &[MANY, &["--spp", "64"]].concat())) != straight);
+
+    place.render("resumed.zarr", &args(&["--spp", "2"]));
+    let resumed = place.render("resumed.zarr", &args(&["--spp", "64", "--resume", "--devices", "2"]));
+    assert!(arrays(&resumed) == straight && choices(&place, "resumed.zarr") == Some(chosen.clone()));
+    for tiles in ["0..4", "4..9"] {
+        place.render("tiles.zarr", &[&args(&["--spp", "64", "--tiles"])[..], &[tiles]].concat());
+    }
+    assert!(arrays(&place.cube("tiles.zarr")) == straight && choices(&place, "tiles.zarr") == Some(chosen));
+
+    let (info, _) = place.success(&["info", "straight.zarr"]);
+    assert!(info.lines().any(|line| line.starts_with("evaluation") && line.contains("roulette: a path")), "{info}");
+    // What is there decides, not what would be chosen now.
+    let file = place.path().join("resumed.zarr/.spectile/choices.json");
+    let other = fs::read_to_string(&file).expect("text").replace("\"scale\"", "\"scales\"");
+    fs::write(&file, other).expect("written");
+    let output = place
+        .run(&[&["render", "scene.toml", "-o", "resumed.zarr"], &args(&["--spp", "128", "--resume"])[..]].concat());
+    assert_eq!(output.status.code(), Some(5));
+    assert!(text(&output.stderr).contains("choices.json: is damaged"), "{}", text(&output.stderr));
+}
+
+/// Where nothing can be saved nobody is asked; nothing else of the cube knows of it.
+#[test]
+fn few_channels_need_no_pilot() {
+    let place = Place::new();
+    let with = |name: &str, evaluation: &str| {
+        let set = format!("integrator.evaluation={evaluation}");
+        arrays(&place.render(name, &["--spp", "4", "--set", &set]))
+    };
+    let radiance = |mut files: crate::cube_files::Files| {
+        files.retain(|name, _| name.starts_with("radiance/c"));
+        files
+    };
+    assert!(radiance(with("auto.zarr", "auto")) == radiance(with("all.zarr", "all")));
+    let chosen = choices(&place, "auto.zarr").expect("a choice");
+    assert_eq!((&chosen["scale"], &chosen["samples"]), (&Value::Null, &Value::from(0)), "{chosen}");
+    assert!(chosen["reason"].as_str().is_some_and(|reason| reason.contains("too little to save")), "{chosen}");
+    assert_eq!(choices(&place, "all.zarr"), None);
+    // `pt` evaluates while it traces.
+    place.render("pt.zarr", &[ROULETTE, &["--spp", "1", "--set", "integrator.evaluator=pt"]].concat());
+    assert_eq!(choices(&place, "pt.zarr"), None);
+    // Light that the pilot does not see could starve.
+    let dark = ["--spp", "1", "--set", "integrator.max_bounces=0", "--set", "objects.2.emission=0"];
+    let output = place.run(&[&["render", "scene.toml", "-o", "dark.zarr"], &dark[..], ROULETTE].concat());
+    assert!(text(&output.stderr).contains("all paths are evaluated: channel 0 was dark"), "{}", text(&output.stderr));
+}
+
+#[test]
+fn a_plan_decides_where_it_is_asked_to() {
+    let place = Place::new();
+    let plan = [&["plan", "scene.toml"], MANY, ROULETTE].concat();
+    let (undecided, _) = place.success(&plan);
+    assert!(undecided.contains("\npaths     which are worth evaluating is decided by samples"), "{undecided}");
+    let (decided, _) = place.success(&[&plan[..], &["--pilot"]].concat());
+    assert!(decided.contains("\npaths     roulette: a path that brings the mean"), "{decided}");
+    assert!(decided.contains("\nused") && decided.contains("roulette on evaluation ("), "{decided}");
+    let (plain, _) = place.success(&["plan", "scene.toml", "--set", "integrator.evaluation=all"]);
+    assert!(!plain.contains("\npaths "), "{plain}");
+}
