@@ -1,0 +1,236 @@
+"""Error against time for every choice between paths and evaluations: wavelengths per channel, roulette on evaluation, and what `auto`
+makes of it.
+
+    measure.py --spectile PROGRAM [-o FOLDER] [--scenes NAMES] [--channels K,K] [--rounds N]
+
+Each choice renders the same picture for some epochs. Time is that between epochs, compilation and the pilot apart; the choices of a
+scene and number of channels take turns. Error is the cube's own estimate from the spread of its epochs, one for each channel:
+efficiency is 1 / (mean over channels of error² x time a path), of which ratios to all paths at one wavelength are told. Needs nothing
+but Python 3.9 and the program.
+"""
+
+import argparse
+import csv
+import html
+import json
+import math
+import pathlib
+import shutil
+import statistics
+import subprocess
+import tempfile
+
+# Scene, and the epochs and pixels that its noise asks for.
+SCENES = ["cornell/cornell", "statues/statues", "aircraft/aircraft", "conference/conference", "aircraft/aircraft-infrared"]
+EPOCH, EPOCHS = 16, 16
+SIZE = "48x30"
+
+
+class Choice:
+    def __init__(self, name, settings, scale=None):
+        self.name, self.settings, self.scale = name, settings, scale
+
+
+def choices(channels, sweep):
+    """What is compared, all paths at one wavelength first."""
+    found = [
+        Choice("all", {"evaluation": "all"}),
+        Choice("auto", {"evaluation": "auto"}),
+        Choice("roulette", {"evaluation": "roulette"}),
+    ]
+    if channels <= 32:
+        found += [Choice(f"m={m}", {"evaluation": "all", "wavelengths_per_channel": m}) for m in (2, 4, 16)]
+    if sweep:
+        found += [Choice(f"s x {factor:g}", {"evaluation": "roulette"}, factor) for factor in (0.125, 0.5, 2, 8)]
+    return found
+
+
+class Program:
+    def __init__(self, path, scenes):
+        self.path, self.scenes = path, scenes
+        self.folder = pathlib.Path(tempfile.mkdtemp())
+
+    def run(self, *arguments):
+        done = subprocess.run([self.path, *arguments], capture_output=True, text=True)
+        if done.returncode != 0:
+            raise RuntimeError(done.stderr.strip().splitlines()[0])
+        return [json.loads(line) for line in done.stdout.splitlines()]
+
+    def render(self, scene, channels, choice, seed):
+        """Seconds a path, error of every channel, what was chosen."""
+        file = self.scenes / f"{scene}.toml"
+        key = "wavenumber" if "\nwavenumber" in file.read_text() else "equal"
+        cube = self.folder / "cube.zarr"
+        shutil.rmtree(cube, ignore_errors=True)
+        settings = {**choice.settings, "epoch": EPOCH}
+        arguments = ["render", str(file), "-o", str(cube), "--size", SIZE, "--seed", str(seed), "--json"]
+        arguments += ["--set", f"channels.{key}.count={channels}"]
+        if "false_colour" in file.read_text():
+            arguments += ["--set", f"channels.false_colour=[{channels - 1},{channels // 2},0]"]
+        for name, value in settings.items():
+            arguments += ["--set", f"integrator.{name}={value}"]
+        if choice.scale:
+            self.run(*arguments, "--spp", "1")
+            chosen = cube / ".spectile/choices.json"
+            written = json.loads(chosen.read_text())
+            if written["scale"] is None:
+                raise RuntimeError(written["reason"])
+            written["scale"] *= choice.scale
+            chosen.write_text(json.dumps(written))
+            arguments.append("--resume")
+        events = self.run(*arguments, "--spp", str(EPOCH * EPOCHS))
+        ends = [(event["samples"], event["time_s"]) for event in events if event["event"] == "epoch"]
+        (before, began), (after, ended) = next(end for end in ends if end[0] >= EPOCH), ends[-1]
+        width, height = map(int, SIZE.split("x"))
+        seconds = (ended - began) / ((after - before) * width * height)
+        info = self.run("info", str(cube), "--json")[-1]
+        errors = [channel["error_estimate"] for channel in info["channels"]]
+        return seconds, errors, info["choices"]
+
+
+def measure(program, scenes, channel_counts, rounds):
+    rows = []
+    for scene in scenes:
+        for channels in channel_counts:
+            sweep = channels == max(channel_counts)
+            found = {}
+            for turn in range(rounds):
+                for choice in choices(channels, sweep):
+                    if isinstance(found.get(choice.name), str):
+                        continue
+                    try:
+                        found.setdefault(choice.name, []).append(program.render(scene, channels, choice, turn))
+                    except RuntimeError as refused:
+                        found[choice.name] = str(refused)
+            base = found["all"]
+            for choice in choices(channels, sweep):
+                rows.append(row(scene, channels, choice, found[choice.name], base))
+                print(rows[-1]["text"], flush=True)
+    return rows
+
+
+def row(scene, channels, choice, turns, base):
+    result = {"scene": scene.split("/")[1], "channels": channels, "choice": choice.name}
+    if isinstance(turns, str):
+        return {**result, "note": turns, "text": f"{result['scene']} {channels} {choice.name}: {turns}"}
+    seconds = statistics.median(turn[0] for turn in turns)
+    of_all = statistics.median(turn[0] for turn in base)
+    # Of each channel: mean of error² over the turns, whose seeds differ.
+    squares = [[statistics.fmean(turn[1][k] ** 2 for turn in several) for k in range(channels)] for several in (turns, base)]
+    lit = [k for k in range(channels) if squares[1][k] > 0]
+    growth = [squares[0][k] / squares[1][k] for k in lit]
+    chosen = turns[0][2] or {}
+    mean = statistics.fmean(growth)
+    result |= {
+        "microseconds": 1e6 * seconds,
+        "error": math.sqrt(statistics.fmean(squares[0][k] for k in lit)),
+        "time": seconds / of_all,
+        "variance": mean,
+        "worst_variance": max(growth),
+        "gain": of_all / (seconds * mean),
+        "predicted": chosen.get("gain"),
+        "evaluated": chosen.get("evaluated"),
+        "scale": chosen.get("scale"),
+        "note": chosen.get("reason", ""),
+    }
+    predicted = "" if chosen.get("scale") is None else f", predicted {chosen['gain']:.2f} with {100 * chosen['evaluated']:.0f} % of the paths"
+    text = f"{result['scene']} {channels} {choice.name}: {result['microseconds']:.1f} us a path, variance x {mean:.2f}"
+    return {**result, "text": f"{text} (at most {max(growth):.2f}), gain {result['gain']:.2f}{predicted}"}
+
+
+def fewer(rows):
+    """n of K channels a path, drawn anew for each: error² goes as K/n, so its efficiency, over that of all K, is n/K T(K)/T(n)."""
+    times = {(r["scene"], r["channels"]): r["microseconds"] for r in rows if r["choice"] == "all" and "microseconds" in r}
+    found = []
+    for (scene, n), of_n in times.items():
+        for (other, many), of_many in times.items():
+            if other == scene and n < many == max(k for s, k in times if s == scene):
+                found.append({"scene": scene, "n": n, "channels": many, "efficiency": n / many * of_many / of_n})
+    return found
+
+
+FIELDS = ["scene", "channels", "choice", "microseconds", "error", "time", "variance", "worst_variance", "gain", "predicted", "evaluated", "scale", "note"]
+
+
+def page(rows, device):
+    """One file with tables, and a drawing of gain against s for every scene."""
+
+    def cell(value):
+        return "" if value is None else f"{value:.3g}" if isinstance(value, float) else html.escape(str(value))
+
+    def table(head, lines):
+        body = "".join("<tr>" + "".join(f"<td>{cell(value)}</td>" for value in line) + "</tr>" for line in lines)
+        return "<table><tr>" + "".join(f"<th>{html.escape(name)}</th>" for name in head) + f"</tr>{body}</table>"
+
+    style = "body{font:15px sans-serif;max-width:75em;margin:2em auto}td,th{padding:.15em .7em;text-align:right}td:first-child,th:first-child,td:last-child{text-align:left}"
+    parts = [f"<!doctype html><meta charset=utf-8><title>Paths against evaluations</title><style>{style}</style>"]
+    parts.append("<h1>Paths against evaluations</h1>")
+    parts.append(
+        f"<p>{html.escape(device)}; {SIZE} pixels, {EPOCH * EPOCHS} samples each. <i>Gain</i>: error² x time of all paths at one wavelength a "
+        "channel, over that of the choice; <i>predicted</i>: by the pilot, before the render. Made by benches/tradeoff/run.</p>"
+    )
+    parts.append("<h2>Fewer wavelengths than channels: n of K a path</h2><p>Efficiency over that of all K, from the measured times.</p>")
+    parts.append(table(["scene", "n", "K", "efficiency"], [[f["scene"], f["n"], f["channels"], f["efficiency"]] for f in fewer(rows)]))
+    parts.append("<h2>Several wavelengths a channel, roulette on evaluation, auto</h2>")
+    parts.append(table(FIELDS, [[r.get(field) for field in FIELDS] for r in rows]))
+    parts.append("<h2>Gain against s</h2><p>Dots: measured. The first line of each scene's table above is all paths, gain 1.</p>")
+    parts.append(drawing(rows))
+    return "\n".join(parts)
+
+
+def drawing(rows):
+    """Gain of roulette against its scale s, both logarithmic, a colour a scene."""
+    colours = ["#1b6ca8", "#c0392b", "#27864b", "#8e5ea2", "#b7791f"]
+    width, height, left = 640, 320, 60
+    scenes = {}
+    for r in rows:
+        if r.get("scale") and "gain" in r:
+            scale = r["scale"]
+            scenes.setdefault((r["scene"], r["channels"]), {})[scale] = r["gain"]
+    scenes = {key: points for key, points in scenes.items() if len(points) > 2}
+    if not scenes:
+        return ""
+    every = [(s, g) for points in scenes.values() for s, g in points.items()]
+    span = [[math.log(min(p[i] for p in every)), math.log(max(p[i] for p in every))] for i in (0, 1)]
+    place = lambda value, i, size: (math.log(value) - span[i][0]) / (span[i][1] - span[i][0] or 1.0) * size
+    parts = [f'<svg viewBox="0 0 {width + left + 220} {height + 50}" width="{width + left + 220}" xmlns="http://www.w3.org/2000/svg">']
+    for value in sorted({round(math.exp(span[1][0]), 2), 1.0, round(math.exp(span[1][1]), 2)}):
+        y = height - place(value, 1, height - 20)
+        parts.append(f'<line x1="{left}" x2="{left + width}" y1="{y:.1f}" y2="{y:.1f}" stroke="#ccc"/><text x="5" y="{y + 4:.1f}">{value:g}</text>')
+    for number, ((scene, channels), points) in enumerate(scenes.items()):
+        colour = colours[number % len(colours)]
+        line = [(left + place(s, 0, width), height - place(g, 1, height - 20)) for s, g in sorted(points.items())]
+        parts.append(f'<polyline fill="none" stroke="{colour}" points="' + " ".join(f"{x:.1f},{y:.1f}" for x, y in line) + '"/>')
+        parts += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="{colour}"/>' for x, y in line]
+        parts.append(f'<text x="{left + width + 10}" y="{20 + 20 * number}" fill="{colour}">{html.escape(scene)}, {channels}</text>')
+    for value in sorted({s for s, _ in every}):
+        parts.append(f'<text x="{left + place(value, 0, width) - 10:.1f}" y="{height + 30}" font-size="11">{value:.3g}</text>')
+    return "".join(parts) + "</svg>"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    parser.add_argument("--spectile", required=True, help="the program")
+    parser.add_argument("--scene-folder", type=pathlib.Path, default=pathlib.Path("scenes"), help="where scenes are")
+    parser.add_argument("-o", "--output", type=pathlib.Path, default=pathlib.Path("out/tradeoff"))
+    parser.add_argument("--scenes", default=",".join(SCENES))
+    parser.add_argument("--channels", default="8,32,128,512")
+    parser.add_argument("--rounds", type=int, default=1)
+    arguments = parser.parse_args()
+    program = Program(arguments.spectile, arguments.scene_folder)
+    try:
+        devices = program.run("devices", "--json")
+        device = next((event["name"] for event in devices if "name" in event), "a device")
+        rows = measure(program, arguments.scenes.split(","), [int(k) for k in arguments.channels.split(",")], arguments.rounds)
+    finally:
+        shutil.rmtree(program.folder, ignore_errors=True)
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    with open(arguments.output / "tradeoff.csv", "w", newline="") as file:
+        writer = csv.DictWriter(file, FIELDS, extrasaction="ignore")
+        writer.writeheader()
+        writer.writerows(rows)
+    (arguments.output / "tradeoff.html").write_text(page(rows, device))
+
+
+if __name__ == "__main__":
+    main()
