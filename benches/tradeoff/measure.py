@@ -23,7 +23,7 @@ import tempfile
 # Scene, and the epochs and pixels that its noise asks for.
 SCENES = ["cornell/cornell", "statues/statues", "aircraft/aircraft", "conference/conference", "aircraft/aircraft-infrared"]
 EPOCH, EPOCHS = 16, 16
-SIZE = "48x30"
+SIZE = "32x20"
 
 
 class Choice:

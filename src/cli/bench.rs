@@ -63,6 +63,12 @@ pub struct Args {
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "pt,dpept-path,dpept-spectral,dpept-pixel", value_parser = parse_evaluator)]
     pub evaluators: Vec<Evaluator>,
 
+    /// Measure scenes with their own kernels only
+    ///
+    /// Kernels that have everything compiled in take a minute and more to compile on a software device.
+    #[arg(long)]
+    pub own_kernels: bool,
+
     /// Turns that each evaluator gets
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..))]
     pub rounds: u32,
@@ -165,7 +171,8 @@ fn steps<'a>(args: &Args, files: &'a [PathBuf]) -> Vec<Step<'a>> {
     let each = |part, channels, pool| files.iter().map(move |file| Step { part, file, channels, pool });
     let by_channels = args.channels.iter().flat_map(|&channels| each(Section::Channels, channels, None));
     let by_pool = args.pools.iter().flat_map(|&pool| each(Section::Pool, CHANNELS, Some(pool)));
-    by_channels.chain(each(Section::LeftOut, CHANNELS, None)).chain(by_pool).collect()
+    let left_out = each(Section::LeftOut, CHANNELS, None).filter(|_| !args.own_kernels);
+    by_channels.chain(left_out).chain(by_pool).collect()
 }
 
 fn measure_step(

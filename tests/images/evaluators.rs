@@ -98,7 +98,7 @@ fn the_same_paths_give_the_same_means() {
         ("infrared", general(37).channels(Channels::equal(1500.0, 5500.0, 37)).build()),
         ("everything, several wavelengths", several(general(4).build())),
     ];
-    for (what, scene) in size::first(5, scenes) {
+    for (what, scene) in size::first(3, scenes) {
         let samples = 64;
         let settings = Settings { seed: 3, ..Settings::default() };
         let expected = render(&with(&scene, Evaluator::DpeptPixel), 2, samples, settings);

@@ -214,13 +214,17 @@ fn every_scene_renders_a_small_picture_cleanly() {
         let channels = ["--set", "channels.equal.count=4", "--set", "channels.false_colour=[3,2,0]"];
         let channels = if size::is_full() { &[][..] } else { &channels };
         let small = [&["--size", "40x25", "--spp", "4"], channels].concat();
-        let output = run(out.path(), &[&["render", &scene, "-o", &path][..], &small].concat());
-        let clean = |output: &Output| output.status.success() && !words(output).contains("warning");
-        assert!(clean(&output), "{name}: {}", words(&output));
         let mut plan = binary::command(out.path(), &[&["plan", &scene][..], &small].concat());
         let plan = binary::output(binary::without_devices(&mut plan));
         let is_other = |line: &str| line.contains("warning") && !line.contains("no adapter that can run Spectile");
         assert!(plan.status.success() && !words(&plan).lines().any(is_other), "{name}: {}", words(&plan));
+        // The tour renders Cornell's box, and what the other aircraft has is in the infrared one.
+        if !size::is_full() && ["cornell", "aircraft"].contains(&name.as_str()) {
+            continue;
+        }
+        let output = run(out.path(), &[&["render", &scene, "-o", &path][..], &small].concat());
+        let clean = |output: &Output| output.status.success() && !words(output).contains("warning");
+        assert!(clean(&output), "{name}: {}", words(&output));
         let cube = Cube::open(&cube).expect("a cube");
         let mut lit = 0;
         for tile in 0..cube.grid().count() {

@@ -215,13 +215,19 @@ fn goodness(material: &Material, law: &Material, o: DVec3, inside: bool, rng: &m
 /// Directions follow the density that goes with them.
 #[test]
 fn directions_follow_their_density() {
-    assert_directions(&[direction(0.999, 0.3), direction(0.5, 2.5), direction(0.06, 5.5)]);
+    assert_directions(&[direction(0.5, 2.5), direction(0.06, 5.5)]);
 }
 
 #[test]
 #[ignore = "half a minute: more directions"]
 fn more_directions_follow_their_density() {
-    assert_directions(&[direction(0.8, 1.0), direction(0.25, 4.0), direction(0.65, 3.1), direction(0.01, 0.2)]);
+    assert_directions(&[
+        direction(0.999, 0.3),
+        direction(0.8, 1.0),
+        direction(0.25, 4.0),
+        direction(0.65, 3.1),
+        direction(0.01, 0.2),
+    ]);
 }
 
 /// Of every kind and side, Sidak over all.
