@@ -437,6 +437,15 @@ impl Header {
                 return refuse(key);
             }
         }
+        // Keys that programs add of their own, such as `scale factor`, nobody else applies.
+        let scales = |key: &str| ["scale", "gain", "factor", "multipl"].iter().any(|word| key.contains(word));
+        let is_one = |text: &str| split_list(text).iter().all(|number| number.parse() == Ok(1.0));
+        let own = |(key, (_, text)): &(&String, &(usize, String))| {
+            !KNOWN.contains(&key.as_str()) && scales(key) && !is_one(text)
+        };
+        if let Some((key, _)) = self.entries.iter().find(own) {
+            return refuse(key);
+        }
         if self.entries.contains_key("read procedures") {
             return refuse("read procedures");
         }

@@ -93,6 +93,11 @@ fn mistakes_name_their_line() {
             Some(5),
             "unit of a spectrum, but is `index`",
         ),
+        (
+            "ENVI\nsamples = 1\nlines = 1\ndata type = 2\nscale factor = 1000\n",
+            Some(5),
+            "`scale factor` is not applied",
+        ),
         ("ENVI\nsamples = 1\nlines = 1\nbands = 2\ndata type = 4\n", None, "lacks `interleave`"),
         ("ENVI\nsamples = 9999999999999\nlines = 9999999999999\ndata type = 4\n", None, "counted"),
     ] {
