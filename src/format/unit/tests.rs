@@ -161,6 +161,8 @@ fn units_in_names_of_columns() {
     for (name, kind, factor) in [
         ("Reflectance (%)", Kind::Number, 0.01),
         ("Reflectance %", Kind::Number, 0.01),
+        ("%R", Kind::Number, 0.01),
+        ("% Transmittance", Kind::Number, 0.01),
         ("Radiance [uW/cm2/sr/nm]", Kind::Radiance, 0.01),
         ("radiance W/m2/sr/um", Kind::Radiance, 1e-3),
         ("L (10^-3 W m-2 sr-1 nm-1)", Kind::Radiance, 1e-3),
@@ -189,6 +191,36 @@ fn units_in_names_of_columns() {
         assert_eq!(Stated::in_name(name).map(|stated| stated.meaning), Some(meaning), "{name}");
     }
     assert_eq!(Stated::in_name("wall, W").map(|stated| stated.certain), Some(false));
+}
+
+#[test]
+fn units_in_sentences() {
+    for (text, irradiance) in [
+        ("# wavelength [nm]   irradiance [mW/(m2 nm)]", Some(1e-3)),
+        ("# Second column: extraterrestrial irradiance in mW m-2 nm-1, at 1 AU.", Some(1e-3)),
+        ("# 2. irradiance (W/m2/um)", Some(1e-3)),
+        ("# nm W/m^2/nm", Some(1.0)),
+        ("# scaled to a total of 1366.1 W/m2", None),
+        ("# Kurucz, R. L., at 1.0 nm; W. M. Sr.", None),
+        ("# reflectance of oak in 2 nm steps", None),
+    ] {
+        let found = Stated::in_sentence(text).map(|stated| match stated.meaning {
+            Meaning::Unit(measure) => measure.to(Kind::Irradiance),
+            other => panic!("{other:?}"),
+        });
+        assert_eq!(found, irradiance.map(|factor| Some(Density::Plain(factor))), "{text}");
+    }
+}
+
+/// At 273.15 K and 1 atm a cubic metre of an ideal gas has Loschmidt's number of molecules, 2.686 780 111e25 (CODATA 2018).
+#[test]
+fn cross_sections_are_absorptions_at_a_temperature() {
+    let per_atm = |text: &str| parse(text).and_then(|measure| measure.cross_section_per_atmosphere(273.15));
+    for text in ["cm2/molecule", "cm^2 molecule^-1", "cm2"] {
+        let found = per_atm(text).unwrap_or_else(|| panic!("{text} is a cross section"));
+        assert!((found / 2.686_780_111e21 - 1.0).abs() < 1e-9, "{text}: {found}");
+    }
+    assert_eq!([per_atm("cm-1"), per_atm("cm2/g"), per_atm("K")], [None; 3]);
 }
 
 /// Lines whose wavelengths in air and in vacuum NIST's Atomic Spectra Database gives: Na D2, H alpha, Hg.
