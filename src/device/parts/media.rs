@@ -367,7 +367,7 @@ impl Media {
                 around.push(number);
             }
         }
-        around.extend((self.outer != NONE).then_some(self.outer + 1));
+        around.extend((self.outer != NONE).then(|| self.outer + 1));
         around
     }
 }
