@@ -374,6 +374,12 @@ impl Stated {
                 None => None,
             };
         }
+        // Nothing but a unit, and one of so many parts that no name is like it: photons/s/m2/nm/sr.
+        if let Some(measure) =
+            parse(&text).filter(|measure| measure.powers.iter().filter(|power| **power != 0).count() > 2)
+        {
+            return stated(Meaning::Unit(measure), true);
+        }
         if let Some(measure) = spectral_power_at_end(&text) {
             return stated(Meaning::Unit(measure), true);
         }

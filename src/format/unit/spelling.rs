@@ -360,6 +360,9 @@ fn symbol(name: &str) -> Option<Measure> {
             "cd" => Measure::of(LUMEN, 1.0).times(Measure::of(STERADIAN, 1.0), -1)?,
             "lx" => Measure::of(LUMEN, 1.0).times(Measure::of(METRE, 1.0), -2)?,
             "mol" => Measure::of(COUNT, 6.022_140_76e23),
+            "erg" => Measure::of(WATT, 1e-7).times(Measure::of(SECOND, 1.0), 1)?,
+            // 1e-26 W m-2 Hz-1
+            "Jy" => Measure::of(WATT, 1e-26).times(Measure::of(SECOND, 1.0), 1)?.times(Measure::of(METRE, 1.0), -2)?,
             _ => return None,
         })
     };

@@ -165,6 +165,9 @@ fn units_in_names_of_columns() {
         ("% Transmittance", Kind::Number, 0.01),
         ("Radiance [uW/cm2/sr/nm]", Kind::Radiance, 0.01),
         ("radiance W/m2/sr/um", Kind::Radiance, 1e-3),
+        // 1e-7 W, 1e4 cm2 a m2, 10 A a nm.
+        ("flux [erg/s/cm2/A]", Kind::Irradiance, 1e-2),
+        ("W/m2/nm/sr", Kind::Radiance, 1.0),
         ("L (10^-3 W m-2 sr-1 nm-1)", Kind::Radiance, 1e-3),
     ] {
         let Some(Stated { meaning: Meaning::Unit(measure), certain: true, .. }) = Stated::in_name(name) else {
@@ -172,6 +175,11 @@ fn units_in_names_of_columns() {
         };
         assert_eq!(measure.to(kind), Some(Density::Plain(factor)), "{name}");
     }
+    let jansky = parse("Jy").and_then(|measure| measure.to(Kind::Irradiance)).expect("an irradiance");
+    // At 500 nm c/λ² is 1.199169832e21 Hz a metre: 1e-26 W m-2 Hz-1 are 1.199169832e-14 W m-2 nm-1.
+    assert!((jansky.apply(1.0, 500.0) / 1.199_169_832e-14 - 1.0).abs() < 1e-12);
+    let photons = Stated::in_name("photons/s/m2/nm/sr").expect("a unit");
+    assert!(matches!(photons.meaning, Meaning::Unit(measure) if measure.to(Kind::Radiance).is_none()));
     for name in ["Sample #1", "leaf (upper side)", "oak (2/3)", "log, oak", "max x", "linen", "x2", "r2"] {
         assert_eq!(Stated::in_name(name), None, "{name}");
     }
