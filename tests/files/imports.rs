@@ -35,7 +35,7 @@ fn latin1(text: &str) -> Vec<u8> {
 
 /// A file of an ASD spectrometer, version 8, of three detectors, as its manufacturer describes the format: counts of a leaf and of
 /// the white reference as doubles.
-fn asd() -> Vec<u8> {
+pub fn asd() -> Vec<u8> {
     const CHANNELS: u16 = 21;
     let mut bytes = vec![0u8; 484];
     let mut put = |offset: usize, field: &[u8]| bytes[offset..offset + field.len()].copy_from_slice(field);
