@@ -232,6 +232,16 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
             other.display()
         ))?;
     }
+    if let (export::Format::Envi { .. } | export::Format::Exr { .. }, None) = (format, args.blocks)
+        && let Some([header, image]) = export::header_beside_exr(&args.output)
+    {
+        output.output.warn(&format!(
+            "{} and {} have one name: a GDAL that cannot read OpenEXR opens the latter as ENVI data, which it is not; give them \
+             different names if other programs read them",
+            header.display(),
+            image.display()
+        ))?;
+    }
     report(args, &view, format, &files, output)
 }
 

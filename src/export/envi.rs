@@ -52,6 +52,13 @@ pub fn other_header(path: &Path) -> Option<PathBuf> {
     other.exists().then_some(other)
 }
 
+/// A header of ENVI and an OpenEXR file that share a name, of which an export to `path` has just written one: where GDAL
+/// cannot read OpenEXR it takes its bytes for the header's data.
+pub fn header_beside_exr(path: &Path) -> Option<[PathBuf; 2]> {
+    let pair = ["hdr", "exr"].map(|extension| path.with_extension(extension));
+    (pair[1].exists() && is_header(&pair[0]).is_ok()).then_some(pair)
+}
+
 /// The data file of an export to `path`, which may name its header.
 fn data_of(path: &Path) -> PathBuf {
     let is_header = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("hdr"));

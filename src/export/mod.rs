@@ -81,7 +81,7 @@ pub fn write(view: &View, path: &Path, format: Format, progress: &mut Progress) 
 }
 
 pub use blocks::{BLOCKS, write as write_blocks};
-pub use envi::other_header;
+pub use envi::{header_beside_exr, other_header};
 pub use table::TABLE;
 
 /// Refuses what would not fit on the disk of `path`, where `bytes` are known to be written.

@@ -250,6 +250,15 @@ impl Header {
         values.checked_mul(self.data_type.bytes() as u64)?.checked_add(self.header_offset)
     }
 
+    /// What to say of a data file of `length` bytes that has more than its header describes: it may be that of another type.
+    pub fn surplus(&self, length: usize, path: &Path) -> Option<String> {
+        let expected = self.data_bytes().filter(|expected| length as u64 > *expected)?;
+        Some(format!(
+            "has {length} bytes in {}, of which its header describes {expected}: is it the right header?",
+            path.display()
+        ))
+    }
+
     /// The numbers in `bytes`, the content of the data file at `path`.
     pub fn data<'a>(&'a self, bytes: &'a [u8], path: &Path) -> Result<Data<'a>, Box<Problem>> {
         // That they can be counted was seen to when the header was read.
@@ -314,7 +323,8 @@ pub fn header_path(data: &Path) -> Option<PathBuf> {
 
 /// Reads a header; `path` stands in messages.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Header, Box<Problem>> {
-    let text = String::from_utf8_lossy(bytes);
+    // Also as programs of Macintosh and Windows end lines.
+    let text = String::from_utf8_lossy(bytes).replace("\r\n", "\n").replace('\r', "\n");
     let wrong = |line: Option<usize>, message: String, help: &str| wrong(path, line, message, help);
     let mut lines = (1..).zip(text.lines());
     if lines.next().is_none_or(|(_, line)| line.trim_start_matches('\u{feff}').trim() != "ENVI") {
@@ -436,6 +446,15 @@ impl Header {
             if self.list(key).unwrap_or_default().iter().any(|item| item.parse() != Ok(0)) {
                 return refuse(key);
             }
+        }
+        // Keys that programs add of their own, such as `scale factor`, nobody else applies.
+        let scales = |key: &str| ["scale", "gain", "factor", "multipl"].iter().any(|word| key.contains(word));
+        let is_one = |text: &str| split_list(text).iter().all(|number| number.parse() == Ok(1.0));
+        let own = |(key, (_, text)): &(&String, &(usize, String))| {
+            !KNOWN.contains(&key.as_str()) && scales(key) && !is_one(text)
+        };
+        if let Some((key, _)) = self.entries.iter().find(own) {
+            return refuse(key);
         }
         if self.entries.contains_key("read procedures") {
             return refuse("read procedures");

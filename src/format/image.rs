@@ -11,6 +11,7 @@ use exr::meta::MetaData;
 use exr::meta::attribute::SampleType;
 
 use super::primaries::Primaries;
+use super::table::shown;
 use crate::error::Problem;
 use crate::spectral::colour::srgb_decode;
 
@@ -104,7 +105,7 @@ impl<'i> Rgb<'i> {
                     return Ok(Some(Rgb::Colour(*rgb)));
                 }
                 let names: Vec<&str> = coloured.iter().map(|(layer, _)| *layer).collect();
-                return Err(format!("has colours in several layers: {}", names.join(", ")));
+                return Err(format!("has colours in several layers: {}", shown(&names.join(", "))));
             }
         }
         let named = |wanted: &str| planes.iter().any(|plane| plane.parts().1.eq_ignore_ascii_case(wanted));
@@ -254,7 +255,9 @@ fn png_colours(info: &png::Info) -> Colours {
 }
 
 fn exr(bytes: &[u8]) -> Result<Image, String> {
-    let wrong = |error: exr::error::Error| format!("is not a whole OpenEXR picture: {error}");
+    // An error may quote the names of the file, which hold anything.
+    let wrong =
+        |error: exr::error::Error| format!("is not a whole OpenEXR picture: {}", error.to_string().escape_debug());
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(wrong)?;
     let header = match &meta.headers[..] {
         [header] => header,
@@ -270,10 +273,12 @@ fn exr(bytes: &[u8]) -> Result<Image, String> {
     }
     for channel in &header.channels.list {
         if channel.sample_type == SampleType::U32 {
-            return Err(format!("has whole numbers in channel {}, but halfs or floats are needed", channel.name));
+            let name = shown(&channel.name.to_string());
+            return Err(format!("has whole numbers in channel {name}, but halfs or floats are needed"));
         }
         if (channel.sampling.x(), channel.sampling.y()) != (1, 1) {
-            return Err(format!("has channel {} at a lower resolution, which is not read", channel.name));
+            let name = shown(&channel.name.to_string());
+            return Err(format!("has channel {name} at a lower resolution, which is not read"));
         }
     }
 
@@ -379,14 +384,14 @@ pub mod tests {
     fn what_is_no_picture_is_refused() {
         let good = encode_png([4, 4], png::ColorType::Rgb, png::BitDepth::Eight, &[7; 48]);
         let exr = encode_exr([4, 4], vec![("Y", FlatSamples::F32(vec![1.0; 16]))]);
-        let whole = encode_exr([1, 1], vec![("id", FlatSamples::U32(vec![1]))]);
+        let whole = encode_exr([1, 1], vec![("a\nb", FlatSamples::U32(vec![1]))]);
         for (bytes, words) in [
             (&b""[..], "neither"),
             (b"#?RADIANCE", "neither"),
             (&good[..40], "not a whole PNG"),
             (&exr[..exr.len() - 9], "not a whole OpenEXR"),
             (&exr[..20], "not a whole OpenEXR"),
-            (&whole, "whole numbers in channel id"),
+            (&whole, "whole numbers in channel a\\nb"),
         ] {
             let message = parse(bytes).unwrap_err();
             assert!(message.contains(words), "{message}");

@@ -7,6 +7,7 @@ use quick_xml::Reader;
 use quick_xml::events::Event;
 use serde_json::Value;
 
+use super::asd;
 use super::table::{self, shown};
 use super::text::{Column, SpectrumTable, ascending, named};
 use super::unit::{self, Stated, Unit};
@@ -23,6 +24,8 @@ pub enum Format {
     RawToAces,
     /// JSON of RADIS.
     Radis,
+    /// Analytical Spectral Devices, binary.
+    Asd,
     /// Spectra Vista.
     Svc,
     /// Spectral Evolution.
@@ -39,27 +42,7 @@ fn wrong<T>(path: &Path, line: Option<usize>, message: impl Into<String>, help: 
 }
 
 /// Formats by how they begin: bytes, what it is, and what to do.
-const MAGIC: [(&[u8], &str, &str); 10] = [
-    (
-        b"ASD",
-        "a binary file of an ASD spectrometer",
-        "export it as text: wavelengths in nm and reflectance or radiance",
-    ),
-    (
-        b"as6",
-        "a binary file of an ASD spectrometer",
-        "export it as text: wavelengths in nm and reflectance or radiance",
-    ),
-    (
-        b"as7",
-        "a binary file of an ASD spectrometer",
-        "export it as text: wavelengths in nm and reflectance or radiance",
-    ),
-    (
-        b"as8",
-        "a binary file of an ASD spectrometer",
-        "export it as text: wavelengths in nm and reflectance or radiance",
-    ),
+const MAGIC: [(&[u8], &str, &str); 6] = [
     (b"\x89HDF", "an HDF5 or netCDF-4 file", "write the spectrum as CSV: `nm,value`"),
     (b"CDF\x01", "a netCDF file", "write the spectrum as CSV: `nm,value`"),
     (b"CDF\x02", "a netCDF file", "write the spectrum as CSV: `nm,value`"),
@@ -72,6 +55,17 @@ impl Format {
     /// The format of a file that is none of the others.
     pub fn of(path: &Path, bytes: &[u8]) -> Option<Format> {
         let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
+        if name.contains("spccoeff") || name.contains("taucoeff") {
+            let help = "take the instrument's responses as text, e.g. of its agency: `wavenumber (cm-1),response`";
+            return Some(Format::Refused("a file of coefficients of CRTM, not of responses or spectra", help));
+        }
+        if name.starts_with("rtcoef_") && !name.contains("srf") {
+            let help = "take the responses, rtcoef_…_srf_chNN.txt of the same instrument";
+            return Some(Format::Refused("a file of coefficients of RTTOV, not of responses or spectra", help));
+        }
+        if asd::is_asd(bytes) {
+            return Some(Format::Asd);
+        }
         if let Some((_, what, help)) = MAGIC.iter().find(|(magic, ..)| bytes.starts_with(magic)) {
             return Some(Format::Refused(what, help));
         }
@@ -80,6 +74,10 @@ impl Format {
         let start = start.trim_start_matches('\u{feff}').trim_start();
         if name.ends_with(".spdx") || start.contains("<IESTM2714") || start.contains("<IESTM27") {
             return Some(Format::Spdx);
+        }
+        if start.starts_with("##TITLE") || start.contains("\n##JCAMP-DX") {
+            let help = "export it as text in columns: wavelengths and values";
+            return Some(Format::Refused("JCAMP-DX, whose numbers are packed and scaled by its header", help));
         }
         if start.starts_with('{') {
             if start.contains("\"spectral_data\"") {
@@ -103,6 +101,10 @@ impl Format {
         if name.starts_with("rtcoef_") && name.contains("srf") {
             return Some(Format::Rttov);
         }
+        if name.ends_with(".header") && start.starts_with('{') && start.contains("\"table_name\"") {
+            let help = "compute absorption coefficients from its lines, and write them over wavenumber: `nu (cm-1),coef (cm-1)`";
+            return Some(Format::Refused("the header of a list of spectral lines of HAPI", help));
+        }
         if is_line_list(untrimmed) {
             let help =
                 "compute absorption coefficients from it, e.g. with HAPI or RADIS, and write them over wavelength";
@@ -118,9 +120,9 @@ impl Format {
                 let read = |name: String| Ok((name.clone(), rawtoaces(bytes, path, Column::Named(&name))?));
                 names.into_iter().map(read).collect()
             })),
-            Format::Rttov => {
+            Format::Rttov | Format::Asd => {
                 let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-                Some(rttov(bytes, path).map(|table| vec![(name, table)]))
+                Some(self.read(bytes, path, Column::Only).map(|table| vec![(name, table)]))
             }
             Format::Refused(..) => Some(self.read(bytes, path, Column::Only).map(|_| Vec::new())),
             _ => None,
@@ -133,6 +135,7 @@ impl Format {
             Format::Spdx => spdx(bytes, path, column),
             Format::RawToAces => rawtoaces(bytes, path, column),
             Format::Radis => radis(bytes, path, column),
+            Format::Asd => asd::read(bytes, path, column),
             Format::Svc => svc(bytes, path, column),
             Format::SpectralEvolution => spectral_evolution(bytes, path, column),
             Format::Rttov => rttov(bytes, path).and_then(|table| no_columns(path, column).map(|()| table)),
@@ -148,7 +151,8 @@ fn is_line_list(start: &str) -> bool {
         // The isotopologue is a letter where there are more than nine.
         let molecule = line.get(..2).is_some_and(|id| id.trim().parse::<u32>().is_ok());
         let wavenumber = line.get(3..15).is_some_and(|text| text.trim().parse::<f64>().is_ok());
-        line.len() == 160 && molecule && wavenumber
+        // HAPI adds columns behind.
+        line.len() >= 160 && molecule && wavenumber
     };
     lines.next().is_some_and(is_line) && lines.take(1).all(is_line)
 }
@@ -158,7 +162,7 @@ fn no_columns(path: &Path, wanted: Column) -> Read<()> {
 }
 
 /// The one among `names` that is wanted; numbers count from `first`.
-fn pick(names: &[String], wanted: Column, default: Option<usize>, first: usize, path: &Path) -> Read<usize> {
+pub(super) fn pick(names: &[String], wanted: Column, default: Option<usize>, first: usize, path: &Path) -> Read<usize> {
     let list = || names.join(", ");
     match wanted {
         Column::Only if names.len() == 1 => Ok(0),
@@ -501,96 +505,4 @@ pub fn rttov(bytes: &[u8], path: &Path) -> Read<SpectrumTable> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn read(name: &str, text: &str, column: Option<&str>) -> Read<SpectrumTable> {
-        let path = Path::new(name);
-        let format = Format::of(path, text.as_bytes()).unwrap_or_else(|| panic!("{name} is not known"));
-        format.read(text.as_bytes(), path, column.into())
-    }
-
-    const SPDX: &str = "<?xml version=\"1.0\"?>\n<IESTM2714 xmlns=\"http://www.ies.org/iestm2714\" version=\"1.0\">\n<Header>\n\
-        <Manufacturer>made up</Manufacturer></Header>\n<SpectralDistribution>\n<SpectralQuantity>irradiance</SpectralQuantity>\n\
-        <SpectralData wavelength=\"400\">0.5</SpectralData>\n<SpectralData wavelength=\"405.5\">0.75</SpectralData>\n\
-        </SpectralDistribution>\n</IESTM2714>\n";
-    const CAMERA: &str = r#"{"header": {"manufacturer": "made up"}, "spectral_data": {"units": "relative",
-        "index": {"main": ["R", "G", "B"]}, "data": {"main": {"400": [0.1, 0.2, 0.3], "380": [0.0, 0.1, 0.2], "1000": [1, 2, 3]}}}}"#;
-    const RADIS: &str = r#"{"arrays": {"wavespace": [2000.0, 2500.0], "radiance_noslit": [1.0, 2.0], "abscoeff": [3.0, 4.0]},
-        "units": {"radiance_noslit": "mW/cm2/sr/cm-1", "abscoeff": "cm-1"}, "conditions": {"waveunit": "cm-1"}}"#;
-    const SIG: &str = "/*** Spectra Vista SIG Data ***/\nname= made up\nunits= Radiance, Radiance\ndata=\n\
-        350.0  2000.0  1000.0  50.00\n400.0  3000.0  600.0  20.00\n";
-    const SED: &str = "Comment:\nVersion: 2.3\nUnits: W/m^2/sr/nm\nChannels: 2\nColumns [4]:\nData:\n\
-        Wvl\tRad. (Ref.)\tRad. (Target)\tReflect. %\n350\t0.5\t0.25\t50.0\n351\t0.5\t0.10\t20.0\n";
-
-    #[test]
-    fn each_is_read_with_its_units() {
-        let lamp = read("lamp.spdx", SPDX, None).unwrap();
-        let density = |table: &SpectrumTable, kind| match table.unit.as_ref()?.meaning {
-            unit::Meaning::Unit(measure) => measure.to(kind),
-            _ => None,
-        };
-        assert_eq!(density(&lamp, unit::Kind::Irradiance), Some(unit::Density::Plain(1.0)));
-        assert_eq!((lamp.nm, lamp.value, lamp.line), (vec![400.0, 405.5], vec![0.5, 0.75], vec![7, 8]));
-        let green = read("camera.json", CAMERA, Some("g")).unwrap();
-        assert_eq!((green.nm, green.value), (vec![380.0, 400.0, 1000.0], vec![0.1, 0.2, 2.0]));
-        let gas = read("co2.spec", RADIS, Some("abscoeff")).unwrap();
-        assert_eq!(density(&gas, unit::Kind::Absorption), Some(unit::Density::Plain(100.0)));
-        assert_eq!((gas.nm, gas.value), (vec![4000.0, 5000.0], vec![4.0, 3.0]));
-        let radiance = read("co2.spec", RADIS, Some("radiance_noslit")).unwrap();
-        // 1 mW cm-2 sr-1 / cm-1 at 2000 cm-1: 10 W m-2 sr-1 / cm-1, and 1e7/5000² = 0.4 cm-1 a nm.
-        let per_nm = density(&radiance, unit::Kind::Radiance).unwrap().apply(1.0, 5000.0);
-        assert!((per_nm - 4.0).abs() < 1e-12, "{per_nm}");
-        let leaf = read("leaf.sig", SIG, None).unwrap();
-        assert_eq!((leaf.nm, leaf.value, leaf.line), (vec![350.0, 400.0], vec![0.5, 0.2], vec![5, 6]));
-        // 1000 x 1e-10 W cm-2 = 1e-3 W m-2.
-        assert!((read("leaf.sig", SIG, Some("target")).unwrap().value[0] - 1e-3).abs() < 1e-18);
-        let leaf = read("leaf.sed", SED, None).unwrap();
-        assert_eq!(density(&leaf, unit::Kind::Number), Some(unit::Density::Plain(0.01)));
-        assert_eq!((leaf.nm, leaf.value), (vec![350.0, 351.0], vec![50.0, 20.0]));
-        assert_eq!(read("leaf.sed", SED, Some("Rad. (Target)")).unwrap().value, [0.25, 0.1]);
-        let text = "GOES-99 ABI channel 13\nmade up\n  wavenumber  response\n 950.0  0.5\n 1000.0 1.0\n";
-        let band = read("rtcoef_goes_99_abi_srf_ch13.txt", text, None).unwrap();
-        assert!((band.nm[1] - 1e7 / 950.0).abs() < 1e-9 && band.value == [1.0, 0.5], "{band:?}");
-    }
-
-    #[test]
-    fn air_is_converted_where_a_file_says_so() {
-        let text = RADIS.replace("\"cm-1\"}}", "\"nm\"}}").replace("[2000.0, 2500.0]", "[500.0, 589.0]");
-        let air = read("a.spec", &text, Some("abscoeff")).unwrap();
-        // n - 1 of standard air at 589 nm is 2.7643e-4 (Ciddor 1996, table 1 gives 1.000276… for dry air at 15 °C).
-        assert!((air.nm[1] / 589.0 - 1.0 - 2.77e-4).abs() < 1e-6, "{:?}", air.nm);
-        let vacuum = text.replace("\"nm\"}}", "\"nm_vac\"}}");
-        assert_eq!(read("a.spec", &vacuum, Some("abscoeff")).unwrap().nm, [500.0, 589.0]);
-    }
-
-    #[test]
-    fn what_is_not_read_is_named() {
-        let par = format!("{:<160}\n", " 21  667.380000 1.0E-19 2.0E+00");
-        for (name, bytes, words) in [
-            ("leaf.asd", &b"ASD\0\0binary"[..], "ASD spectrometer"),
-            ("a.nc", b"\x89HDF\r\n", "netCDF-4"),
-            ("a.xlsx", b"PK\x03\x04", "spreadsheet"),
-            ("a.csv", b"\x1f\x8b\x08", "gzip"),
-            ("02_hit.par", par.as_bytes(), "lines of HITRAN"),
-        ] {
-            let path = Path::new(name);
-            let format = Format::of(path, bytes).unwrap_or_else(|| panic!("{name} is not known"));
-            let problem = format.read(bytes, path, Column::Only).unwrap_err();
-            assert!(problem.message.contains(words) && problem.help.is_some(), "{problem}");
-        }
-        for (name, text, column, words) in [
-            ("lamp.spdx", SPDX.replace("405.5", "x"), None, "without a `wavelength`"),
-            ("lamp.spdx", SPDX.replace("</IESTM2714>", ""), None, "ends within"),
-            ("camera.json", CAMERA.to_owned(), None, "has 3 spectra"),
-            ("camera.json", CAMERA.to_owned(), Some("X"), "no column \"X\""),
-            ("leaf.sig", SIG.replace("Radiance, Radiance", "Counts, Counts"), Some("target"), "no radiance"),
-            ("leaf.sig", SIG.replace("400.0", "340.0"), None, "next detector"),
-            ("leaf.sed", SED.replace("\nData:", "\nDaten:"), None, "no line `Data:`"),
-        ] {
-            let problem = read(name, &text, column).unwrap_err();
-            assert!(problem.message.contains(words), "{name}: {problem}");
-        }
-        assert_eq!(Format::of(Path::new("a.csv"), b"nm,value\n400,1\n"), None);
-    }
-}
+mod tests;

@@ -1,5 +1,6 @@
 //! Readers and writers of other people's formats; they know no GPU.
 
+pub mod asd;
 pub mod csv_table;
 pub mod envi;
 pub mod image;

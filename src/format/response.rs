@@ -7,7 +7,7 @@ use super::instrument::Format;
 use super::noise::{self, Range};
 use super::table;
 use super::text::{SpectrumTable, ascending, read};
-use super::unit::{self, Meaning, Stated, Unit};
+use super::unit::{self, Density, Kind, Meaning, Stated, Unit};
 use crate::error::Problem;
 use crate::spectral::Response;
 
@@ -85,8 +85,33 @@ pub fn parse_responses(bytes: &[u8], path: &Path) -> Result<Responses, Box<Probl
     if tables.is_empty() {
         return Err(wrong(None, "holds no responses".into(), ""));
     }
+    if !is_long {
+        let (others, responses): (Vec<_>, Vec<_>) = tables.into_iter().partition(|(name, _)| is_no_response(name));
+        tables = responses;
+        notes.extend(
+            others.iter().map(|(name, _)| {
+                format!("has a column \"{}\" that is no response: it is left out", name.escape_debug())
+            }),
+        );
+        if tables.is_empty() {
+            return Err(wrong(None, "holds no responses".into(), ""));
+        }
+    }
+    let value_name = |name: &str| if is_long { table.names[2].clone() } else { name.to_owned() };
+    for (name, table) in &mut tables {
+        let named = value_name(name);
+        apply_unit(&named, table);
+        notes.extend(per_photon(&named, table).then(|| {
+            format!(
+                "gives quantum efficiencies as \"{}\", per photon: they are multiplied by the wavelength, as responses are \
+                 per energy",
+                named.escape_debug()
+            )
+        }));
+    }
+    notes.dedup();
     let is_logarithm = |name: &str| Stated::in_name(name).is_some_and(|stated| stated.meaning == Meaning::Logarithm);
-    if let Some((name, _)) = tables.iter().find(|(name, _)| is_logarithm(name)) {
+    if let Some((name, _)) = tables.iter().find(|(name, _)| is_logarithm(&value_name(name))) {
         let message = format!("gives logarithms as the responses \"{}\"", name.escape_debug());
         return Err(wrong(Some(table.line), message, "write the responses themselves"));
     }
@@ -96,6 +121,35 @@ pub fn parse_responses(bytes: &[u8], path: &Path) -> Result<Responses, Box<Probl
         return Err(wrong(Some(table.line), message, "give each its own name"));
     }
     responses(tables, notes, path)
+}
+
+/// Whether a column is another axis, as NOAA's files have one, or the uncertainty of the one before, as those of Landsat.
+fn is_no_response(name: &str) -> bool {
+    let lower = name.to_lowercase();
+    let first = lower.split(|c: char| !c.is_alphabetic()).find(|word| !word.is_empty()).unwrap_or("");
+    ["wavelength", "wavenumber", "frequency", "stdev", "stddev", "sd", "uncertainty", "sigma"].contains(&first)
+}
+
+/// Percent become shares.
+fn apply_unit(name: &str, table: &mut SpectrumTable) {
+    if let Some(Stated { meaning: Meaning::Unit(measure), certain: true, .. }) = Stated::in_name(name)
+        && let Some(Density::Plain(factor)) = measure.to(Kind::Number)
+    {
+        table.value.iter_mut().for_each(|value| *value *= factor);
+    }
+}
+
+/// Makes a response to photons one to energy, A/W, if its name says that it is one; whether it did.
+fn per_photon(name: &str, table: &mut SpectrumTable) -> bool {
+    // Of a quantum efficiency of 1 each photon gives one charge: λ / 1239.84 nm amperes a watt (h c / e).
+    const NM_VOLT: f64 = 6.626_070_15e-34 * 299_792_458.0 / 1.602_176_634e-19 * 1e9;
+    let lower = name.to_lowercase();
+    let mut words = lower.split(|c: char| !c.is_alphanumeric());
+    let is = words.any(|word| ["qe", "eqe", "iqe", "ipce", "quantum", "photon", "photons"].contains(&word));
+    if is {
+        table.value.iter_mut().zip(&table.nm).for_each(|(value, nm)| *value *= nm / NM_VOLT);
+    }
+    is
 }
 
 fn responses(tables: Vec<(String, SpectrumTable)>, notes: Vec<String>, path: &Path) -> Result<Responses, Box<Problem>> {
@@ -157,6 +211,36 @@ mod tests {
         assert_eq!(wide, long);
         assert_eq!(wide.named[1].1.integral(), 75.0);
         assert!(wide.warnings.is_empty());
+    }
+
+    #[test]
+    fn percent_and_quantum_efficiencies_are_applied() {
+        let share = parse("nm,red\n400,0\n500,0.5\n600,0\n").unwrap();
+        for text in ["nm,red (%)\n400,0\n500,50\n600,0\n", "band,nm,response [%]\nred,400,0\nred,500,50\nred,600,0\n"] {
+            let percent = parse(text).unwrap();
+            assert_eq!(percent.named[0].1, share.named[0].1, "{text}");
+            assert!(percent.warnings.is_empty());
+        }
+        // A silicon diode at 1239.84 nm and an efficiency of 1: 1 A/W; at half of that 0.5 A/W.
+        let photons = parse("nm,QE\n619.920992,1\n1239.841984,1\n").unwrap();
+        assert!(photons.warnings[0].contains("multiplied by the wavelength"), "{:?}", photons.warnings);
+        let mean = photons.named[0].1.integral() / (1_239.841_984 - 619.920_992);
+        assert!((mean - 0.75).abs() < 1e-9, "{mean}");
+        assert!(parse("band,nm,log10 response\na,400,1\na,500,2\n").unwrap_err().message.contains("logarithms"));
+    }
+
+    /// NOAA's files of ABI, and USGS's of Landsat 8.
+    #[test]
+    fn columns_that_are_no_responses_are_left_out() {
+        let abi = parse(
+            "Wavelength (um)   Wavenumber (cm-1)   Response\n0.50 20000 0.1\n0.51 19607.8 1.0\n0.52 19230.8 0.1\n",
+        )
+        .unwrap();
+        assert_eq!(abi.named.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), ["Response"]);
+        assert!(abi.warnings[0].contains("Wavenumber") && abi.warnings[0].contains("left out"), "{:?}", abi.warnings);
+        let oli = parse("Wavelength,BA RSR [watts],STDEV[+/-]\n500,0.1,0.01\n510,1,0.02\n520,0.1,0.01\n").unwrap();
+        assert_eq!((oli.named.len(), oli.warnings.len()), (1, 1));
+        assert!(parse("nm,wavenumber\n500,20000\n510,19607\n").unwrap_err().message.contains("no responses"));
     }
 
     #[test]

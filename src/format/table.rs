@@ -5,7 +5,7 @@ use std::path::Path;
 
 use csv::{ReaderBuilder, StringRecord, Trim};
 
-use super::unit::{self, Unit};
+use super::unit::{self, Stated, Unit};
 use crate::error::Problem;
 
 type Read<T> = Result<T, Box<Problem>>;
@@ -21,6 +21,8 @@ pub struct Table<'p> {
     pub rows: Vec<Row>,
     /// What was left out or mended, in words that go on after the file's name.
     pub notes: Vec<String>,
+    /// The unit of power that the comments before the numbers speak of, and the line of the first that does.
+    pub unit_in_comment: Option<(usize, Stated)>,
     decimal: Decimal,
 }
 
@@ -89,7 +91,8 @@ fn is_comment(line: &str) -> bool {
     let starts = |mark: &str| {
         line.starts_with(mark) && !NOT_GIVEN.iter().any(|cell| !cell.is_empty() && lower_starts(line, cell))
     };
-    starts("#") || line.starts_with('%') || line.starts_with('!') || line.starts_with("//")
+    // Ocean Optics puts `>>>>>Begin Spectral Data<<<<<` and an end around its numbers.
+    starts("#") || line.starts_with(">>>>>") || line.starts_with('%') || line.starts_with('!') || line.starts_with("//")
 }
 
 fn lower_starts(line: &str, cell: &str) -> bool {
@@ -238,7 +241,8 @@ pub fn parse<'p>(text: &str, first_line: usize, path: &'p Path) -> Read<Table<'p
     if rows.is_empty() {
         return Err(wrong(path, None, "holds no data".to_owned(), "write lines of `nm,value`"));
     }
-    let mut table = Table { path, names: Vec::new(), line: rows[0].line, rows, notes: Vec::new(), decimal };
+    let mut table =
+        Table { path, names: Vec::new(), line: rows[0].line, rows, notes: Vec::new(), unit_in_comment: None, decimal };
     table.find_header(separator, &comments)?;
     Ok(table)
 }
@@ -375,6 +379,7 @@ impl Table<'_> {
         }
         self.look_at_preamble(preamble)?;
         self.warn_of_units_in_comments(&names, start, comments);
+        self.unit_in_comment = self.unit_of_comments(start, comments);
         if names.is_empty() {
             self.line = self.rows.get(start).map_or(self.line, |row| row.line);
         }
@@ -504,6 +509,16 @@ impl Table<'_> {
                 .push(format!("{lines} left out: `{}`", shown(&first.cells.iter().collect::<Vec<_>>().join(" "))));
         }
         Ok(())
+    }
+
+    /// The unit of spectral power in the comments, as those of libRadtran's solar spectra have it, if it is the same in all that
+    /// speak of one.
+    fn unit_of_comments(&self, start: usize, comments: &[(usize, &str)]) -> Option<(usize, Stated)> {
+        let first = self.rows.get(start).map_or(usize::MAX, |row| row.line);
+        let before = comments.iter().filter(|(line, _)| *line < first);
+        let mut found = before.filter_map(|(line, text)| Some((*line, Stated::in_sentence(text)?)));
+        let one = found.next()?;
+        found.all(|(_, other)| other.meaning == one.1.meaning).then_some(one)
     }
 
     /// A comment that speaks of another unit than nm, where nothing else says the unit.

@@ -5,7 +5,7 @@ use std::fmt::Debug;
 use std::path::Path;
 
 use super::table::{self, Table};
-use super::unit::{self, Stated, Unit};
+use super::unit::{self, Meaning, Stated, Unit};
 use super::{csv_table, instrument, library, modtran};
 use crate::error::Problem;
 use crate::spectral::Channels;
@@ -198,8 +198,13 @@ impl Axis {
             Some(unit) => unit,
             None => stated.map(|unit| unit.unwrap_or(Unit::NANOMETRE)).map_err(|other| {
                 let message = format!("gives its first column as {other}, from which no wavelength follows");
-                let help =
-                    "name wavelength and unit in the header: nm, um, angstrom, cm-1, THz, eV; or write `unit = \"nm\"`";
+                let second = table.names.get(1).map(|name| name.to_lowercase()).unwrap_or_default();
+                let help = if second.starts_with("coef") {
+                    "of HAPI's absorption coefficients say the units: `nu (cm-1),coef (cm-1)`, or for a species \
+                     `nu (cm-1),300 K (cm2/molecule)`"
+                } else {
+                    "name wavelength and unit in the header: nm, um, angstrom, cm-1, THz, eV; or write `unit = \"nm\"`"
+                };
                 table.problem(Some(table.line), message, help)
             })?,
         };
@@ -239,7 +244,13 @@ impl Axis {
             Column::Only if others.len() == 1 => Ok(others[0]),
             Column::Only if table.names.is_empty() => {
                 let message = format!("has {} columns and no header line", table.columns());
-                let help = "pick one by its number: `column = 2` is the one after the wavelengths";
+                let help = if table.columns() == 7 {
+                    "pick one by its number: `column = 2` is the one after the wavelengths (if this is output of libRadtran's \
+                     uvspec: lambda, edir, edn, eup, uavgdir, uavgdn, uavgup, in the unit of its solar spectrum, mostly \
+                     mW m-2 nm-1: `scale = 0.001`)"
+                } else {
+                    "pick one by its number: `column = 2` is the one after the wavelengths"
+                };
                 Err(table.problem(Some(table.line), message, help))
             }
             Column::Only => {
@@ -262,6 +273,9 @@ impl Axis {
         wanted: &[usize],
         of: impl Fn(usize) -> String,
     ) -> Result<Vec<(usize, SpectrumTable)>, Box<Problem>> {
+        for column in wanted {
+            self.check_axis_of(table, *column)?;
+        }
         let mut found: Vec<SpectrumTable> = vec![SpectrumTable::default(); wanted.len()];
         for row in &table.rows {
             table.check_row(row)?;
@@ -277,6 +291,13 @@ impl Axis {
             let name = table.names.get(*column).map_or("", String::as_str);
             found.unit = Stated::in_name(name);
             found.notes.clone_from(&self.notes);
+            if let (None, 2, Some((line, stated))) = (&found.unit, table.columns(), &table.unit_in_comment) {
+                if !matches!(stated.meaning, Meaning::Unit(measure) if measure.is_own()) {
+                    let text = table::shown(&stated.text);
+                    found.notes.push(format!("says the unit of its values in the comment on line {line}: `{text}`"));
+                }
+                found.unit = Some(stated.clone());
+            }
             found.notes.extend(self.looks_like_micrometres(&found.nm));
             if self.in_air {
                 found.notes.push(
@@ -286,6 +307,25 @@ impl Axis {
             Ok((*column, ascending(found, table.path, &of(*column))?))
         };
         wanted.iter().zip(found).map(finish).collect()
+    }
+
+    /// Refuses a column that stands after wavelengths of its own, as spectrophotometers write a sample beside the other, unless
+    /// they are the same.
+    fn check_axis_of(&self, table: &Table, column: usize) -> Result<(), Box<Problem>> {
+        let name = |column: usize| table.names.get(column).map_or("", String::as_str);
+        let begins_as_axis = |other: &usize| !name(*other).is_empty() && name(*other) == name(self.column);
+        let Some(other) = (self.column + 1..column).rev().find(begins_as_axis) else { return Ok(()) };
+        for row in &table.rows {
+            if table.number(row, other)? != table.number(row, self.column)? {
+                let message = format!(
+                    "gives column {} over wavelengths of its own, those of column {}, which differ from the first column's here",
+                    column + 1,
+                    other + 1
+                );
+                return Err(table.problem(Some(row.line), message, "put each spectrum into a file of its own"));
+            }
+        }
+        Ok(())
     }
 
     /// What to say of wavelengths in nm that nobody has there.
@@ -453,122 +493,4 @@ pub(super) fn named(name: &str) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn csv(text: &str, column: Option<&str>) -> Result<SpectrumTable, Box<Problem>> {
-        parse_spectrum(text.as_bytes(), Path::new("t.csv"), column)
-    }
-
-    #[test]
-    fn reads_the_common_layouts() {
-        for text in [
-            "400,0.5\n500,0.75\n",
-            "# about\nwavelength_nm,value\n400,0.5\n\n500,0.75 # end\n",
-            "\u{feff}nm;r\r\n400;0.5\r\n500;0.75",
-            "nm\tr\n400\t0.5\n500\t0.75",
-            "\"wavelength (um)\",\"r\"\n0.5,0.75\n0.4,0.5",
-            "wavenumber_cm-1,r\n20000,0.75\n25000,0.5",
-            "\u{3bb} (\u{c5}),r\n4000,0.5\n5000,0.75",
-            ",nm,r\n0,400,0.5\n1,500,0.75",
-            "# wavelength_um,r\n0.4,0.5\n0.5,0.75",
-            "400 0.5\n500   0.75",
-        ] {
-            let table = csv(text, None).unwrap();
-            assert_eq!((table.nm, table.value), (vec![400.0, 500.0], vec![0.5, 0.75]), "{text}");
-        }
-        let spd = parse_spectrum(b"400 0.5 # x\n500 0.75", Path::new("t.SPD"), None).unwrap();
-        assert_eq!((spd.nm, spd.line), (vec![400.0, 500.0], vec![1, 2]));
-    }
-
-    #[test]
-    fn picks_columns_and_skips_what_is_not_given() {
-        let text = "nm,a,b\n400,1,\n500,2,5\n600,3,6\n";
-        assert_eq!(csv(text, Some("a")).unwrap().value, [1.0, 2.0, 3.0]);
-        let b = csv(text, Some("b")).unwrap();
-        assert_eq!((b.nm, b.value, b.line), (vec![500.0, 600.0], vec![5.0, 6.0], vec![3, 4]));
-        assert!(csv(text, None).unwrap_err().help.unwrap().contains("a, b"));
-        assert!(csv(text, Some("c")).unwrap_err().help.unwrap().contains("a, b"));
-        let number = |text: &str, column| parse(text.as_bytes(), Path::new("t.csv"), column, None);
-        assert_eq!(number("400,1,2\n500,3,4\n", Column::Number(3)).unwrap().value, [2.0, 4.0]);
-        assert_eq!(number("400,1,2\n500,3,4\n", Column::Named("2")).unwrap().value, [1.0, 3.0]);
-        for wrong in [0, 1, 4] {
-            assert!(number("400,1,2\n500,3,4\n", Column::Number(wrong)).unwrap_err().help.unwrap().contains("2 to 3"));
-        }
-        let in_um = |text: &str| parse(text.as_bytes(), Path::new("t.csv"), Column::Only, Some(Unit::MICROMETRE));
-        assert_eq!(in_um("Frequency,v\n0.4,1\n0.5,3\n").unwrap().nm, [400.0, 500.0]);
-        assert_eq!(in_um("wl (um),v\n0.4,1\n0.5,3\n").unwrap().nm, [400.0, 500.0]);
-        assert!(in_um("nm,v\n400,1\n500,3\n").unwrap_err().message.contains("the scene says another unit"));
-        let twice = number("nm,v,v\n400,1,2\n500,1,2", Column::Named("v")).unwrap_err();
-        assert!(twice.message.contains("several columns") && twice.help.unwrap().contains("`column = 2` or 3"));
-    }
-
-    #[test]
-    fn an_index_is_two_columns() {
-        let index = |text: &str| parse_index(text.as_bytes(), Path::new("nk.csv"));
-        for text in
-            ["400,1.5,0\n500,1.4,0.25\n", "k,nm,x\n400,1,2\n500,1,2\n", "um,k,x,n\n0.4,0,9,1.5\n0.5,0.25,,1.4\n"]
-        {
-            match index(text) {
-                Ok([Some(n), Some(k)]) => {
-                    assert_eq!((n.nm, n.value), (vec![400.0, 500.0], vec![1.5, 1.4]), "{text}");
-                    assert_eq!((k.nm, k.value), (vec![400.0, 500.0], vec![0.0, 0.25]), "{text}");
-                }
-                Ok(_) => panic!("{text} gives both"),
-                Err(problem) => assert!(text.starts_with('k') && problem.message.contains("no column \"n\"")),
-            }
-        }
-        // Each has the wavelengths at which it is given.
-        let [Some(n), Some(k)] = index("nm,n,k\n400,1.5,\n500,1.4,1\n600,1.3,2\n").unwrap() else { panic!("both") };
-        assert_eq!((n.nm.len(), k.nm), (3, vec![500.0, 600.0]));
-        assert!(index("nm,n,k\n400,1.5,\n500,1.4,\n").unwrap_err().message.contains("0 values of k"));
-        assert!(index("400,1.5\n500,1.4\n").unwrap_err().message.contains("2 columns and no header"));
-    }
-
-    /// As refractiveindex.info offers them: um, n and k one under the other.
-    #[test]
-    fn downloads_are_two_tables() {
-        for separator in [",", "\t"] {
-            let text = "wl,n\n0.4,0.2\n0.7,0.25\n\nwl,k\n0.4,3\n0.7,4\n".replace(',', separator);
-            let [Some(n), Some(k)] = parse_index(text.as_bytes(), Path::new("a.csv")).unwrap() else { panic!("both") };
-            assert_eq!((n.nm, n.value, k.value), (vec![400.0, 700.0], vec![0.2, 0.25], vec![3.0, 4.0]));
-            assert_eq!(k.line, [6, 7]);
-            assert_eq!(csv(&text, Some("k")).unwrap().value, [3.0, 4.0]);
-            assert_eq!(csv(&text, None).unwrap().value, [0.2, 0.25]);
-        }
-        let [n, k] = parse_index(b"wl,n\n0.4,1.5\n0.7,1.4\n", Path::new("a.csv")).unwrap();
-        assert!(n.is_some() && k.is_none());
-    }
-
-    #[test]
-    fn a_step_is_two_equal_wavelengths() {
-        assert_eq!(csv("400,1\n400,2\n500,3", None).unwrap().nm, [400.0, 400.0, 500.0]);
-    }
-
-    #[test]
-    fn mistakes_name_their_line() {
-        for (text, line, words) in [
-            ("", None, "no data"),
-            ("# only\n\n", None, "no data"),
-            ("400\n500", Some(1), "one column"),
-            ("400,1,2\n500,1,2", Some(1), "no header"),
-            ("nm,v\n400,1\n500,x", Some(3), "`x` is not a finite number"),
-            ("400,1\n500,nan", Some(2), "finite"),
-            ("400,1\n500,inf", Some(2), "finite"),
-            ("400,1\n500,", Some(2), "finite"),
-            ("400,1\n500,1,1", Some(2), "cells"),
-            ("400,1\n-500,1", Some(2), "greater than 0"),
-            ("400,1\n500,1\n450,1\n600,1", Some(3), "follows"),
-            ("400,1\n400,2\n400,3\n500,1", Some(3), "third time"),
-            ("400,1", None, "1 values"),
-            ("Frequency,v\n4000,1\n5000,1", Some(1), "`Frequency`"),
-            ("nm,v,v\n400,1,2\n500,1,2", Some(1), "2 value columns"),
-        ] {
-            let problem = csv(text, None).unwrap_err();
-            assert_eq!(problem.line, line, "{text:?}: {problem}");
-            assert!(problem.message.contains(words), "{text:?}: {problem}");
-            assert_eq!(problem.file, Path::new("t.csv"));
-        }
-        assert!(csv("400,1\n500,2", Some("a")).unwrap_err().message.contains("no header"));
-    }
-}
+mod tests;

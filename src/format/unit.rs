@@ -272,6 +272,27 @@ impl Measure {
         }
     }
 
+    /// What a cross section of a molecule in this unit is as an absorption per metre and atmosphere of partial pressure, at
+    /// `kelvin`; `None` if it is none. The number of molecules in 1 m³ is p / (k T).
+    pub fn cross_section_per_atmosphere(self, kelvin: f64) -> Option<f64> {
+        const BOLTZMANN: f64 = 1.380_649e-23;
+        const ATMOSPHERE_PA: f64 = 101_325.0;
+        let is_area = self.is(&[(METRE, 2), (COUNT, -1)]) || self.is(&[(METRE, 2)]);
+        is_area.then(|| self.factor * ATMOSPHERE_PA / (BOLTZMANN * kelvin))
+    }
+
+    /// Whether this is a spectral radiance, irradiance or intensity.
+    fn is_spectral_power(self) -> bool {
+        [Kind::Radiance, Kind::Irradiance, Kind::Intensity].iter().any(|kind| self.to(*kind).is_some())
+    }
+
+    /// Whether numbers in this unit are those of Spectile's.
+    pub fn is_own(self) -> bool {
+        [Kind::Radiance, Kind::Irradiance, Kind::Intensity]
+            .iter()
+            .any(|kind| self.to(*kind) == Some(Density::Plain(1.0)))
+    }
+
     /// Kelvins in one, if this is a temperature.
     pub fn kelvin(self) -> Option<f64> {
         self.is(&[(KELVIN, 1)]).then_some(self.factor)
@@ -327,8 +348,15 @@ impl Stated {
         Some(Stated { meaning: Meaning::Unit(measure), text: text.trim().to_owned(), certain: true })
     }
 
+    /// The unit of spectral power that a sentence speaks of, if there is just one: what stands in its brackets, or a run of its
+    /// words.
+    pub fn in_sentence(text: &str) -> Option<Stated> {
+        let measure = spelling::spectral_power_within(&plain(text))?;
+        Some(Stated { meaning: Meaning::Unit(measure), text: text.trim().to_owned(), certain: false })
+    }
+
     /// The unit in the name of a column of values: in brackets, at the end of its words, after a comma (where W may as well
-    /// be the west), or a percent sign. What does not look like a unit is a part of the name.
+    /// be the west), or a percent sign at either end. What does not look like a unit is a part of the name.
     pub fn in_name(name: &str) -> Option<Stated> {
         let text = plain(name);
         let stated = |meaning, certain| Some(Stated { meaning, text: name.to_owned(), certain });
@@ -346,10 +374,19 @@ impl Stated {
                 None => None,
             };
         }
+        // Nothing but a unit, and one of so many parts that no name is like it: photons/s/m2/nm/sr.
+        if let Some(measure) =
+            parse(&text).filter(|measure| measure.powers.iter().filter(|power| **power != 0).count() > 2)
+        {
+            return stated(Meaning::Unit(measure), true);
+        }
         if let Some(measure) = spectral_power_at_end(&text) {
             return stated(Meaning::Unit(measure), true);
         }
-        if text.ends_with('%') {
+        // Spectrophotometers write %R and %T.
+        if text.ends_with('%')
+            || text.strip_prefix('%').is_some_and(|rest| rest.trim_start().starts_with(char::is_alphabetic))
+        {
             return stated(Meaning::Unit(Measure { factor: 0.01, ..Measure::ONE }), true);
         }
         if let Some(measure) = text.rsplit_once(", ").and_then(|(_, after)| parse(after)) {

@@ -186,9 +186,9 @@ impl<'a> Spectra<'a> {
                 );
                 return None;
             }
-            let data = table_data(table, path.clone());
-            let source = Source { data, scale: 1.0, outside: None, path: item.path.clone(), at: item.at };
             let kelvin = kelvin?;
+            let data = table_data(per_atmosphere(table, kelvin), path.clone());
+            let source = Source { data, scale: 1.0, outside: None, path: item.path.clone(), at: item.at };
             found.push((kelvin, self.check(&source, &format!("{written} ({kelvin} K)"), item, Quantity::Absorption)?));
         }
         found.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -492,7 +492,14 @@ impl<'a> Spectra<'a> {
                 let message =
                     format!("gives its values in the unit of `{text}`, which is not that of {}", quantity.noun());
                 if *certain {
-                    let help = format!("convert them to {}, or correct the header", quantity.unit());
+                    let is_cross_section = measure.cross_section_per_atmosphere(1.0).is_some();
+                    let help = if quantity == Quantity::Absorption && is_cross_section {
+                        "multiply them by the molecules in a volume, p / (k T); or write them as a table of a `species`, \
+                         with the temperature: `nu (cm-1),300 K (cm2/molecule)`"
+                            .to_owned()
+                    } else {
+                        format!("convert them to {}, or correct the header", quantity.unit())
+                    };
                     user.error_help(format!("{path} {message}"), help);
                     return None;
                 }
@@ -546,6 +553,17 @@ impl<'a> Spectra<'a> {
         let gaps: Vec<String> = [below, above].into_iter().flatten().map(|[a, b]| format!("{a}-{b} nm")).collect();
         (!gaps.is_empty()).then(|| gaps.join(" and "))
     }
+}
+
+/// The table of a species at `kelvin` in m⁻¹ atm⁻¹, if it has cross sections.
+fn per_atmosphere(mut table: SpectrumTable, kelvin: f64) -> SpectrumTable {
+    if let Some(Stated { meaning: Meaning::Unit(measure), .. }) = &table.unit
+        && let Some(factor) = measure.cross_section_per_atmosphere(kelvin)
+    {
+        table.value.iter_mut().for_each(|value| *value *= factor);
+        table.unit = None;
+    }
+    table
 }
 
 /// A value as it is written, with what it is multiplied by.

@@ -33,6 +33,40 @@ fn latin1(text: &str) -> Vec<u8> {
     text.chars().map(|c| u8::try_from(u32::from(c)).unwrap_or(b'?')).collect()
 }
 
+/// A file of an ASD spectrometer, version 8, of three detectors, as its manufacturer describes the format: counts of a leaf and of
+/// the white reference as doubles.
+pub fn asd() -> Vec<u8> {
+    const CHANNELS: u16 = 21;
+    let mut bytes = vec![0u8; 484];
+    let mut put = |offset: usize, field: &[u8]| bytes[offset..offset + field.len()].copy_from_slice(field);
+    put(0, b"as8");
+    // Second, minute, hour, day, month, year since 1900.
+    put(160, &[1, 0, 2, 0, 3, 0, 4, 0, 5, 0, 120, 0]);
+    // Dark current subtracted; reflectance; a reference was taken.
+    put(181, &[1]);
+    put(186, &[1]);
+    put(187, &1_600_000_000u32.to_le_bytes());
+    put(191, &350f32.to_le_bytes());
+    put(195, &1f32.to_le_bytes());
+    put(199, &[2]);
+    put(204, &CHANNELS.to_le_bytes());
+    // Integration time, ms; the instrument, gains and where detectors meet.
+    put(390, &17u32.to_le_bytes());
+    put(431, &[4]);
+    put(436, &1000u16.to_le_bytes());
+    put(438, &500u16.to_le_bytes());
+    put(444, &7f32.to_le_bytes());
+    put(448, &14f32.to_le_bytes());
+    let counts = |scale: f64| (0..CHANNELS).flat_map(move |i| (scale * (100.0 + f64::from(i).sin())).to_le_bytes());
+    bytes.extend(counts(3.0));
+    bytes.extend([0xff, 0xff]);
+    bytes.extend([0; 16]);
+    bytes.extend(7u16.to_le_bytes());
+    bytes.extend(b"made up");
+    bytes.extend((0..CHANNELS).flat_map(|i| (1000.0 + 7.0 * f64::from(i)).to_le_bytes()));
+    bytes
+}
+
 /// A folder with one file of every kind.
 fn files() -> tempfile::TempDir {
     let folder = tempdir().expect("folder");
@@ -48,6 +82,7 @@ fn files() -> tempfile::TempDir {
     put("um.csv", b"wavelength_um;r\n0.5;0.75\n0.4;0.5\n");
     put("cm.csv", b"wavenumber (cm-1),r\n20000,0.75\n25000,0.5\n");
     put("bare.csv", b"0.4 0.5\n0.5 0.75\n");
+    put("leaf.asd", &asd());
     folder
 }
 
@@ -145,9 +180,9 @@ fn scenes_use_them_wherever_a_spectrum_is_expected() {
     wrong("file = \"bare.csv\"\n", "constant = 1\n", "goes with `file` only");
 }
 
-/// What spectral's own readers make of the files, and a library that spectral wrote.
+/// What spectral's own readers and pyASDReader make of the files, and a library that spectral wrote.
 #[test]
-fn spectral_reads_the_same() {
+fn readers_of_python_read_the_same() {
     let Some(mut python) = python("read_libraries.py") else { return };
     let folder = files();
     let output = python.arg(folder.path()).output().expect("runs");
@@ -156,6 +191,7 @@ fn spectral_reads_the_same() {
     for (name, column) in [
         ("concrete.spectrum.txt", None),
         ("splib07a_Quartz_GDS31_ASDFRa_AREF.txt", None),
+        ("leaf.asd", None),
         ("written.sli", Some("dry soil")),
         ("written.sli", Some("wet soil")),
     ] {

@@ -173,6 +173,12 @@ fn headers_of_other_data_stay() {
     let said = text(&place.succeeds(&export).stderr);
     assert!(said.contains("warning: scan.img.hdr is there too: GDAL and QGIS read it"), "{said}");
     assert_eq!(fs::read(place.at("scan.img.hdr")).expect("read"), b"ENVI\n");
+    fs::remove_file(place.at("scan.img.hdr")).expect("removed");
+    // And what it would take for the header's data, whichever is written last.
+    for name in ["scan.exr", "scan.img"] {
+        let said = text(&place.succeeds(&["export", "cube.zarr", "-o", name]).stderr);
+        assert!(said.contains("warning: scan.hdr and scan.exr have one name"), "{name}: {said}");
+    }
 }
 
 #[test]

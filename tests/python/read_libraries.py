@@ -1,4 +1,4 @@
-"""What Spectral Python's own readers make of the spectra in FOLDER, as JSON; and a library that it writes there.
+"""What Spectral Python's own readers, and pyASDReader, make of the spectra in FOLDER, as JSON; and a library written there.
 
     python -W error read_libraries.py FOLDER
 """
@@ -6,6 +6,7 @@
 import json
 import os
 import sys
+import warnings
 
 import numpy as np
 from spectral.database.ecostress import read_ecostress_file
@@ -26,6 +27,17 @@ def main(folder):
     spectrometer = SpectrometerData.read_from_file(os.path.join(folder, wavelengths))
     pairs = [(1e3 * x, y) for x, y in zip(spectrometer.values, sample.values) if y > -1e30]
     found[usgs] = {"nm": [x for x, _ in pairs], "value": [y for _, y in pairs]}
+
+    # It writes a log to where it is.
+    os.chdir(folder)
+    from pyASDReader import ASDFile
+
+    leaf = ASDFile(os.path.join(folder, "leaf.asd"))
+    with warnings.catch_warnings():
+        # Of the way in which it divides.
+        warnings.simplefilter("ignore", UserWarning)
+        reflectance = leaf.reflectance
+    found["leaf.asd"] = {"nm": leaf.wavelengths.tolist(), "value": reflectance.tolist()}
 
     nm = np.array([410.0, 520.5, 633.25, 790.125])
     data = np.array([[0.11, 0.22, 0.33, 0.44], [0.05, 0.06, 0.07, 0.09]], dtype=np.float32)

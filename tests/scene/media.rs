@@ -80,6 +80,27 @@ fn absorption_resolves() {
     assert_ne!(scene.digest, good(&text, &[], &[("camera.perspective.medium", "unused")]).digest);
 }
 
+/// Molecules per volume are p / (k T): at 273.15 K and 1 atm Loschmidt's number, 2.686 780 111e25 m⁻³ (CODATA 2018), and half of
+/// it at twice that.
+#[test]
+fn cross_sections_of_a_species_are_absorptions_at_its_temperatures() {
+    let table =
+        "wavenumber (cm-1),273.15 K (cm2/molecule),546.3 K [cm2/molecule]\n14000,1e-21,2e-21\n26000,3e-21,4e-21\n";
+    let media = "[media.gas]\nspecies = [{ table = \"gas.csv\", fraction = 1.0 }]\ntemperature = 300";
+    let scene = good(&filled(BALL, media), &[("gas.csv", table)], &[]);
+    for ((kelvin, spectrum), expected) in scene.media[0].absorbers[0].columns.iter().zip([2.686_780_111, 2.686_780_111])
+    {
+        let found = scene.spectra[*spectrum].curve.eval(1e7 / 14_000.0);
+        assert!((found / expected - 1.0).abs() < 1e-9, "{kelvin} K: {found}");
+    }
+    // Without a temperature nothing follows.
+    let alone = "[media.gas]\nabsorption = { file = \"one.csv\" }";
+    let one = "nm,sigma (cm2/molecule)\n400,1e-21\n700,1e-21\n";
+    let dir = folder(&[("one.csv", one)]);
+    let error = scene::parse(&filled(BALL, alone), &dir.path().join("scene.toml"), &overrides(&[])).unwrap_err();
+    assert!(error.to_string().contains("p / (k T)"), "{error}");
+}
+
 #[test]
 fn species_resolve_with_what_they_do_not_cover() {
     let media = "[media.gas]\nspecies = [{ table = \"gas.csv\", fraction = 0.25 }, { table = \"gas.csv\", fraction = 0.5 }]\npressure = 2.0\ntemperature = 650";

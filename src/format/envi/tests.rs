@@ -71,6 +71,18 @@ fn numbers_of_every_type_and_order() {
 }
 
 #[test]
+fn every_end_of_a_line_and_more_bytes_than_described() {
+    let text = "ENVI\nsamples = 2\nlines = 3\nbands = 1\ndata type = 4\ninterleave = bsq\n";
+    let header = read(text).unwrap();
+    for end in ["\r\n", "\r"] {
+        assert_eq!(read(&text.replace('\n', end)).unwrap(), header, "{end:?}");
+    }
+    assert_eq!(header.surplus(24, Path::new("a.img")), None);
+    let told = header.surplus(48, Path::new("a.img")).unwrap();
+    assert!(told.contains("48 bytes in a.img, of which its header describes 24"), "{told}");
+}
+
+#[test]
 fn mistakes_name_their_line() {
     for (text, line, words) in [
         ("", None, "first line"),
@@ -92,6 +104,11 @@ fn mistakes_name_their_line() {
             "ENVI\nsamples = 1\nlines = 1\ndata type = 4\nwavelength units = Index\nwavelength = { 1 }\n",
             Some(5),
             "unit of a spectrum, but is `index`",
+        ),
+        (
+            "ENVI\nsamples = 1\nlines = 1\ndata type = 2\nscale factor = 1000\n",
+            Some(5),
+            "`scale factor` is not applied",
         ),
         ("ENVI\nsamples = 1\nlines = 1\nbands = 2\ndata type = 4\n", None, "lacks `interleave`"),
         ("ENVI\nsamples = 9999999999999\nlines = 9999999999999\ndata type = 4\n", None, "counted"),

@@ -41,6 +41,7 @@ pub fn read(path: &Path, data: Option<&Path>) -> Result<Map, Box<Problem>> {
         None => super::radiance_unsaid(path, axis)?,
     };
     let bytes = bytes(&data_path)?;
+    warnings.extend(header.surplus(bytes.len(), &data_path));
     let data = header.data(&bytes, &data_path)?;
     let good: Vec<usize> = (0..header.bands).filter(|band| header.is_good(*band)).collect();
     if good.is_empty() {

@@ -4,11 +4,12 @@
 use std::path::Path;
 
 use exr::meta::MetaData;
-use exr::meta::attribute::{AttributeValue, Text};
+use exr::meta::attribute::{AttributeValue, EnvironmentMap, Text};
 
 use super::{Bands, Content, Map, checked_size, spectral, to_srgb, with_help};
 use crate::error::Problem;
 use crate::format::image::{self, Plane, Rgb};
+use crate::format::table::shown;
 use crate::format::unit::{self, Density, Unit};
 
 /// The file at `path` as spectra where it has emissive spectral channels, else as R, G and B.
@@ -17,11 +18,15 @@ pub fn read_map(path: &Path) -> Result<Map, Box<Problem>> {
     let size = checked_size(path, picture.size[0].into(), picture.size[1].into())?;
     let planes = &picture.planes;
     let mut warnings = Vec::new();
+    said(path, &mut warnings)?;
     let bands: Vec<(f64, &[f32])> =
         planes.iter().filter_map(|plane| Some((emissive_band(&plane.name)?, plane.samples.as_slice()))).collect();
     if !bands.is_empty() {
         // The layout's own label; its authors store W m-2 sr-1 nm-1 under it, as everybody does.
         const KNOWN: [&str; 3] = ["W.m^-2.sr^-1", "W.m^-2.sr^-1.nm^-1", "W m^-2 sr^-1 nm^-1"];
+        if planes.iter().any(|plane| ["S1.", "S2.", "S3."].iter().any(|start| plane.name.starts_with(start))) {
+            warnings.push("holds polarised light: S1, S2 and S3 are left out".to_owned());
+        }
         let mut bands = bands;
         let mut converted: Vec<Vec<f32>> = Vec::new();
         if let Some(units) = units(path).filter(|units| !KNOWN.contains(&units.as_str())) {
@@ -48,7 +53,8 @@ pub fn read_map(path: &Path) -> Result<Map, Box<Problem>> {
     let Some(found) = found else {
         let names: Vec<&str> = planes.iter().take(8).map(|plane| plane.name.as_str()).collect();
         let more = if planes.len() > 8 { ", …" } else { "" };
-        let message = format!("has the channels {}{more}: neither R, G, B nor spectral radiance", names.join(", "));
+        let names = names.join(", ");
+        let message = format!("has the channels {}{more}: neither R, G, B nor spectral radiance", names.escape_debug());
         return Err(with_help(path, message, "name channels R, G, B, or by wavelength as in S0.550,0nm"));
     };
     if let Rgb::Colour(of) = found
@@ -57,9 +63,9 @@ pub fn read_map(path: &Path) -> Result<Map, Box<Problem>> {
         warnings.push(format!(
             "has {} channels, of which {}, {} and {} are used",
             planes.len(),
-            of[0].name,
-            of[1].name,
-            of[2].name
+            shown(&of[0].name),
+            shown(&of[1].name),
+            shown(&of[2].name)
         ));
     }
     let [r, g, b] = found.planes().map(|plane| &plane.samples);
@@ -68,6 +74,29 @@ pub fn read_map(path: &Path) -> Result<Map, Box<Problem>> {
         to_srgb(path, &mut rgb, size[0], primaries, &mut warnings)?;
     }
     Ok(Map { size, content: Content::Rgb(rgb), warnings })
+}
+
+/// What attributes say of the numbers, or of the directions of the pixels, and nothing here applies.
+fn said(path: &Path, warnings: &mut Vec<String>) -> Result<(), Box<Problem>> {
+    // That the file can be read was seen to before.
+    let Ok(meta) = MetaData::read_from_file(path, false) else { return Ok(()) };
+    let Some(header) = meta.headers.first() else { return Ok(()) };
+    if header.own_attributes.environment_map == Some(EnvironmentMap::Cube) {
+        let message = "says (`envmap`) that it is the six faces of a cube".to_owned();
+        return Err(with_help(path, message, "convert it to longitude and latitude, e.g. with exrenvmap"));
+    }
+    if let Some(luminance) = header.own_attributes.white_luminance {
+        warnings.push(format!("says that its white has {luminance} cd/m2 (`whiteLuminance`), which is not applied"));
+    }
+    for name in ["EV", "cameraResponse", "lensTransmission"] {
+        let key = Text::from(name);
+        let attributes = [&header.own_attributes.other, &header.shared_attributes.other];
+        if attributes.iter().any(|attributes| attributes.contains_key(&key)) {
+            warnings
+                .push(format!("has the attribute `{name}`, which is not applied: its values are taken as they are"));
+        }
+    }
+    Ok(())
 }
 
 /// `emissiveUnits` of the spectral layout.
@@ -127,7 +156,37 @@ fn emissive_band(name: &str) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::emissive_band;
+    use exr::image::pixel_vec::PixelVec;
+    use exr::image::{Encoding, Image, Layer};
+    use exr::meta::attribute::{AttributeValue, EnvironmentMap, Text};
+    use exr::meta::header::LayerAttributes;
+    use exr::prelude::{SpecificChannels, WritableImage};
+
+    use super::{emissive_band, read_map};
+
+    #[test]
+    fn what_attributes_say_is_told_or_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("sky.exr");
+        let write = |change: &dyn Fn(&mut LayerAttributes)| {
+            let mut attributes = LayerAttributes::default();
+            change(&mut attributes);
+            let pixels = PixelVec { resolution: (2, 1).into(), pixels: vec![(1f32, 2f32, 3f32); 2] };
+            let layer = Layer::new((2, 1), attributes, Encoding::SMALL_LOSSLESS, SpecificChannels::rgb(pixels));
+            Image::from_layer(layer).write().non_parallel().to_file(&path).unwrap();
+            read_map(&path)
+        };
+        assert!(write(&|_| {}).unwrap().warnings.is_empty());
+        assert!(
+            write(&|all| all.environment_map = Some(EnvironmentMap::LatitudeLongitude)).unwrap().warnings.is_empty()
+        );
+        let cube = write(&|all| all.environment_map = Some(EnvironmentMap::Cube)).unwrap_err();
+        assert!(cube.message.contains("six faces of a cube"), "{cube}");
+        let white = write(&|all| all.white_luminance = Some(100.0)).unwrap();
+        assert!(white.warnings[0].contains("100 cd/m2"), "{:?}", white.warnings);
+        let exposed = write(&|all| drop(all.other.insert(Text::from("EV"), AttributeValue::F32(2.0)))).unwrap();
+        assert!(exposed.warnings[0].contains("`EV`"), "{:?}", exposed.warnings);
+    }
 
     #[test]
     fn names_of_spectral_channels() {

@@ -11,6 +11,7 @@ use std::io::Read;
 use std::path::Path;
 
 use super::primaries::{self, Primaries, White};
+use super::table::shown;
 use super::unit::{Density, Kind, Measure, Unit};
 use crate::error::Problem;
 
@@ -207,6 +208,7 @@ fn radiance_of(
     axis: Unit,
     warnings: &mut Vec<String>,
 ) -> Result<Density, Box<Problem>> {
+    let text = shown(text);
     if let Some(density) = measure.and_then(|measure| measure.to(Kind::Radiance)) {
         if density != Density::Plain(1.0) {
             warnings.push(format!("gives radiance in `{text}`, which is converted to W m-2 sr-1 nm-1"));

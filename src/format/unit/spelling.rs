@@ -34,6 +34,25 @@ pub(super) fn spectral_power_at_end(text: &str) -> Option<Measure> {
         .find(|measure| measure.powers[WATT] == 1 && measure.powers[METRE] < 0)
 }
 
+/// The unit of spectral power that a sentence has in brackets or among its words, the longest run first.
+pub(super) fn spectral_power_within(text: &str) -> Option<Measure> {
+    /// `mW / ( m2 sr cm-1 )` has as many.
+    const MOST_WORDS: usize = 8;
+    let words: Vec<&str> = text.split_whitespace().collect();
+    let strip = |run: &str| run.trim_matches([',', ';', ':', '.', '"', '=']).to_owned();
+    for length in (1..=words.len().min(MOST_WORDS)).rev() {
+        for run in words.windows(length) {
+            let run = strip(&run.join(" "));
+            let inner = bracketed(&run).filter(|_| run.ends_with([')', ']'])).unwrap_or("");
+            let found = [run.as_str(), inner].into_iter().filter_map(parse).find(|measure| measure.is_spectral_power());
+            if found.is_some() {
+                return found;
+            }
+        }
+    }
+    None
+}
+
 /// Whether the words of a name spell a unit of power in no way that could be read: `L_mW_m2_sr_nm`.
 pub(super) fn spells_power(text: &str) -> bool {
     let all: Vec<&str> = words(text).collect();
@@ -341,6 +360,9 @@ fn symbol(name: &str) -> Option<Measure> {
             "cd" => Measure::of(LUMEN, 1.0).times(Measure::of(STERADIAN, 1.0), -1)?,
             "lx" => Measure::of(LUMEN, 1.0).times(Measure::of(METRE, 1.0), -2)?,
             "mol" => Measure::of(COUNT, 6.022_140_76e23),
+            "erg" => Measure::of(WATT, 1e-7).times(Measure::of(SECOND, 1.0), 1)?,
+            // 1e-26 W m-2 Hz-1
+            "Jy" => Measure::of(WATT, 1e-26).times(Measure::of(SECOND, 1.0), 1)?.times(Measure::of(METRE, 1.0), -2)?,
             _ => return None,
         })
     };

@@ -161,8 +161,13 @@ fn units_in_names_of_columns() {
     for (name, kind, factor) in [
         ("Reflectance (%)", Kind::Number, 0.01),
         ("Reflectance %", Kind::Number, 0.01),
+        ("%R", Kind::Number, 0.01),
+        ("% Transmittance", Kind::Number, 0.01),
         ("Radiance [uW/cm2/sr/nm]", Kind::Radiance, 0.01),
         ("radiance W/m2/sr/um", Kind::Radiance, 1e-3),
+        // 1e-7 W, 1e4 cm2 a m2, 10 A a nm.
+        ("flux [erg/s/cm2/A]", Kind::Irradiance, 1e-2),
+        ("W/m2/nm/sr", Kind::Radiance, 1.0),
         ("L (10^-3 W m-2 sr-1 nm-1)", Kind::Radiance, 1e-3),
     ] {
         let Some(Stated { meaning: Meaning::Unit(measure), certain: true, .. }) = Stated::in_name(name) else {
@@ -170,6 +175,11 @@ fn units_in_names_of_columns() {
         };
         assert_eq!(measure.to(kind), Some(Density::Plain(factor)), "{name}");
     }
+    let jansky = parse("Jy").and_then(|measure| measure.to(Kind::Irradiance)).expect("an irradiance");
+    // At 500 nm c/λ² is 1.199169832e21 Hz a metre: 1e-26 W m-2 Hz-1 are 1.199169832e-14 W m-2 nm-1.
+    assert!((jansky.apply(1.0, 500.0) / 1.199_169_832e-14 - 1.0).abs() < 1e-12);
+    let photons = Stated::in_name("photons/s/m2/nm/sr").expect("a unit");
+    assert!(matches!(photons.meaning, Meaning::Unit(measure) if measure.to(Kind::Radiance).is_none()));
     for name in ["Sample #1", "leaf (upper side)", "oak (2/3)", "log, oak", "max x", "linen", "x2", "r2"] {
         assert_eq!(Stated::in_name(name), None, "{name}");
     }
@@ -189,6 +199,36 @@ fn units_in_names_of_columns() {
         assert_eq!(Stated::in_name(name).map(|stated| stated.meaning), Some(meaning), "{name}");
     }
     assert_eq!(Stated::in_name("wall, W").map(|stated| stated.certain), Some(false));
+}
+
+#[test]
+fn units_in_sentences() {
+    for (text, irradiance) in [
+        ("# wavelength [nm]   irradiance [mW/(m2 nm)]", Some(1e-3)),
+        ("# Second column: extraterrestrial irradiance in mW m-2 nm-1, at 1 AU.", Some(1e-3)),
+        ("# 2. irradiance (W/m2/um)", Some(1e-3)),
+        ("# nm W/m^2/nm", Some(1.0)),
+        ("# scaled to a total of 1366.1 W/m2", None),
+        ("# Kurucz, R. L., at 1.0 nm; W. M. Sr.", None),
+        ("# reflectance of oak in 2 nm steps", None),
+    ] {
+        let found = Stated::in_sentence(text).map(|stated| match stated.meaning {
+            Meaning::Unit(measure) => measure.to(Kind::Irradiance),
+            other => panic!("{other:?}"),
+        });
+        assert_eq!(found, irradiance.map(|factor| Some(Density::Plain(factor))), "{text}");
+    }
+}
+
+/// At 273.15 K and 1 atm a cubic metre of an ideal gas has Loschmidt's number of molecules, 2.686 780 111e25 (CODATA 2018).
+#[test]
+fn cross_sections_are_absorptions_at_a_temperature() {
+    let per_atm = |text: &str| parse(text).and_then(|measure| measure.cross_section_per_atmosphere(273.15));
+    for text in ["cm2/molecule", "cm^2 molecule^-1", "cm2"] {
+        let found = per_atm(text).unwrap_or_else(|| panic!("{text} is a cross section"));
+        assert!((found / 2.686_780_111e21 - 1.0).abs() < 1e-9, "{text}: {found}");
+    }
+    assert_eq!([per_atm("cm-1"), per_atm("cm2/g"), per_atm("K")], [None; 3]);
 }
 
 /// Lines whose wavelengths in air and in vacuum NIST's Atomic Spectra Database gives: Na D2, H alpha, Hg.

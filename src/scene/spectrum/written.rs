@@ -164,7 +164,9 @@ pub(super) fn index_file(item: &Item, path: PathBuf, column: Column, needed: Opt
 
 /// The temperature that names a column: `300`, `300K`, or with words before it as in `kappa_300K`.
 pub(super) fn column_kelvin(name: &str) -> Option<f64> {
-    let number = name.trim_end_matches(['K', 'k', ' ']);
+    // The unit of the values may follow: `300 K (cm2/molecule)`.
+    let bracket = name.rfind(['(', '[']).filter(|i| name.trim_end().ends_with([')', ']']) && *i > 0);
+    let number = name[..bracket.unwrap_or(name.len())].trim_end_matches(['K', 'k', ' ']);
     let start = number.rfind(|c: char| !c.is_ascii_digit() && c != '.').map_or(0, |i| i + 1);
     number.get(start..)?.parse().ok().filter(|kelvin: &f64| kelvin.is_finite() && *kelvin > 0.0)
 }
