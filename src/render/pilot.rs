@@ -92,9 +92,16 @@ fn kept() -> Error {
 
 /// Where no sample needs to be asked.
 fn by_rule(scene: &Scene, prepared: &Prepared, software: bool) -> Option<Choices> {
-    let cost = evaluation_cost(prepared, software);
-    (scene.integrator.evaluation == Evaluation::Auto && cost < LEAST_COST)
-        .then(|| all(format!("evaluating a path costs {cost:.2} of generating it, too little to save"), 0, Vec::new()))
+    let reason = if prepared.surfaces.as_ref().is_some_and(|surfaces| surfaces.dispersion) {
+        "dispersion leaves paths to one channel each, of which the few that they are tried in do not tell".to_owned()
+    } else {
+        let cost = evaluation_cost(prepared, software);
+        if scene.integrator.evaluation == Evaluation::Roulette || cost >= LEAST_COST {
+            return None;
+        }
+        format!("evaluating a path costs {cost:.2} of generating it, too little to save")
+    };
+    Some(all(reason, 0, Vec::new()))
 }
 
 fn all(reason: String, samples: u32, mean_radiance: Vec<f64>) -> Choices {
