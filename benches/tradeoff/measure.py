@@ -3,8 +3,8 @@ makes of it.
 
     measure.py --spectile PROGRAM [-o FOLDER] [--scenes NAMES] [--channels K,K] [--rounds N]
 
-Each choice renders the same picture for some epochs. Time is that between epochs, compilation and the pilot apart; the choices of a
-scene and number of channels take turns. Error is the cube's own estimate from the spread of its epochs, one for each channel:
+Each choice renders the same picture for some epochs. Time is that of the epochs, compilation and the pilot apart; processor time on
+software devices. The choices of a scene and number of channels take turns. Error is the cube's own estimate from the spread of its epochs, one for each channel:
 efficiency is 1 / (mean over channels of error² x time a path), of which ratios to all paths at one wavelength are told. Needs nothing
 but Python 3.9 and the program.
 """
@@ -15,10 +15,12 @@ import html
 import json
 import math
 import pathlib
+import resource
 import shutil
 import statistics
 import subprocess
 import tempfile
+import time
 
 # Scene, and the epochs and pixels that its noise asks for.
 SCENES = ["cornell/cornell", "statues/statues", "aircraft/aircraft", "conference/conference", "aircraft/aircraft-infrared"]
@@ -48,6 +50,8 @@ def choices(channels, sweep):
 class Program:
     def __init__(self, path, scenes):
         self.path, self.scenes = path, scenes
+        adapter = next(event for event in self.run("devices", "--json") if event["event"] == "device")
+        self.device, self.is_software = adapter["name"], adapter["is_software"]
         self.folder = pathlib.Path(tempfile.mkdtemp())
 
     def run(self, *arguments):
@@ -55,6 +59,13 @@ class Program:
         if done.returncode != 0:
             raise RuntimeError(done.stderr.strip().splitlines()[0])
         return [json.loads(line) for line in done.stdout.splitlines()]
+
+    def seconds(self, *arguments):
+        """Of a run: processor time on software devices, of which a machine with other things to do takes hardly more."""
+        times = lambda: (time.monotonic(), sum(resource.getrusage(resource.RUSAGE_CHILDREN)[:2]))
+        before = times()
+        self.run(*arguments)
+        return [after - before for after, before in zip(times(), before)][self.is_software]
 
     def render(self, scene, channels, choice, seed):
         """Seconds a path, error of every channel, what was chosen."""
@@ -69,20 +80,20 @@ class Program:
             arguments += ["--set", f"channels.false_colour=[{channels - 1},{channels // 2},0]"]
         for name, value in settings.items():
             arguments += ["--set", f"integrator.{name}={value}"]
+        self.run(*arguments, "--spp", "1")
+        chosen = cube / ".spectile/choices.json"
         if choice.scale:
-            self.run(*arguments, "--spp", "1")
-            chosen = cube / ".spectile/choices.json"
             written = json.loads(chosen.read_text())
             if written["scale"] is None:
                 raise RuntimeError(written["reason"])
             written["scale"] *= choice.scale
             chosen.write_text(json.dumps(written))
-            arguments.append("--resume")
-        events = self.run(*arguments, "--spp", str(EPOCH * EPOCHS))
-        ends = [(event["samples"], event["time_s"]) for event in events if event["event"] == "epoch"]
-        (before, began), (after, ended) = next(end for end in ends if end[0] >= EPOCH), ends[-1]
+        arguments.append("--resume")
+        # Setting up takes the same both times.
+        few, few_s = EPOCH - 1, self.seconds(*arguments, "--spp", str(EPOCH))
+        many, many_s = EPOCH * (EPOCHS - 1), self.seconds(*arguments, "--spp", str(EPOCH * EPOCHS))
         width, height = map(int, SIZE.split("x"))
-        seconds = (ended - began) / ((after - before) * width * height)
+        seconds = (many_s - few_s) / ((many - few) * width * height)
         info = self.run("info", str(cube), "--json")[-1]
         errors = [channel["error_estimate"] for channel in info["channels"]]
         return seconds, errors, info["choices"]
@@ -219,8 +230,6 @@ def main():
     arguments = parser.parse_args()
     program = Program(arguments.spectile, arguments.scene_folder)
     try:
-        devices = program.run("devices", "--json")
-        device = next((event["name"] for event in devices if "name" in event), "a device")
         rows = measure(program, arguments.scenes.split(","), [int(k) for k in arguments.channels.split(",")], arguments.rounds)
     finally:
         shutil.rmtree(program.folder, ignore_errors=True)
@@ -229,7 +238,7 @@ def main():
         writer = csv.DictWriter(file, FIELDS, extrasaction="ignore")
         writer.writeheader()
         writer.writerows(rows)
-    (arguments.output / "tradeoff.html").write_text(page(rows, device))
+    (arguments.output / "tradeoff.html").write_text(page(rows, program.device))
 
 
 if __name__ == "__main__":
