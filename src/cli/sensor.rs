@@ -45,7 +45,7 @@ pub struct Args {
     #[arg(long, value_name = "SENSOR.toml")]
     pub model: Option<PathBuf>,
 
-    /// Of noise and fixed patterns
+    /// Of the noise of this exposure; fixed patterns have the model's `pattern_seed`
     #[arg(long, default_value_t = 0, requires = "model")]
     pub seed: u64,
 

@@ -27,6 +27,8 @@ pub struct SensorModel {
     pub prnu: f64,
     /// Standard deviation of the dark signal over pixels: electrons, or counts of a thermal detector.
     pub dsnu: f64,
+    /// Of the fixed patterns, which all exposures share.
+    pub pattern_seed: u64,
     pub kind: Detector,
     /// Names and responses; `None` is the interval of all channels.
     pub bands: Option<Vec<(String, Response)>>,
@@ -139,6 +141,7 @@ fn decode<'a>(cx: &'a Context<'a>, root: &'a [tree::Entry], channels: &Channels)
     let offset = number(&detector, "offset", 0.0, |v| v >= 0.0, "0 or greater");
     let prnu = number(&detector, "prnu", 0.0, |v| (0.0..=0.1).contains(&v), "from 0 to 0.1");
     let dsnu = number(&detector, "dsnu", 0.0, |v| v >= 0.0, "0 or greater");
+    let pattern_seed = detector.get("pattern_seed").map_or(Some(0), |item| item.whole(0..=u32::MAX));
     let (mut optics, mut kind) = (optics?, kind?);
     let all = spectra.finish();
     let curve = |id: usize| all[id].curve.clone();
@@ -158,6 +161,7 @@ fn decode<'a>(cx: &'a Context<'a>, root: &'a [tree::Entry], channels: &Channels)
         offset: offset?,
         prnu: prnu?,
         dsnu: dsnu?,
+        pattern_seed: pattern_seed?.into(),
         kind: kind.0,
         bands: bands?,
         reference_temperature: reference_temperature?,

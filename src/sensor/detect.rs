@@ -25,6 +25,7 @@ impl std::ops::AddAssign for Clipped {
 #[derive(Debug, Clone)]
 pub struct Electronics<'a> {
     pub model: &'a SensorModel,
+    /// Of one exposure; fixed patterns have the model's.
     pub seed: u64,
     /// Whether there is noise and fixed patterns at all.
     pub noise: bool,
@@ -34,7 +35,8 @@ impl Electronics<'_> {
     /// The count of a pixel with this mean signal of light (electrons, or W), background included.
     pub fn count(&self, light: f64, pixel: [u32; 2], band: usize, clipped: &mut Clipped) -> u32 {
         let model = self.model;
-        let normal = |purpose| if self.noise { Stream::new(self.seed, purpose, pixel, band).normal() } else { 0.0 };
+        let normal =
+            |purpose| if self.noise { Stream::new(model.pattern_seed, purpose, pixel, band).normal() } else { 0.0 };
         let pattern = |size: f64, purpose| if size > 0.0 { size * normal(purpose) } else { 0.0 };
         let light = light * (1.0 + pattern(model.prnu, Purpose::Response));
         let dark = pattern(model.dsnu, Purpose::Dark);

@@ -9,6 +9,8 @@ mod figures;
 mod noise;
 mod radiometry;
 mod store;
+#[cfg(test)]
+mod tests;
 
 pub use apply::{Applied, BandReport, Settings, apply};
 pub use detect::{Clipped, Electronics};

@@ -45,6 +45,7 @@ pub static DETECTOR: Section = section(
         Key::default("offset", Number, "0.0", "Counts without light."),
         Key::default("prnu", Number, "0.0", "Standard deviation of the response over pixels.").range("[0, 0.1]"),
         Key::default("dsnu", Number, "0.0", "Standard deviation of the dark signal over pixels: electrons, or counts."),
+        Key::default("pattern_seed", Whole, "0", "Of both patterns, the same in every exposure."),
         Key::optional("integration_time", Number, "photon detectors need it", "Exposure.").unit("s"),
         Key::optional("quantum_efficiency", Spectrum(Reflectance), "photon detectors need it", "Electrons a photon."),
         Key::default("dark_current", Number, "0.0", "At the temperature of operation.").unit("electrons/s"),
