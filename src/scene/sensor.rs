@@ -48,6 +48,8 @@ impl SensorModel {
 pub struct Optics {
     pub f_number: f64,
     pub transmittance: Curve,
+    /// Focal length, m, of optics whose irradiance falls as cos⁴ of the angle to the axis.
+    pub cos4: Option<f64>,
     /// K; optics without one emit nothing.
     pub temperature: Option<f64>,
     /// F-number of the cone from which the warm optics shine; `None`: the hemisphere.
@@ -213,8 +215,15 @@ fn optics<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> WithSpectrum<Optics
             return None;
         }
     };
-    let optics =
-        Optics { f_number, transmittance: Curve::Constant(1.0), temperature: temperature?, cold_shield: shield? };
+    let cos4 = match fields.get("cos4").map_or(Some(false), |item| item.boolean())? {
+        true if focal.is_none() => {
+            fields.error_help("has cos4, but no focal_length", "add focal_length, or remove cos4");
+            return None;
+        }
+        is_on => focal.filter(|_| is_on),
+    };
+    let transmitted = Curve::Constant(1.0);
+    let optics = Optics { f_number, transmittance: transmitted, cos4, temperature: temperature?, cold_shield: shield? };
     if optics.cold_shield.is_some() && optics.temperature.is_none() {
         fields.error_help("has a cold_shield, but no temperature", "add temperature, or remove cold_shield");
         return None;

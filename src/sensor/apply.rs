@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use rayon::prelude::*;
+use serde_json::Value;
 
 use super::detect::{Clipped, Electronics};
 use super::figures::Figures;
@@ -72,6 +73,21 @@ pub fn apply(
     if !cube.channels().responses.is_empty() {
         return usage("its channels are weighted by responses already; sensors need plain channels".into());
     }
+    let film = &cube.header().attributes.get("settings").unwrap_or(&Value::Null)["film"];
+    if film["filter"].as_str().is_some_and(|filter| filter != "box") {
+        return usage(
+            "was rendered with a film.filter that mixes pixels; a detector's pixel is the filter \"box\"".into(),
+        );
+    }
+    let vignetting = match model.optics.cos4 {
+        None => None,
+        Some(focal_length) => match (film["width"].as_f64(), film["height"].as_f64()) {
+            (Some(width), Some(height)) => {
+                Some(Vignetting { centre: [0.5 * width, 0.5 * height], per_pixel: model.pitch / focal_length })
+            }
+            _ => return usage("does not tell the size of its film, which optics.cos4 needs for the axis".into()),
+        },
+    };
     let Bands { bands, left_out } = Bands::new(model, cube.channels());
     if bands.is_empty() {
         let most = left_out.iter().map(|(_, share)| *share).fold(0.0, f64::max);
@@ -104,7 +120,8 @@ pub fn apply(
                 .into_par_iter()
                 .map(|(i, (counts, signal))| {
                     let (band, y) = (i / height, chunk.rect().y0 + (i % height) as u32);
-                    expose_row(&chunk, y, &bands[band], band, &electronics, cube.header().origin, counts, signal)
+                    let row = (&chunk, y, cube.header().origin, vignetting);
+                    expose_row(row, &bands[band], band, &electronics, counts, signal)
                 })
                 .collect();
             // In one order whatever the threads did.
@@ -136,15 +153,29 @@ pub fn apply(
     Ok(applied)
 }
 
+/// How much darker pixels off the axis are.
+#[derive(Debug, Clone, Copy)]
+struct Vignetting {
+    /// The axis, in pixels of the full film.
+    centre: [f64; 2],
+    /// Tangent of the angle a pixel.
+    per_pixel: f64,
+}
+
+impl Vignetting {
+    /// cos⁴θ = 1 / (1 + tan²θ)² at the middle of a pixel.
+    fn at(&self, pixel: [u32; 2]) -> f64 {
+        let tangent = |axis: usize| self.per_pixel * (f64::from(pixel[axis]) + 0.5 - self.centre[axis]);
+        (1.0 + tangent(0).powi(2) + tangent(1).powi(2)).powi(-2)
+    }
+}
+
 /// One row of a tile in one band; rows below the picture stay empty.
-#[expect(clippy::too_many_arguments, reason = "a row of a band of a chunk, from here to there")]
 fn expose_row(
-    chunk: &Chunk,
-    y: u32,
+    (chunk, y, origin, vignetting): (&Chunk, u32, [u32; 2], Option<Vignetting>),
     band: &Optical,
     index: usize,
     electronics: &Electronics,
-    origin: [u32; 2],
     counts: &mut [u32],
     mut signal: Option<&mut [f32]>,
 ) -> Row {
@@ -160,10 +191,10 @@ fn expose_row(
             continue;
         }
         row.negative += u64::from(light < 0.0);
-        let light = light.max(0.0);
+        let pixel = [origin[0] + x, origin[1] + y];
+        let light = light.max(0.0) * vignetting.map_or(1.0, |vignetting| vignetting.at(pixel));
         row.sum += light;
         let at = (x - rect.x0) as usize;
-        let pixel = [origin[0] + x, origin[1] + y];
         counts[at] = electronics.count(light + band.background, pixel, index, &mut row.clipped);
         if let Some(signal) = &mut signal {
             signal[at] = (light + band.background) as f32;

@@ -101,6 +101,44 @@ fn counts_depend_on_the_seed_and_on_no_tile() {
     }
 }
 
+/// Off the axis light falls as cos⁴: 1 / (1 + (pitch r / f)²)², r in pixels from the middle of the film.
+#[test]
+fn light_falls_off_the_axis_and_other_filters_are_refused() {
+    let folder = tempdir().expect("folder");
+    let path = folder.path();
+    let flat = |name: &str, filter: &str| {
+        let channels = Channels::equal(400.0, 700.0, 30);
+        let mut header = Header { channels, ..header(SIZE, [8, 8], 1) };
+        let film = serde_json::json!({ "film": { "width": 20, "height": 13, "filter": filter } });
+        header.attributes.insert("settings".into(), film);
+        let cube = create(path, name, header);
+        for tile in 0..cube.grid().count() {
+            cube.merge_unit(tile, 1, &unit(&cube, tile, |_, _, _| 0.01)).expect("merged");
+        }
+    };
+    flat("box.zarr", "box");
+    flat("gaussian.zarr", "gaussian");
+    // The tangent of the angle grows by 0.1 a pixel.
+    let model = MODEL.replace("f_number = 2", "f_number = 2\nfocal_length = 1e-4\ncos4 = true");
+    fs::write(path.join("sensor.toml"), model.replace("gain = 2", "gain = 10").replace("bits = 12", "bits = 15"))
+        .expect("written");
+    let expose = |cube: &str| run(path, &["sensor", cube, "--model", "sensor.toml", "-o", "s.zarr", "--noise", "off"]);
+    let output = expose("gaussian.zarr");
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("film.filter"));
+    let output = expose("box.zarr");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let found = counts(&path.join("s.zarr"), [8, 8]);
+    let light = |x: f64, y: f64| (1.0 + 0.01 * ((x - 9.5).powi(2) + (y - 6.0).powi(2))).powi(-2);
+    let at = |x: usize, y: usize| f64::from(found[y * 20 + x]) - 50.0;
+    assert!(at(9, 6) > 1000.0 && at(9, 6) < 32_000.0, "{}", at(9, 6));
+    for (x, y) in [(0, 0), (19, 12), (9, 0), (3, 6)] {
+        let expected = at(9, 6) * light(x as f64, y as f64) / light(9.0, 6.0);
+        // Both are rounded.
+        assert!((at(x, y) - expected).abs() <= 1.0, "{x} {y}: {} {expected}", at(x, y));
+    }
+}
+
 #[test]
 fn holes_existing_stores_and_other_commands_are_refused_in_words() {
     let folder = tempdir().expect("folder");

@@ -1,6 +1,6 @@
 //! What a sensor model's file may contain.
 
-use super::Kind::{Choice, File, ListOfTables, Number, Spectrum, Table, Text, Whole};
+use super::Kind::{Boolean, Choice, File, ListOfTables, Number, Spectrum, Table, Text, Whole};
 use super::{Key, Section};
 use crate::scene::Quantity::Reflectance;
 
@@ -28,11 +28,12 @@ pub static OPTICS: Section = section(
         Key::optional("aperture", Number, "from `f_number`", "Diameter of the entrance pupil.").unit("m"),
         Key::optional("focal_length", Number, "not needed beside `f_number`", "Focal length.").unit("m"),
         Key::default("transmittance", Spectrum(Reflectance), "1.0", "What the optics let through."),
+        Key::default("cos4", Boolean, "false", "Whether irradiance falls as cos⁴ of the angle to the axis."),
         Key::optional("temperature", Number, "they emit nothing", "Of the optics, which emit what they absorb.")
             .unit("K"),
         Key::optional("cold_shield", Number, "none: the hemisphere", "F-number of the cone that warm optics fill."),
     ],
-    &["psf", "mtf", "cos4", "oversampling"],
+    &["psf", "mtf", "oversampling"],
 );
 
 pub static DETECTOR: Section = section(
