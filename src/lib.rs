@@ -16,6 +16,7 @@ pub mod reference;
 pub mod render;
 pub mod report;
 pub mod scene;
+pub mod sensor;
 pub mod slurm;
 pub mod spectral;
 pub mod stress;

@@ -1,6 +1,6 @@
 //! `spectile sensor`: what a sensor would see of a cube.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
@@ -8,21 +8,28 @@ use super::Output;
 use crate::cube::{Cube, Existing, integrate};
 use crate::files::shown;
 use crate::format::response;
+use crate::scene::load_sensor;
+use crate::sensor::{Applied, Settings, apply};
 use crate::{Error, Result};
 
-/// Integrate a cube with the responses of a sensor, after the fact
+/// What a sensor would see of a cube: integrated with responses, or as counts of a detector behind optics
 ///
-/// Every band of the sensor becomes a channel of a new cube: the mean of the radiance weighted by the band's response, in
+/// With --responses every band of the sensor becomes a channel of a new cube: the mean of the radiance weighted by the band's response, in
 /// W m-2 sr-1 nm-1. That is exact where the radiance is constant within each channel, also where channels and responses
 /// overlap in part; so channels should be narrower than the responses are. Where they are too wide for a response to the
 /// point that it matters, the error is estimated from the slope of the spectra and told. Bands that the cube does not cover
 /// (99 % of their response) are left out, which is told too.
 ///
 /// (`channels.responses` in a scene weights while rendering instead: fewer channels, and no error of this kind.)
+///
+/// With --model a file says what the optics and the detector are, and the result is the counts of every band, with shot noise,
+/// reading noise and fixed patterns: a Zarr store for xarray and others, with SNR, NEDL and, where black bodies at the reference
+/// temperature are seen, NETD of every band among its attributes. The same seed gives the same bytes.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = "\
 Examples:
   spectile sensor cube.zarr --responses sentinel2.csv -o sentinel2.zarr
+  spectile sensor cube.zarr --model camera.toml -o counts.zarr --seed 1
 
 Responses are CSV: `wavelength_nm,red,green,blue`, a column a band; or long, with the header
 `band,wavelength_nm,response`. Lines that begin with # are comments.")]
@@ -31,8 +38,28 @@ pub struct Args {
     pub cube: PathBuf,
 
     /// The responses, a CSV file
-    #[arg(long, value_name = "S.csv")]
-    pub responses: PathBuf,
+    #[arg(long, value_name = "S.csv", required_unless_present = "model", conflicts_with = "model")]
+    pub responses: Option<PathBuf>,
+
+    /// The model of a sensor, a TOML file with [optics], [detector] and bands
+    #[arg(long, value_name = "SENSOR.toml")]
+    pub model: Option<PathBuf>,
+
+    /// Of the noise of this exposure; fixed patterns have the model's `pattern_seed`
+    #[arg(long, default_value_t = 0, requires = "model")]
+    pub seed: u64,
+
+    /// Noise and fixed patterns, or what the mean of many exposures of a perfect detector would be
+    #[arg(long, value_enum, default_value_t = Noise::On, requires = "model")]
+    pub noise: Noise,
+
+    /// Keep the signal without noise, background included, beside the counts: electrons, or W of a thermal detector
+    #[arg(long, requires = "model")]
+    pub electrons: bool,
+
+    /// Take a cube of which tiles are missing; their pixels get the fill value
+    #[arg(long, requires = "model")]
+    pub partial: bool,
 
     /// The cube to make, a folder
     #[arg(short, long, value_name = "OUT.zarr")]
@@ -49,9 +76,87 @@ pub struct Args {
     pub json: bool,
 }
 
+/// Whether there is noise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Noise {
+    On,
+    Off,
+}
+
 pub fn run(args: &Args, output: &Output) -> Result<()> {
+    match (&args.model, &args.responses) {
+        (Some(model), _) => expose(args, model, output),
+        (None, Some(responses)) => integrate_with(args, responses, output),
+        (None, None) => Err(Error::Usage("give --responses or --model".into())),
+    }
+}
+
+fn expose(args: &Args, file: &Path, output: &Output) -> Result<()> {
     let cube = Cube::open(&args.cube)?;
-    let responses = response::read_responses(&args.responses).map_err(|problem| Error::Input(vec![*problem]))?;
+    let model = load_sensor(file, cube.channels())?;
+    for warning in &model.warnings {
+        output.warn(warning)?;
+    }
+    let settings = Settings {
+        seed: args.seed,
+        noise: args.noise == Noise::On,
+        electrons: args.electrons,
+        partial: args.partial,
+        overwrite: args.overwrite,
+        about: file.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+    };
+    let Applied { bands, left_out, negative, pixels } =
+        super::progress::watched(args.json, |progress| apply(&cube, &model, &settings, &args.output, progress))?;
+    warn_left_out(&left_out, output)?;
+    if negative > 0 {
+        output.warn(&format!("{negative} negative signals, which the noise of the cube makes, are taken as 0"))?;
+    }
+    let mut text = format!("{}: counts of {} bands of {}\n", args.output.display(), bands.len(), settings.about);
+    let mut each = Vec::new();
+    for band in &bands {
+        let (figures, clipped) = (&band.figures, &band.clipped);
+        text += &format!("  {}: SNR {:.4}, NEDL {:.4e} W m-2 sr-1 nm-1", band.name, figures.snr, figures.nedl);
+        if let Some(netd) = figures.netd {
+            text += &format!(", NETD {netd:.4} K at {} K", model.reference_temperature);
+        }
+        text += "\n";
+        let share = |count: u64| 100.0 * count as f64 / pixels as f64;
+        for (count, what) in [
+            (clipped.full_wells, "have full wells"),
+            (clipped.above, "are above the converter's range"),
+            (clipped.below, "are below the converter's range"),
+        ] {
+            if count > 0 {
+                output.warn(&format!("{}: {count} pixels ({:.2} %) {what}", band.name, share(count)))?;
+            }
+        }
+        each.push(json!({
+            "band": band.name,
+            "snr_at_mean": figures.snr,
+            "nedl": figures.nedl,
+            "netd_k": figures.netd,
+            "mean_signal": band.mean_signal,
+            "full_wells": clipped.full_wells,
+            "clipped_above": clipped.above,
+            "clipped_below": clipped.below,
+        }));
+    }
+    let left_out: Vec<_> = left_out.iter().map(|(name, share)| json!({ "band": name, "covered": share })).collect();
+    output.event("done", json!({ "cube": shown(&args.output), "bands": each, "left_out": left_out }))?;
+    output.text(&text)
+}
+
+fn warn_left_out(left_out: &[(String, f64)], output: &Output) -> Result<()> {
+    if left_out.is_empty() {
+        return Ok(());
+    }
+    let each: Vec<String> = left_out.iter().map(|(name, share)| format!("{name} ({:.1} %)", 100.0 * share)).collect();
+    output.warn(&format!("bands of which the cube does not cover 99 % are left out: {}", each.join(", ")))
+}
+
+fn integrate_with(args: &Args, file: &Path, output: &Output) -> Result<()> {
+    let cube = Cube::open(&args.cube)?;
+    let responses = response::read_responses(file).map_err(|problem| Error::Input(vec![*problem]))?;
     for warning in &responses.warnings {
         output.warn(warning)?;
     }
@@ -62,17 +167,13 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         let what = "a cube cannot be integrated into itself; choose another name";
         return Err(Error::Usage(format!("{}: {what}", args.output.display())));
     }
-    let about = args.responses.file_name().unwrap_or_default().to_string_lossy();
+    let about = file.file_name().unwrap_or_default().to_string_lossy();
     let existing = if args.overwrite { Existing::Replace } else { Existing::Refuse };
     let findings = super::progress::watched(args.json, |progress| {
         integrate(&cube, &responses.named, &about, &args.output, existing, progress)
     })?;
 
-    if !findings.left_out.is_empty() {
-        let each: Vec<String> =
-            findings.left_out.iter().map(|(name, share)| format!("{name} ({:.1} %)", 100.0 * share)).collect();
-        output.warn(&format!("bands of which the cube does not cover 99 % are left out: {}", each.join(", ")))?;
-    }
+    warn_left_out(&findings.left_out, output)?;
     if !findings.wide.is_empty() {
         let each: Vec<String> = findings
             .wide

@@ -14,6 +14,9 @@ use crate::{Error, Result};
 /// The version of the layout that is written, `spectile_format` among the attributes of the group.
 pub const FORMAT: u64 = 2;
 
+/// The attribute of groups that hold counts of a sensor instead of radiance.
+pub const SENSOR_FORMAT: &str = "spectile_sensor_format";
+
 /// How the files of a tile are laid out in a version of the layout.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Layout {
@@ -340,6 +343,10 @@ impl Header {
     ) -> Result<(Header, Layout)> {
         let layout = match group["attributes"]["spectile_format"].as_u64() {
             Some(format) => Layout::of_format(format).ok_or_else(|| unknown_format(path, format))?,
+            None if !group["attributes"][SENSOR_FORMAT].is_null() => {
+                let what = "holds counts of a sensor, which this command does not read; open it as any Zarr store, with xarray or zarr-python";
+                return Err(Error::storage(path, what));
+            }
             None => {
                 let what = "is a Zarr store, but not a Spectile cube: it has no attribute `spectile_format`";
                 return Err(Error::storage(path, what));

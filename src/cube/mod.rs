@@ -43,7 +43,7 @@ pub use epochs::{epoch_samples, epochs_in, samples_before, whole_epochs};
 pub use grid::{Grid, Rect};
 pub use map::Chunk;
 pub use merge::{merge_bytes, merge_means};
-pub use metadata::{FORMAT, Header, plain_attributes};
+pub use metadata::{FORMAT, Header, SENSOR_FORMAT, plain_attributes};
 pub use preview::reduction;
 pub use runs::{Run, RunFile, RunState, SlurmTask, Stand, Work, node_name, now_s};
 pub use sensor::{Findings, integrate};

@@ -17,6 +17,7 @@ mod material;
 mod medium;
 mod object;
 mod overrides;
+mod sensor;
 mod shape;
 mod spectrum;
 mod sun;
@@ -32,6 +33,7 @@ use glam::{DAffine3, DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 pub use file::{load, parse};
+pub use sensor::{Detector, Optics, SensorModel, load_sensor, parse_sensor};
 pub use spectrum::{Quantity, irradiance};
 
 use crate::spectral::{Channels, Curve};

@@ -8,5 +8,6 @@ mod outputs;
 mod python;
 mod refractive;
 mod sensor;
+mod sensor_model;
 mod spoilt;
 mod store;

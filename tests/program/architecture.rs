@@ -17,6 +17,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     // Of gpu the type of a kernel's text alone, which has no word of wgpu.
     ("device", &["scene", "spectral", "gpu::source"]),
     ("cube", &["spectral"]),
+    ("sensor", &["cube", "scene", "spectral"]),
     ("export", &["cube", "format", "spectral"]),
     ("preview", &["cube", "format", "spectral"]),
     ("render", &["device", "gpu", "cube", "preview", "scene", "spectral"]),
@@ -26,8 +27,8 @@ const ARROWS: &[(&str, &[&str])] = &[
     (
         "cli",
         &[
-            "stress", "report", "slurm", "render", "preview", "export", "cube", "device", "gpu", "scene", "format",
-            "spectral",
+            "stress", "report", "slurm", "render", "preview", "export", "sensor", "cube", "device", "gpu", "scene",
+            "format", "spectral",
         ],
     ),
 ];

@@ -9,6 +9,7 @@ mod materials;
 mod media;
 mod objects;
 mod page;
+mod sensor;
 mod spectra;
 mod view;
 
@@ -19,6 +20,7 @@ pub use materials::*;
 pub use media::*;
 pub use objects::*;
 pub use page::{page, text};
+pub use sensor::*;
 pub use spectra::*;
 pub use view::*;
 
