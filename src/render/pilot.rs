@@ -247,7 +247,7 @@ impl Trial {
     /// The scale that is expected to bring most, where evaluating a path in all channels costs `cost` of generating it. All paths are
     /// evaluated where nothing brings enough, unless it `must` be.
     fn choose(self, cost: f64, must: bool) -> Choices {
-        if let Some(dark) = self.means.iter().position(|mean| !(*mean > 0.0)) {
+        if let Some(dark) = self.means.iter().position(|mean| mean.is_nan() || *mean <= 0.0) {
             // Its light may come along paths that bring nothing elsewhere.
             let reason = format!("channel {dark} was dark in all samples of the pilot, and roulette could starve it");
             return all(reason, self.samples, self.means);
