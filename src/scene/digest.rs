@@ -175,12 +175,12 @@ impl Hash {
         });
         self.text(evaluator.name());
         self.counts([epoch]);
-        // Nothing of one, so that other scenes keep their digests.
+        // Nothing of what is usual, so that other scenes keep their digests.
         if *wavelengths_per_channel > 1 {
             self.text("wavelengths per channel");
             self.counts([wavelengths_per_channel]);
         }
-        if *evaluation != Evaluation::All {
+        if *evaluation != Evaluation::Auto {
             self.text("evaluation");
             self.text(evaluation.name());
         }

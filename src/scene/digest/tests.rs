@@ -91,7 +91,7 @@ fn full() -> Scene {
             sampler: Sampler::Sobol,
             wavelengths: Wavelengths::Uniform,
             wavelengths_per_channel: 1,
-            evaluation: Evaluation::All,
+            evaluation: Evaluation::Auto,
             evaluator: Evaluator::Auto,
             epoch: 64,
         },
@@ -148,7 +148,7 @@ fn digests_are_those_of_earlier_versions() {
                     sampler: Sampler::Independent,
                     wavelengths: Wavelengths::Emission,
                     wavelengths_per_channel: 1,
-                    evaluation: Evaluation::All,
+                    evaluation: Evaluation::Auto,
                     evaluator: Evaluator::Pt,
                     epoch: 128,
                 };
