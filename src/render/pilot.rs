@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use crate::cube::Choices;
 use crate::device::evaluator::evaluation_cost;
-use crate::device::parts::paths::{Thinning, representatives};
+use crate::device::parts::paths::{Thinning, representatives, tried_channels};
 use crate::device::prepared::Prepared;
 use crate::gpu::adapter::Gpu;
 use crate::render::interrupt::Interrupt;
@@ -29,6 +29,9 @@ const MOST_CHANNELS: usize = 256;
 
 /// Chances never fall below, so that no path counts for more than 64 (shaders/passes/thin_paths.wgsl).
 const LEAST_CHANCE: f64 = 1.0 / 64.0;
+/// What a channel costs in which a path is tried, over one of those in which it is evaluated: threads that have a path each read records
+/// and tables more slowly than those that share one.
+const TRYING: f64 = 2.5;
 /// Variance that any channel may gain, over that of evaluating all paths.
 const MOST_VARIANCE: f64 = 1.1;
 /// What `auto` takes must be expected to bring so much.
@@ -151,6 +154,8 @@ struct Trial {
     /// Of each path: the most that its scattered light brings to a representative channel, over that one's mean.
     energy: Vec<f64>,
     pixels: usize,
+    /// What trying a path costs, over evaluating it in all channels.
+    trying: f64,
     /// Variance of the sampler's nets over that of independent paths, per sample: 1 at most.
     net: f64,
     samples: u32,
@@ -206,6 +211,7 @@ impl Trial {
             scattered,
             energy,
             pixels,
+            trying: TRYING * tried_channels(prepared) as f64 / count as f64,
             net: 1.0,
             samples: pixels as u32 * (SINGLES + 2 * NET),
         };
@@ -298,7 +304,7 @@ impl Trial {
         let (sum, variance) =
             grown.fold((0.0, 1.0), |(sum, most): (f64, f64), grown| (sum + grown - 1.0, most.max(grown)));
         let mean = 1.0 + sum / kept as f64;
-        Expected { evaluated, variance, gain: (1.0 + cost) / (1.0 + cost * evaluated) / mean }
+        Expected { evaluated, variance, gain: (1.0 + cost) / (1.0 + cost * (evaluated + self.trying)) / mean }
     }
 }
 

@@ -57,6 +57,11 @@ fn representative_quads(prepared: &Prepared) -> Vec<usize> {
     (0..count).map(|r| (2 * r + 1) * quads / (2 * count)).collect()
 }
 
+/// Channels in which every path is tried, those included that do not count.
+pub fn tried_channels(prepared: &Prepared) -> usize {
+    4 * representative_quads(prepared).len()
+}
+
 fn channels_of(prepared: &Prepared, quad: usize) -> impl Iterator<Item = usize> + use<> {
     let each = (REPRESENTATIVES / representative_quads(prepared).len()).min(4);
     let channels = prepared.channels;
