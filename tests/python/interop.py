@@ -39,6 +39,8 @@ height = {height}
 [channels]
 intervals = {intervals}
 [integrator]
+# So that no path is left out, and no two pixels of one sample each are black.
+evaluation = "all"
 max_bounces = 1
 [materials]
 floor.diffuse.reflectance = {{ samples = [[380, 0.1], [2500, 0.9]] }}
