@@ -20,8 +20,10 @@ use crate::{Error, Result};
 const PIXELS: u32 = 256;
 /// Epochs of one sample: independent paths, each with its values.
 const SINGLES: u32 = 32;
-/// Samples of two epochs whose difference tells how much less than single paths the sampler's nets vary.
-const NET: u32 = 16;
+/// Samples of all pixels in one of two epochs, nets as the render's, whose difference tells how much less than single paths they vary;
+/// and those of the largest nets that are tried.
+const NET_SAMPLES: u32 = 4096;
+const LARGEST_NET: u32 = 256;
 /// The pilot's epochs have numbers that no render comes to.
 const FIRST_EPOCH: u32 = 1 << 31;
 /// Channels whose variance is predicted, at most: evenly among all.
@@ -122,7 +124,7 @@ pub fn choose(
     let budget = Budget { memory, paths: None };
     let mut worker = Worker::new(Arc::clone(gpu), Arc::clone(prepared), [1, 1], budget)?;
     worker.watch(interrupt);
-    let trial = Trial::run(&mut worker, prepared, &scene.film)?;
+    let trial = Trial::run(&mut worker, prepared, &scene.film, scene.integrator.epoch.min(LARGEST_NET))?;
     let cost = evaluation_cost(prepared, gpu.is_software);
     Ok(trial.choose(cost, scene.integrator.evaluation == Evaluation::Roulette))
 }
@@ -157,12 +159,13 @@ struct Trial {
     /// What trying a path costs, over evaluating it in all channels.
     trying: f64,
     /// Variance of the sampler's nets over that of independent paths, per sample: 1 at most.
-    net: f64,
+    share_of_nets: f64,
     samples: u32,
 }
 
 impl Trial {
-    fn run(worker: &mut Worker, prepared: &Prepared, film: &Film) -> Result<Trial> {
+    /// `net`: samples of a full epoch of the render.
+    fn run(worker: &mut Worker, prepared: &Prepared, film: &Film, net: u32) -> Result<Trial> {
         let (units, count) = (pixels(film), prepared.channels);
         let representatives = representatives(prepared);
         let even = (0..count.min(MOST_CHANNELS)).map(|i| i * count / count.min(MOST_CHANNELS));
@@ -184,7 +187,8 @@ impl Trial {
             add(&values);
             radiance.extend(kept(&values));
         }
-        let nets = [0, 1].map(|i| values(worker, &units, FIRST_EPOCH + SINGLES + i, NET).map(|values| kept(&values)));
+        let some = &units[..units.len().min((NET_SAMPLES / net) as usize)];
+        let nets = [0, 1].map(|i| values(worker, some, FIRST_EPOCH + SINGLES + i, net).map(|values| kept(&values)));
         let [first, second] = nets;
         let (first, second) = (first?, second?);
         // The same paths, ended where they are scattered first.
@@ -212,42 +216,47 @@ impl Trial {
             energy,
             pixels,
             trying: TRYING * tried_channels(prepared) as f64 / count as f64,
-            net: 1.0,
-            samples: pixels as u32 * (SINGLES + 2 * NET),
+            share_of_nets: 1.0,
+            samples: pixels as u32 * SINGLES + 2 * some.len() as u32 * net,
         };
-        trial.net = trial.net_share(&first, &second);
+        trial.share_of_nets = trial.compare_nets(&first, &second, net);
         Ok(trial)
     }
 
-    /// Variance of each kept channel's samples around their pixel's mean, mean over the pixels.
-    fn variances(&self) -> Vec<f64> {
+    /// Variance of each kept channel's samples around their pixel's mean, mean over the first so many pixels.
+    fn variances(&self, pixels: usize) -> Vec<f64> {
         let kept = self.channels.len();
         let row = self.pixels * kept;
         let mut variances = vec![0.0; kept];
-        for pixel in 0..self.pixels {
+        for pixel in 0..pixels {
             for (k, variance) in variances.iter_mut().enumerate() {
                 let samples = || self.radiance.chunks(row).map(|epoch| f64::from(epoch[pixel * kept + k]));
                 let n = samples().count() as f64;
                 let mean = samples().sum::<f64>() / n;
-                *variance += samples().map(|x| (x - mean) * (x - mean)).sum::<f64>() / (n - 1.0) / self.pixels as f64;
+                *variance += samples().map(|x| (x - mean) * (x - mean)).sum::<f64>() / (n - 1.0) / pixels as f64;
             }
         }
         variances
     }
 
-    /// From two means of nets in every pixel: their variance, times the samples of a net, over that of single paths; the mean over
+    /// From two means of nets in some pixels: their variance, times the samples of a `net`, over that of single paths; the mean over
     /// the channels, since each alone is known badly.
-    fn net_share(&self, first: &[f32], second: &[f32]) -> f64 {
+    fn compare_nets(&self, first: &[f32], second: &[f32], net: u32) -> f64 {
         let kept = self.channels.len();
+        let pixels = first.len() / kept;
         let mut squares = vec![0.0; kept];
         for (a, b) in first.chunks(kept).zip(second.chunks(kept)) {
             for (square, (a, b)) in squares.iter_mut().zip(a.iter().zip(b)) {
-                *square += 0.5 * f64::from(a - b).powi(2) * f64::from(NET) / self.pixels as f64;
+                *square += 0.5 * f64::from(a - b).powi(2) * f64::from(net) / pixels as f64;
             }
         }
-        let shares: Vec<f64> =
-            squares.iter().zip(self.variances()).filter(|(_, of_paths)| *of_paths > 0.0).map(|(s, v)| s / v).collect();
-        if shares.is_empty() { 1.0 } else { (shares.iter().sum::<f64>() / shares.len() as f64).clamp(0.01, 1.0) }
+        let shares: Vec<f64> = squares
+            .iter()
+            .zip(self.variances(pixels))
+            .filter(|(_, of_paths)| *of_paths > 0.0)
+            .map(|(s, v)| s / v)
+            .collect();
+        if shares.is_empty() { 1.0 } else { (shares.iter().sum::<f64>() / shares.len() as f64).clamp(1e-4, 1.0) }
     }
 
     /// The scale that is expected to bring most, where evaluating a path in all channels costs `cost` of generating it. All paths are
@@ -258,7 +267,8 @@ impl Trial {
             let reason = format!("channel {dark} was dark in all samples of the pilot, and roulette could starve it");
             return all(reason, self.samples, self.means);
         }
-        let variances: Vec<f64> = self.variances().iter().map(|variance| variance * self.net).collect();
+        let variances: Vec<f64> =
+            self.variances(self.pixels).iter().map(|variance| variance * self.share_of_nets).collect();
         // Powers of the square root of two: so that what differs in the last bits chooses the same.
         let scales = (-24..=24).map(|i| 2f64.powf(0.5 * f64::from(i)));
         let expected = scales.map(|scale| (scale, self.expect(scale, cost, &variances)));
