@@ -42,10 +42,10 @@ fn evaluate_path(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
         }
 #end
     }
+    var foreign = head.y ^ (wave.sequence << 16u);
 #if THINNED
-    prove(1u, (head.y ^ (wave.sequence << 16u)) | (chance.x ^ (wave.sequence << 16u)), local_slot == 0u && id.z == 0u);
-#else
-    prove(1u, head.y ^ (wave.sequence << 16u), local_slot == 0u && id.z == 0u);
+    foreign |= chance.x ^ (wave.sequence << 16u);
 #endif
+    prove(1u, foreign, local_slot == 0u && id.z == 0u);
     report(bad, slot);
 }

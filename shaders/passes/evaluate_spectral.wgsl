@@ -41,11 +41,11 @@ fn evaluate_spectral(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workg
     }
 #end
     if (thread % LANES == 0u) {
+        var foreign = head.y ^ (wave.sequence << 16u);
 #if THINNED
-        prove(1u, (head.y ^ (wave.sequence << 16u)) | (chance.x ^ (wave.sequence << 16u)), local_slot == 0u && group.z == 0u);
-#else
-        prove(1u, head.y ^ (wave.sequence << 16u), local_slot == 0u && group.z == 0u);
+        foreign |= chance.x ^ (wave.sequence << 16u);
 #endif
+        prove(1u, foreign, local_slot == 0u && group.z == 0u);
     }
     report(bad, slot);
 }

@@ -21,11 +21,6 @@
 @group(1) @binding(8) var<storage, read_write> queue: array<u32>;
 @group(1) @binding(9) var<storage, read_write> queue_lengths: array<atomic<u32>>;
 
-#if THINNED
-// Roulette on evaluation: how many records hold what a path sees before it is scattered.
-@group(1) @binding(15) var<storage, read_write> chances: array<vec2<u32>>;
-#endif
-
 // `count` records so far; evaluation may stop after the last one with a weight, `used`.
 struct RecordList {
     path: u32,
@@ -94,9 +89,7 @@ fn generate_bounce(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
         append(&list, 0u, frame.environment_spectrum, scale * weight);
 #endif
 #if THINNED
-        if (step.bounce == 0u) {
-            chances[path].x = list.used;
-        }
+        note_seen(&list);
 #endif
         if (overflow) {
             atomicAdd(&counters[COUNTER_OVERFLOW], 1u);
@@ -122,9 +115,7 @@ fn generate_bounce(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 #endif
 
 #if THINNED
-    if (step.bounce == 0u) {
-        chances[path].x = list.used;
-    }
+    note_seen(&list);
 #endif
     let material = materials[surface.material];
     if (step.bounce == frame.max_bounces || material.factor == NONE || !(from_front || material.two_sided != 0u) || overflow) {

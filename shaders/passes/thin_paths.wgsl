@@ -9,8 +9,7 @@
 // Of each representative quad of channels: s over the channel's mean, 0 for channels that do not count.
 @group(1) @binding(16) var<storage, read> importances: array<vec4<f32>>;
 
-// So that no path counts for more than 64.
-const LEAST_CHANCE: f32 = 0.015625;
+#constants MOST_WEIGHT
 
 @compute @workgroup_size(64)
 fn thin_paths(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
@@ -29,9 +28,7 @@ fn thin_paths(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgro
         let turn = 0u;
 #endif
         let first_record = path * frame.max_records;
-#repeat VECTORS v
-        let quad_$v = ((2u * $vu + 1u) * QUADS) / (2u * VECTORS);
-#end
+#lines REPRESENTATIVE_QUADS
 #include common/hold_spectra.wgsl
 #include common/held_spectra.wgsl
 #repeat VECTORS v
@@ -49,7 +46,7 @@ fn thin_paths(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgro
         let key = pixel_key(frame.seed_low, frame.seed_high, pixel.x, pixel.y, wave.epoch);
         // The second number of the pair whose first is the wavelength's: one of the sampler's own dimensions.
         let u = random_pair(key, DIMENSION_WAVELENGTH, wave.sample_begin + path % wave.samples, wave.epoch_mask).y;
-        let p = clamp(max(max(brought.x, brought.y), max(brought.z, brought.w)), LEAST_CHANCE, 1.0);
+        let p = clamp(max(max(brought.x, brought.y), max(brought.z, brought.w)), 1.0 / f32(MOST_WEIGHT), 1.0);
         kept = select(0.0, 1.0 / p, u < p);
     }
     chances[path] = vec2<u32>(seen_records | (wave.sequence << 16u), bitcast<u32>(kept));

@@ -19,6 +19,10 @@ constants! {
         NONE = 0xffff_ffff;
         ENDED = 0xffff_ffff;
     }
+    /// Roulette on evaluation: what a path counts for at most, so that its chance is 1 / this at least.
+    CHANCES {
+        MOST_WEIGHT = 64;
+    }
     /// Places of [`Counters`], which every pass may raise.
     COUNTERS {
         /// Traversals that gave up.

@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use super::instrument::pick;
+use super::instrument::{pick, wrong};
 use super::text::{Column, SpectrumTable, ascending};
 use super::unit::Stated;
 use crate::error::Problem;
@@ -31,11 +31,6 @@ const REFERENCE_HEADER: usize = 20;
 
 /// No radiance or irradiance in W m⁻² (sr⁻¹) nm⁻¹ that these instruments can see is above this, and all counts are.
 const MOST_POWER: f64 = 100.0;
-
-fn wrong<T>(path: &Path, message: impl Into<String>, help: &str) -> Read<T> {
-    let help = (!help.is_empty()).then(|| help.to_owned());
-    Err(Box::new(Problem { file: path.to_owned(), message: message.into(), help, ..Problem::default() }))
-}
 
 /// Whether `bytes` are such a file, and not text that begins like one.
 pub fn is_asd(bytes: &[u8]) -> bool {
@@ -91,7 +86,7 @@ impl File {
     fn parse(bytes: &[u8], path: &Path) -> Read<File> {
         let cut = |end: usize, what: &str| {
             let message = format!("ends after {} bytes, where {what} goes on to {end}", bytes.len());
-            wrong(path, message, "the file is cut: copy it again")
+            wrong(path, None, message, "the file is cut: copy it again")
         };
         if bytes.len() < HEADER {
             return cut(HEADER, "the header");
@@ -101,7 +96,7 @@ impl File {
         let channels = usize::from(u16::from_le_bytes(at(bytes, CHANNELS)));
         if !(first.is_finite() && first > 0.0 && step.is_finite() && step > 0.0 && channels > 1) {
             let message = format!("says that it has {channels} channels from {first} nm on in steps of {step} nm");
-            return wrong(path, message, "the header is damaged");
+            return wrong(path, None, message, "the header is damaged");
         }
         let numbers = match bytes[DATA_FORMAT] {
             0 => Numbers::Float,
@@ -109,7 +104,7 @@ impl File {
             2 => Numbers::Double,
             other => {
                 let message = format!("stores its numbers in the format {other}, which ASD does not describe");
-                return wrong(path, message, "export it as text: wavelengths in nm and reflectance or radiance");
+                return wrong(path, None, message, "export it as text: wavelengths in nm and reflectance or radiance");
             }
         };
         let size = channels * numbers.size();
@@ -186,7 +181,7 @@ pub fn read(bytes: &[u8], path: &Path, column: Column) -> Read<SpectrumTable> {
                 let message = format!(
                     "holds values up to {highest} and a white reference in counts: whether they are to be divided by it, it does not say"
                 );
-                return wrong(path, message, as_text);
+                return wrong(path, None, message, as_text);
             }
             let (mut found, left_out) = file.quotient(white);
             if left_out > 0 {
@@ -207,7 +202,7 @@ pub fn read(bytes: &[u8], path: &Path, column: Column) -> Read<SpectrumTable> {
         }
         (0 | 1 | 6, None) => {
             let what = if file.data_type == 0 { "counts" } else { "a spectrum to be divided by a white reference" };
-            return wrong(path, format!("holds {what}, and no white reference"), as_text);
+            return wrong(path, None, format!("holds {what}, and no white reference"), as_text);
         }
         (2 | 4, _) => {
             let (name, unit) =
@@ -220,7 +215,7 @@ pub fn read(bytes: &[u8], path: &Path, column: Column) -> Read<SpectrumTable> {
                 let message = format!(
                     "says that it holds {name}, but its values, up to {highest}, are counts that are to be calibrated"
                 );
-                return wrong(path, message, as_text);
+                return wrong(path, None, message, as_text);
             }
             file.table(values, unit)
         }
@@ -231,11 +226,11 @@ pub fn read(bytes: &[u8], path: &Path, column: Column) -> Read<SpectrumTable> {
                 8 => "absorbance, a logarithm",
                 _ => "a quantity that its header does not name",
             };
-            return wrong(path, format!("is a file of an ASD spectrometer that holds {what}"), as_text);
+            return wrong(path, None, format!("is a file of an ASD spectrometer that holds {what}"), as_text);
         }
     };
     if let Some(i) = found.value.iter().position(|value| !value.is_finite()) {
-        return wrong(path, format!("has {} at {} nm, which is no number", found.value[i], found.nm[i]), as_text);
+        return wrong(path, None, format!("has {} at {} nm, which is no number", found.value[i], found.nm[i]), as_text);
     }
     if !file.dark_corrected {
         found.notes.push("says that the dark current was not subtracted: what is dark comes out too bright".to_owned());

@@ -36,7 +36,8 @@ pub enum Format {
     Refused(&'static str, &'static str),
 }
 
-fn wrong<T>(path: &Path, line: Option<usize>, message: impl Into<String>, help: &str) -> Read<T> {
+/// What is wrong with a file, and what to do.
+pub(super) fn wrong<T>(path: &Path, line: Option<usize>, message: impl Into<String>, help: &str) -> Read<T> {
     let help = (!help.is_empty()).then(|| help.to_owned());
     Err(Box::new(Problem { file: path.to_owned(), line, message: message.into(), help, ..Problem::default() }))
 }

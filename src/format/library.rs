@@ -5,16 +5,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::envi;
+use super::instrument::wrong;
 use super::text::{Column as Wanted, SpectrumTable, ascending, named, only_one, read};
 use super::unit::Unit;
 use crate::error::Problem;
 
 type Read<T> = Result<T, Box<Problem>>;
-
-fn wrong<T>(path: &Path, line: Option<usize>, message: impl Into<String>, help: &str) -> Read<T> {
-    let help = (!help.is_empty()).then(|| help.to_owned());
-    Err(Box::new(Problem { file: path.to_owned(), line, message: message.into(), help, ..Problem::default() }))
-}
 
 /// Whether `path` is an ENVI spectral library: its data, or its header.
 pub fn is_envi(path: &Path, bytes: &[u8]) -> bool {

@@ -10,6 +10,7 @@ use super::text::{SpectrumTable, ascending, read};
 use super::unit::{self, Density, Kind, Meaning, Stated, Unit};
 use crate::error::Problem;
 use crate::spectral::Response;
+use crate::spectral::planck::{CHARGE, LIGHT_SPEED, PLANCK};
 
 /// The responses of a sensor, by name, in the order of the file.
 #[derive(Debug, Clone, PartialEq)]
@@ -142,7 +143,7 @@ fn apply_unit(name: &str, table: &mut SpectrumTable) {
 /// Makes a response to photons one to energy, A/W, if its name says that it is one; whether it did.
 fn per_photon(name: &str, table: &mut SpectrumTable) -> bool {
     // Of a quantum efficiency of 1 each photon gives one charge: λ / 1239.84 nm amperes a watt (h c / e).
-    const NM_VOLT: f64 = 6.626_070_15e-34 * 299_792_458.0 / 1.602_176_634e-19 * 1e9;
+    const NM_VOLT: f64 = PLANCK * LIGHT_SPEED / CHARGE * 1e9;
     let lower = name.to_lowercase();
     let mut words = lower.split(|c: char| !c.is_alphanumeric());
     let is = words.any(|word| ["qe", "eqe", "iqe", "ipce", "quantum", "photon", "photons"].contains(&word));

@@ -10,11 +10,12 @@ use spelling::{
     spectral_power_at_end, spells_power,
 };
 
+use crate::spectral::planck::{CHARGE, LIGHT_SPEED, PLANCK};
+
 pub use spelling::parse;
 
-/// Speed of light, m s⁻¹, and Planck's constant over the charge of the electron, eV s (SI, exact).
-const LIGHT_SPEED: f64 = 299_792_458.0;
-const PLANCK_EV: f64 = 6.626_070_15e-34 / 1.602_176_634e-19;
+/// Planck's constant, eV s.
+const PLANCK_EV: f64 = PLANCK / CHARGE;
 
 /// Wavelengths all below this are those of nobody's optics in nm, and of everybody's in um.
 pub const MICROMETRES_BELOW: f64 = 100.0;

@@ -9,6 +9,7 @@ use crate::cube::Choices;
 use crate::device::evaluator::evaluation_cost;
 use crate::device::parts::paths::{Thinning, representatives, tried_channels};
 use crate::device::prepared::Prepared;
+use crate::device::words::MOST_WEIGHT;
 use crate::gpu::adapter::Gpu;
 use crate::render::interrupt::Interrupt;
 use crate::render::wave::Budget;
@@ -29,8 +30,6 @@ const FIRST_EPOCH: u32 = 1 << 31;
 /// Channels whose variance is predicted, at most: evenly among all.
 const MOST_CHANNELS: usize = 256;
 
-/// Chances never fall below, so that no path counts for more than 64 (shaders/passes/thin_paths.wgsl).
-const LEAST_CHANCE: f64 = 1.0 / 64.0;
 /// What a channel costs in which a path is tried, over one of those in which it is evaluated: threads that have a path each read records
 /// and tables more slowly than those that share one.
 const TRYING: f64 = 2.5;
@@ -148,18 +147,14 @@ fn pixels(film: &Film) -> Vec<UnitRect> {
 struct Trial {
     /// Mean of the picture in every channel.
     means: Vec<f64>,
-    /// Channels whose values are kept.
-    channels: Vec<usize>,
-    /// [path][channel kept]: radiance, and what of it was scattered.
-    radiance: Vec<f32>,
+    /// Of each channel kept: variance of a sample, as the sampler's nets make it.
+    variances: Vec<f64>,
+    /// [path][channel kept]: radiance that was scattered.
     scattered: Vec<f32>,
     /// Of each path: the most that its scattered light brings to a representative channel, over that one's mean.
     energy: Vec<f64>,
-    pixels: usize,
     /// What trying a path costs, over evaluating it in all channels.
     trying: f64,
-    /// Variance of the sampler's nets over that of independent paths, per sample: 1 at most.
-    share_of_nets: f64,
     samples: u32,
 }
 
@@ -207,56 +202,16 @@ impl Trial {
             .chunks(channels.len())
             .map(|path| at.iter().map(|&(i, mean)| (f64::from(path[i]) / mean).abs()).fold(0.0, f64::max));
         let energy = energy.collect();
-        let pixels = units.len();
-        let mut trial = Trial {
+        let singles = Samples { radiance: &radiance, pixels: units.len(), channels: channels.len() };
+        let share = share_of_nets(&singles, &first, &second, net);
+        Ok(Trial {
             means,
-            channels,
-            radiance,
+            variances: singles.variances(units.len()).into_iter().map(|variance| variance * share).collect(),
             scattered,
             energy,
-            pixels,
             trying: TRYING * tried_channels(prepared) as f64 / count as f64,
-            share_of_nets: 1.0,
-            samples: pixels as u32 * SINGLES + 2 * some.len() as u32 * net,
-        };
-        trial.share_of_nets = trial.compare_nets(&first, &second, net);
-        Ok(trial)
-    }
-
-    /// Variance of each kept channel's samples around their pixel's mean, mean over the first so many pixels.
-    fn variances(&self, pixels: usize) -> Vec<f64> {
-        let kept = self.channels.len();
-        let row = self.pixels * kept;
-        let mut variances = vec![0.0; kept];
-        for pixel in 0..pixels {
-            for (k, variance) in variances.iter_mut().enumerate() {
-                let samples = || self.radiance.chunks(row).map(|epoch| f64::from(epoch[pixel * kept + k]));
-                let n = samples().count() as f64;
-                let mean = samples().sum::<f64>() / n;
-                *variance += samples().map(|x| (x - mean) * (x - mean)).sum::<f64>() / (n - 1.0) / pixels as f64;
-            }
-        }
-        variances
-    }
-
-    /// From two means of nets in some pixels: their variance, times the samples of a `net`, over that of single paths; the mean over
-    /// the channels, since each alone is known badly.
-    fn compare_nets(&self, first: &[f32], second: &[f32], net: u32) -> f64 {
-        let kept = self.channels.len();
-        let pixels = first.len() / kept;
-        let mut squares = vec![0.0; kept];
-        for (a, b) in first.chunks(kept).zip(second.chunks(kept)) {
-            for (square, (a, b)) in squares.iter_mut().zip(a.iter().zip(b)) {
-                *square += 0.5 * f64::from(a - b).powi(2) * f64::from(net) / pixels as f64;
-            }
-        }
-        let shares: Vec<f64> = squares
-            .iter()
-            .zip(self.variances(pixels))
-            .filter(|(_, of_paths)| *of_paths > 0.0)
-            .map(|(s, v)| s / v)
-            .collect();
-        if shares.is_empty() { 1.0 } else { (shares.iter().sum::<f64>() / shares.len() as f64).clamp(1e-4, 1.0) }
+            samples: units.len() as u32 * SINGLES + 2 * some.len() as u32 * net,
+        })
     }
 
     /// The scale that is expected to bring most, where evaluating a path in all channels costs `cost` of generating it. All paths are
@@ -267,11 +222,9 @@ impl Trial {
             let reason = format!("channel {dark} was dark in all samples of the pilot, and roulette could starve it");
             return all(reason, self.samples, self.means);
         }
-        let variances: Vec<f64> =
-            self.variances(self.pixels).iter().map(|variance| variance * self.share_of_nets).collect();
         // Powers of the square root of two: so that what differs in the last bits chooses the same.
         let scales = (-24..=24).map(|i| 2f64.powf(0.5 * f64::from(i)));
-        let expected = scales.map(|scale| (scale, self.expect(scale, cost, &variances)));
+        let expected = scales.map(|scale| (scale, self.expect(scale, cost)));
         let fair = expected.filter(|(_, expected)| expected.variance <= MOST_VARIANCE);
         let best = fair.max_by(|(_, a), (_, b)| a.rounded_gain().total_cmp(&b.rounded_gain()));
         match best {
@@ -293,8 +246,8 @@ impl Trial {
 
     /// What roulette with `scale` is expected to do. Dropping a path with the chance 1 - p and counting it for 1/p adds
     /// (1/p - 1) S² to the variance of what it scatters.
-    fn expect(&self, scale: f64, cost: f64, variances: &[f64]) -> Expected {
-        let kept = self.channels.len();
+    fn expect(&self, scale: f64, cost: f64) -> Expected {
+        let kept = self.variances.len();
         let paths = self.energy.len() as f64;
         let (mut evaluated, mut added) = (0.0, vec![0.0; kept]);
         for (path, energy) in self.scattered.chunks(kept).zip(&self.energy) {
@@ -302,20 +255,63 @@ impl Trial {
             if path.iter().all(|x| *x == 0.0) {
                 continue;
             }
-            let p = (scale * energy).clamp(LEAST_CHANCE, 1.0);
+            let p = (scale * energy).clamp(1.0 / f64::from(MOST_WEIGHT), 1.0);
             evaluated += p / paths;
             if p < 1.0 {
                 let more = (1.0 / p - 1.0) / paths;
                 added.iter_mut().zip(path).for_each(|(sum, &x)| *sum += more * f64::from(x).powi(2));
             }
         }
-        let grown =
-            added.iter().zip(variances).filter(|(added, _)| **added > 0.0).map(|(added, of_all)| 1.0 + added / of_all);
+        let grown = added
+            .iter()
+            .zip(&self.variances)
+            .filter(|(added, _)| **added > 0.0)
+            .map(|(added, of_all)| 1.0 + added / of_all);
         let (sum, variance) =
             grown.fold((0.0, 1.0), |(sum, most): (f64, f64), grown| (sum + grown - 1.0, most.max(grown)));
         let mean = 1.0 + sum / kept as f64;
         Expected { evaluated, variance, gain: (1.0 + cost) / (1.0 + cost * (evaluated + self.trying)) / mean }
     }
+}
+
+/// Independent samples, [epoch][pixel][channel].
+struct Samples<'a> {
+    radiance: &'a [f32],
+    pixels: usize,
+    channels: usize,
+}
+
+impl Samples<'_> {
+    /// Variance of each channel's samples around their pixel's mean, mean over the first so many pixels.
+    fn variances(&self, pixels: usize) -> Vec<f64> {
+        let epoch = self.pixels * self.channels;
+        let mut variances = vec![0.0; self.channels];
+        for pixel in 0..pixels {
+            for (k, variance) in variances.iter_mut().enumerate() {
+                let samples = || self.radiance.chunks(epoch).map(|epoch| f64::from(epoch[pixel * self.channels + k]));
+                let n = samples().count() as f64;
+                let mean = samples().sum::<f64>() / n;
+                *variance += samples().map(|x| (x - mean) * (x - mean)).sum::<f64>() / (n - 1.0) / pixels as f64;
+            }
+        }
+        variances
+    }
+}
+
+/// Variance of the sampler's nets over that of independent `singles`, per sample, 1 at most: from two means of a `net` in the first
+/// pixels; the mean over the channels, since each alone is known badly.
+fn share_of_nets(singles: &Samples, first: &[f32], second: &[f32], net: u32) -> f64 {
+    let kept = singles.channels;
+    let pixels = first.len() / kept;
+    let mut squares = vec![0.0; kept];
+    for (a, b) in first.chunks(kept).zip(second.chunks(kept)) {
+        for (square, (a, b)) in squares.iter_mut().zip(a.iter().zip(b)) {
+            *square += 0.5 * f64::from(a - b).powi(2) * f64::from(net) / pixels as f64;
+        }
+    }
+    let of_paths = singles.variances(pixels);
+    let shares: Vec<f64> = squares.iter().zip(&of_paths).filter(|(_, v)| **v > 0.0).map(|(s, v)| s / v).collect();
+    if shares.is_empty() { 1.0 } else { (shares.iter().sum::<f64>() / shares.len() as f64).clamp(1e-4, 1.0) }
 }
 
 struct Expected {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 
-use super::tree::Origin;
+use super::tree::{self, Entry, Origin};
 use crate::error::Problem;
 
 /// The file being read and everything found wrong with it so far. Decoding goes on after a mistake, so that
@@ -23,6 +23,25 @@ pub struct Context<'a> {
 impl<'a> Context<'a> {
     pub fn new(file: &'a Path, text: &'a str, overrides: &'a [(String, String)]) -> Self {
         Context { file, text, overrides, problems: RefCell::default(), warnings: RefCell::default() }
+    }
+
+    /// The document, or its mistakes of syntax recorded.
+    pub fn document(&self) -> Option<Vec<Entry>> {
+        let errors = match tree::parse_document(self.text) {
+            Ok(root) => return Some(root),
+            Err(errors) => errors,
+        };
+        let mut last_line = None;
+        for (span, message) in errors {
+            let line = span.as_ref().map(|span| position(self.text, span.start).0);
+            // What follows on the same line is mostly an echo of the first mistake.
+            if line.is_none() || line != last_line {
+                let origin = span.map_or(Origin::Whole, Origin::File);
+                self.error(&origin, "", format!("is not valid TOML: {message}"), None);
+            }
+            last_line = line;
+        }
+        None
     }
 
     /// A path of the scene, which is relative to the scene file.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::camera;
 use super::channels;
-use super::context::{Context, position};
+use super::context::Context;
 use super::coverage;
 use super::decode::{Fields, Item};
 use super::digest::digest;
@@ -16,7 +16,7 @@ use super::medium::Media;
 use super::object::Objects;
 use super::overrides;
 use super::spectrum::Spectra;
-use super::tree::{self, Entry, Origin};
+use super::tree::{Entry, Origin};
 use super::{Evaluation, Evaluator, Integrator, Sampler, Scene, Wavelengths};
 use crate::error::{Error, Problem, Result};
 
@@ -51,22 +51,7 @@ pub fn parse(text: &str, file: &Path, overrides: &[(String, String)]) -> Result<
     // A mark some editors put first; it is no part of the scene.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let cx = Context::new(file, text, overrides);
-    let mut root = match tree::parse_document(text) {
-        Ok(root) => root,
-        Err(errors) => {
-            let mut last_line = None;
-            for (span, message) in errors {
-                let line = span.as_ref().map(|span| position(text, span.start).0);
-                // What follows on the same line is mostly an echo of the first mistake.
-                if line.is_none() || line != last_line {
-                    let origin = span.map_or(Origin::Whole, Origin::File);
-                    cx.error(&origin, "", format!("is not valid TOML: {message}"), None);
-                }
-                last_line = line;
-            }
-            return Err(Error::Input(cx.finish().0));
-        }
-    };
+    let Some(mut root) = cx.document() else { return Err(Error::Input(cx.finish().0)) };
     overrides::apply(&cx, &mut root, overrides);
     let scene = decode(&cx, &root);
     let (problems, warnings) = cx.finish();

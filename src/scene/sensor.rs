@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use super::Quantity;
-use super::context::{Context, position};
+use super::context::Context;
 use super::decode::{Fields, Item};
 use super::keys;
 use super::spectrum::{Spectra, report_in_file};
-use super::tree::{self, Origin};
+use super::tree;
 use crate::error::{Error, Result};
 use crate::format::response;
 use crate::spectral::{Channels, Curve, Response};
@@ -93,25 +93,7 @@ pub fn load_sensor(file: &Path, channels: &Channels) -> Result<SensorModel> {
 pub fn parse_sensor(text: &str, file: &Path, channels: &Channels) -> Result<SensorModel> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let cx = Context::new(file, text, &[]);
-    let root = match tree::parse_document(text) {
-        Ok(root) => root,
-        Err(errors) => {
-            let mut lines = Vec::new();
-            for (span, message) in errors {
-                let line = span.as_ref().map(|span| position(text, span.start).0);
-                if !lines.contains(&line) {
-                    cx.error(
-                        &span.map_or(Origin::Whole, Origin::File),
-                        "",
-                        format!("is not valid TOML: {message}"),
-                        None,
-                    );
-                }
-                lines.push(line);
-            }
-            return Err(Error::Input(cx.finish().0));
-        }
-    };
+    let Some(root) = cx.document() else { return Err(Error::Input(cx.finish().0)) };
     let model = decode(&cx, &root, channels);
     let (problems, warnings) = cx.finish();
     if !problems.is_empty() {

@@ -3,12 +3,9 @@
 use std::f64::consts::PI;
 
 use crate::scene::{Detector, SensorModel};
-use crate::spectral::planck::{self, C2};
+use crate::spectral::planck::{self, C2, LIGHT_SPEED, PLANCK};
 use crate::spectral::{Channels, Curve, Response};
 
-/// Planck's constant, J s, and the speed of light, m/s (SI 2019).
-const H: f64 = 6.626_070_15e-34;
-const C: f64 = 299_792_458.0;
 /// Of a band, by the light that it sees, the channels must cover this much; one of which they do not is left out.
 const COVERED: f64 = 0.99;
 /// Where an integrand is no polynomial, an interval is cut into at least so many parts of three points each.
@@ -143,7 +140,7 @@ impl<'a> Sensor<'a> {
 
     /// Photons a joule, or 1.
     fn conversion(&self, nm: f64) -> f64 {
-        if self.is_photon { nm * 1e-9 / (H * C) } else { 1.0 }
+        if self.is_photon { nm * 1e-9 / (PLANCK * LIGHT_SPEED) } else { 1.0 }
     }
 
     fn behind(&self, response: Option<&'a Response>) -> Vec<&'a Curve> {

@@ -1,5 +1,9 @@
 //! Planck's law.
 
+/// Planck's constant, J s, the speed of light, m/s, and the charge of the electron, C (SI 2019, exact).
+pub const PLANCK: f64 = 6.626_070_15e-34;
+pub const LIGHT_SPEED: f64 = 299_792_458.0;
+pub const CHARGE: f64 = 1.602_176_634e-19;
 /// First radiation constant for spectral radiance, 2hc² (SI 2019), in W m² sr⁻¹.
 pub const C1L: f64 = 1.191_042_972_397_188_4e-16;
 /// Second radiation constant hc/k (SI 2019), in m K.

@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 use spectile::device::prepared::Prepared;
 use spectile::render::wave::{Budget, DeviceLimits, WavePlan};
 use spectile::scene::{Evaluator, Field, Filter, Projection, Sampler, Scene, Sides};
-use spectile::spectral::{Channels, Curve, Outside};
+use spectile::spectral::Channels;
 
 use crate::device::{self, Settings, render};
 use crate::scene_builder::*;
@@ -15,10 +15,6 @@ const OTHERS: [Evaluator; 3] = [Evaluator::DpeptPath, Evaluator::DpeptSpectral, 
 /// Kernels of general scenes take long to compile, and all of these read records by one text: the one that is chosen by itself.
 fn others(is_general: bool) -> impl Iterator<Item = Evaluator> {
     OTHERS.into_iter().filter(move |other| size::is_full() || !is_general || *other == Evaluator::Pt)
-}
-
-fn table(nm: &[f64], value: &[f64]) -> Curve {
-    Curve::Linear { nm: nm.to_vec(), value: value.to_vec(), outside: Outside::Hold }
 }
 
 fn with(scene: &Scene, evaluator: Evaluator) -> Scene {

@@ -12,15 +12,11 @@ use spectile::gpu::buffer;
 use spectile::render::wave::Budget;
 use spectile::render::worker::Worker;
 use spectile::scene::{Filter, Mesh, Projection, Sampler, Scene, Shape, Sides};
-use spectile::spectral::{Channels, Curve, Outside};
+use spectile::spectral::Channels;
 
 use crate::device::{Settings, render};
 use crate::scene_builder::*;
 use crate::size;
-
-fn table(nm: &[f64], value: &[f64]) -> Curve {
-    Curve::Linear { nm: nm.to_vec(), value: value.to_vec(), outside: Outside::Hold }
-}
 
 /// A scene that uses a bit of everything: triangles and shapes, several lamps, a sky, roulette, slanted spectra, one with
 /// a narrow line. 21 x 13 pixels, so that no tile fits.

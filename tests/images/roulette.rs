@@ -8,16 +8,12 @@ use spectile::device::prepared::Prepared;
 use spectile::render::pilot;
 use spectile::render::wave::Budget;
 use spectile::scene::{Evaluation, Evaluator, Field, Filter, Projection, Sampler, Scene, Sides};
-use spectile::spectral::{Channels, Curve, Outside, Response};
+use spectile::spectral::{Channels, Response};
 
 use crate::device::{self, Settings, assert_as_reference, render};
 use crate::scene_builder::*;
 use crate::size;
 use crate::statistics::{Bound, assert_agreement};
-
-fn table(nm: &[f64], value: &[f64]) -> Curve {
-    Curve::Linear { nm: nm.to_vec(), value: value.to_vec(), outside: Outside::Hold }
-}
 
 /// A floor under a small lamp and a coloured ball, 13 x 7 pixels: some paths bring a hundred times what others do.
 fn floor(channels: Channels) -> Builder {

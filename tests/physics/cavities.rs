@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 use spectile::scene::{Filter, Projection, Shape, Sides};
 use spectile::spectral::Channels;
 
-use super::{assert_exact, measure, table};
+use super::{assert_exact, measure};
 use crate::device::{Settings, render};
 use crate::scene_builder::closed_forms::{self, Case};
 use crate::scene_builder::*;

@@ -9,7 +9,6 @@ mod sides;
 mod spectra;
 
 use spectile::scene::Scene;
-use spectile::spectral::{Curve, Outside};
 
 use crate::device::{Settings, measure, render};
 
@@ -21,8 +20,4 @@ fn assert_exact(what: &str, scene: &Scene, samples: u32, expected: f64, allowanc
         let error = (f64::from(*value) / expected - 1.0).abs();
         assert!(error <= allowance, "{what}: {value} instead of {expected}, {error:e}");
     }
-}
-
-fn table(nm: &[f64], value: &[f64]) -> Curve {
-    Curve::Linear { nm: nm.to_vec(), value: value.to_vec(), outside: Outside::Hold }
 }

@@ -4,7 +4,7 @@ use glam::DVec3;
 use spectile::scene::{Sampler, Sides};
 use spectile::spectral::{Channels, Curve};
 
-use super::{measure, table};
+use super::measure;
 use crate::scene_builder::*;
 use crate::statistics::*;
 

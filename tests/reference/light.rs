@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 use glam::{DVec2, DVec3};
 use spectile::reference::Estimate;
 use spectile::scene::{Filter, Projection, Scene, Shape, Sides};
-use spectile::spectral::{Channels, Curve, Outside, planck};
+use spectile::spectral::{Channels, Curve, planck};
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
 use crate::scene_builder::closed_forms::{self, Case, form_factors, patch, patch_under_squares};
@@ -49,10 +49,6 @@ fn assert_exact(estimate: &Estimate, expected: &[f64], rounding: f64) {
 
 fn one_pixel(scene: &Scene, samples: u32, seed: u64) -> Estimate {
     render(scene, &[[0, 0]], samples, seed)
-}
-
-fn table(nm: &[f64], value: &[f64]) -> Curve {
-    Curve::Linear { nm: nm.to_vec(), value: value.to_vec(), outside: Outside::Hold }
 }
 
 /// Radiance after `vertices` surface vertices in a closed cavity.

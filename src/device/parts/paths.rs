@@ -1,6 +1,6 @@
 //! How paths are followed: where their random numbers come from, and when they end.
 
-use crate::device::part::{Part, Place, SceneBuffer};
+use crate::device::part::{Part, Place, SceneBuffer, Work};
 use crate::device::prepared::Prepared;
 use crate::device::text::module;
 
@@ -49,8 +49,7 @@ impl Thinning {
     }
 }
 
-/// The quads of channels that paths are tried in, as passes/thin_paths.wgsl has them. Each is compiled: long where records are
-/// instructions.
+/// The quads of channels that paths are tried in. Each is compiled: long where records are instructions.
 fn representative_quads(prepared: &Prepared) -> Vec<usize> {
     let (quads, most) = (prepared.tables.channels_padded / 4, if prepared.is_general() { 2 } else { 4 });
     let count = quads.min(most);
@@ -85,9 +84,15 @@ pub const ROULETTE_ON_EVALUATION: Part = Part {
         None => "8 bytes a path, and a pass that tries paths in a few channels".into(),
     },
     is_planned: true,
-    modules: &[(Place::Stage, module!("parts/paths/seen.wgsl"))],
+    modules: &[(Place::Generate, module!("parts/paths/seen.wgsl"))],
     lines: &[("BEYOND", "note_seen(&list);"), ("EMIT", "note_seen(&list);")],
-    defines: |_, _, defines| _ = defines.set("THINNED", true),
+    defines: |scene, work, defines| {
+        defines.set("THINNED", true);
+        if work == Work::Evaluate {
+            let quads = representative_quads(scene).into_iter().enumerate();
+            defines.lines("REPRESENTATIVE_QUADS", quads.map(|(v, quad)| format!("        let quad_{v} = {quad}u;")));
+        }
+    },
     buffers: |scene| match &scene.prepared.thinning {
         Some(thinning) => vec![SceneBuffer::new(
             "importances",

@@ -11,6 +11,7 @@ use crate::error::Problem;
 use crate::format::image::{self, Plane, Rgb};
 use crate::format::table::shown;
 use crate::format::unit::{self, Density, Unit};
+use crate::spectral::planck::LIGHT_SPEED;
 
 /// The file at `path` as spectra where it has emissive spectral channels, else as R, G and B.
 pub fn read_map(path: &Path) -> Result<Map, Box<Problem>> {
@@ -113,7 +114,6 @@ fn units(path: &Path) -> Option<String> {
 /// The wavelength, in nm, of an unpolarised emissive channel: `S0.` and a number with a decimal comma, an SI prefix, and
 /// m or Hz.
 fn emissive_band(name: &str) -> Option<f64> {
-    const LIGHT_SPEED: f64 = 299_792_458.0;
     let text = name.strip_prefix("S0.")?;
     // The number ends before the unit; an exponent is part of it.
     let digits = |c: char| c.is_ascii_digit() || matches!(c, ',' | '+' | '-');

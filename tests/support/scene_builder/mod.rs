@@ -10,7 +10,7 @@ use spectile::scene::{
     Light, Material, Mesh, Object, Projection, Reflectance, Sampler, Scene, Shape, Sides, Spectrum, Texels, Texture,
     TextureKind, Wavelengths, Weight,
 };
-use spectile::spectral::{Channels, Curve, upsample};
+use spectile::spectral::{Channels, Curve, Outside, upsample};
 
 /// A scene under construction. Starts empty and dark: one pixel that looks along -z from (0, 0, 1), one channel
 /// 500-600 nm, one bounce.
@@ -251,6 +251,11 @@ impl IntoCurve for Curve {
     fn into_curve(self) -> Curve {
         self
     }
+}
+
+/// Linear between nodes, held beyond them.
+pub fn table(nm: &[f64], value: &[f64]) -> Curve {
+    Curve::Linear { nm: nm.to_vec(), value: value.to_vec(), outside: Outside::Hold }
 }
 
 /// A projection so narrow that all rays of a film go to one point to within 1e-9 of the distance.
