@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use crate::device::accel::{Accel, bounds};
 use crate::device::parts::media::terms;
-use crate::scene::{Field, Light, Medium, Scene, Sides};
+use crate::scene::{Cone, Field, Light, Medium, Profile, Scene, Sides};
 use crate::spectral::{Curve, planck};
 
 /// A spectrum of radiance or the like, and what its power is proportional to.
@@ -33,6 +33,7 @@ impl<'a> Emitted<'a> {
             let light = &scene.lights[i];
             let per_value = match light {
                 Light::Point { .. } => 4.0 * accel.space.scale.powi(2),
+                Light::Spot { cone, .. } => flux_over_pi(cone) * accel.space.scale.powi(2),
                 Light::Directional { .. } | Light::Sun { .. } => cross_section,
             };
             (light.spectrum(), per_value)
@@ -51,6 +52,17 @@ impl<'a> Emitted<'a> {
         shares.extend(self.environment);
         shares.extend(hot_gases(scene, accel));
         shares
+    }
+}
+
+/// What a spot sends out, over π and its intensity on the axis: 2 ∫ profile(θ) sin θ dθ.
+fn flux_over_pi(cone: &Cone) -> f64 {
+    let (inner, outer) = (cone.falloff, cone.half_angle);
+    match cone.profile {
+        // Over 1 - cos θ the step is as much above ½ as below.
+        Profile::Smooth => (1.0 - inner.cos()) + (1.0 - outer.cos()),
+        Profile::Linear if outer - inner < 1e-6 => 2.0 * (1.0 - outer.cos()),
+        Profile::Linear => 2.0 * (1.0 - (outer.sin() - inner.sin()) / (outer - inner)),
     }
 }
 

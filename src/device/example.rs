@@ -9,8 +9,9 @@ use glam::{DAffine3, DMat3, DVec2, DVec3};
 use crate::device::accel;
 use crate::device::part::{PARTS, Part};
 use crate::scene::{
-    Absorber, Attributes, Bsdf, Emission, Environment, EnvironmentMap, Field, Grid, Interior, Light, Material, Medium,
-    Mesh, Object, Reflectance, Scene, Shape, Sides, Spectrum, Temperature, Texels, Texture, TextureKind, Weight,
+    Absorber, Attributes, Bsdf, Cone, Emission, Environment, EnvironmentMap, Field, Grid, Interior, Light, Material,
+    Medium, Mesh, Object, Placement, Profile, Reflectance, Scene, Shape, Sides, Spectrum, Temperature, Texels, Texture,
+    TextureKind, Weight,
 };
 use crate::spectral::{Curve, Outside};
 
@@ -143,6 +144,7 @@ impl Exhibit {
     pub fn add_textures(&mut self) {
         let colour = self.texture(TextureKind::Colour, &[0.5; 12]);
         let weight = self.texture(TextureKind::Number, &[0.5; 4]);
+        self.scene.textures[weight].placement.scale = DVec2::splat(2.0);
         let (mixture, eta) = (self.mixture(), self.index());
         let a = self.add_ball(Bsdf::Diffuse { reflectance: Reflectance::Texture(colour) }, None);
         let coated = Bsdf::Plastic { reflectance: Reflectance::Texture(mixture), eta, roughness: 0.2 };
@@ -221,6 +223,15 @@ impl Exhibit {
         ]);
     }
 
+    /// One of each profile.
+    pub fn add_spots(&mut self) {
+        let dark = self.spectrum(Curve::Constant(DARK));
+        for profile in [Profile::Smooth, Profile::Linear] {
+            let cone = Cone { half_angle: 0.5, falloff: 0.25, profile };
+            self.scene.lights.push(Light::Spot { position: self.at, direction: DVec3::NEG_Y, intensity: dark, cone });
+        }
+    }
+
     /// A map around the scene, where there is no environment yet.
     pub fn add_map(&mut self) {
         if self.scene.environment.is_some() {
@@ -251,7 +262,8 @@ impl Exhibit {
 
     /// 2 x 2 texels.
     fn texture(&mut self, kind: TextureKind, texels: &[f32]) -> usize {
-        let texture = Texture { name: "of everything".into(), size: [2, 2], kind, texels: texels.into() };
+        let placement = Placement::default();
+        let texture = Texture { name: "of everything".into(), size: [2, 2], kind, texels: texels.into(), placement };
         self.scene.textures.push(texture);
         self.scene.textures.len() - 1
     }

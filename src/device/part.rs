@@ -66,6 +66,7 @@ pub const PARTS: &[&Part] = &[
     &lights::AIMS,
     &sky::MAP,
     &lights::LAMPS,
+    &lights::SPOTS,
     &lights::SUNS,
     &lights::SURFACES,
     &heat::BY_ANGLE,

@@ -11,7 +11,7 @@ use crate::device::integration::Integration;
 use crate::device::part::{OnDevice, Records};
 use crate::device::parts::geometry;
 use crate::device::parts::heat::{self, Heat};
-use crate::device::parts::lights::{LightPicks, STEPS, light_picks};
+use crate::device::parts::lights::{self, LightPicks, STEPS, light_picks};
 use crate::device::parts::media::Media;
 use crate::device::parts::paths::Thinning;
 use crate::device::parts::radiators::Radiators;
@@ -21,7 +21,7 @@ use crate::device::spectra::{MAX_REGISTER_SPECTRA, SpectrumIds, daylight, spectr
 use crate::device::windows::Windows;
 use crate::device::words::{
     EMITS_BOTH_SIDES, EMITS_BY_ANGLE, EMITS_BY_PLACE, EMITTER_IS_LAMP, Emitter, Frame, HOT_COSINES, LAMP_DIRECTIONAL,
-    LAMP_POINT, LAMP_SUN, LOOP_LIMIT, Lamp, Material, NONE,
+    LAMP_POINT, LAMP_SPOT, LAMP_SUN, LOOP_LIMIT, Lamp, Material, NONE,
 };
 use crate::scene::{Attributes, Bsdf, Evaluator, Filter, Light, Projection, Reflectance, Sampler, Scene, Sides};
 use crate::spectral::table::SpectralTables;
@@ -335,29 +335,40 @@ fn emitters(
 
 /// The scene's lights as the device has them, and their places among the emitters.
 fn lamps(scene: &Scene, accel: &Accel, picks: &LightPicks, source: impl Fn(usize) -> u32) -> (Vec<Lamp>, Vec<Emitter>) {
-    let lamp = |(index, (&light, &pick)): (usize, (&usize, &f64))| {
+    let place = |towards: DVec3| towards.as_vec3().to_array();
+    let (mut lamps, mut emitters) = (Vec::new(), Vec::new());
+    for (&light, &pick) in picks.lamps.iter().zip(&picks.emitters[accel.emitters.len()..]) {
         let light = &scene.lights[light];
-        let place = |towards: DVec3| towards.as_vec3().to_array();
-        let (lamp, factor) = match *light {
+        let spectrum = source(light.spectrum()) | EMITTER_IS_LAMP;
+        let mut emitter = Emitter {
+            primitive: lamps.len() as u32,
+            spectrum,
+            pick: pick as f32,
+            area: accel.space.scale.powi(2) as f32,
+        };
+        match *light {
             Light::Point { position, .. } => {
-                let lamp = Lamp { place: accel.space.point(position), kind: LAMP_POINT, ..Lamp::default() };
-                (lamp, accel.space.scale.powi(2))
+                lamps.push(Lamp { place: accel.space.point(position), kind: LAMP_POINT, ..Lamp::default() });
+            }
+            Light::Spot { position, direction, ref cone, .. } => {
+                lamps.push(Lamp { place: accel.space.point(position), kind: LAMP_SPOT, ..Lamp::default() });
+                lamps.push(lights::cone(direction, cone));
             }
             Light::Directional { direction, .. } => {
-                (Lamp { place: place(-direction), kind: LAMP_DIRECTIONAL, ..Lamp::default() }, 1.0)
+                lamps.push(Lamp { place: place(-direction), kind: LAMP_DIRECTIONAL, ..Lamp::default() });
+                emitter.area = 1.0;
             }
             Light::Sun { direction, angular_radius, .. } => {
                 let (sine, half) = (angular_radius.sin(), (0.5 * angular_radius).sin());
                 let (sine2, versine) = ((sine * sine) as f32, (2.0 * half * half) as f32);
+                lamps.push(Lamp { place: place(-direction), kind: LAMP_SUN, sine2, versine, ..Lamp::default() });
                 // The irradiance facing a disk of unit radiance is π sin².
-                let factor = 1.0 / (PI * sine * sine);
-                (Lamp { place: place(-direction), kind: LAMP_SUN, sine2, versine, ..Lamp::default() }, factor)
+                emitter.area = (1.0 / (PI * sine * sine)) as f32;
             }
-        };
-        let spectrum = source(light.spectrum()) | EMITTER_IS_LAMP;
-        (lamp, Emitter { primitive: index as u32, spectrum, pick: pick as f32, area: factor as f32 })
-    };
-    picks.lamps.iter().zip(&picks.emitters[accel.emitters.len()..]).enumerate().map(lamp).unzip()
+        }
+        emitters.push(emitter);
+    }
+    (lamps, emitters)
 }
 
 fn material(scene: &Scene, m: &crate::scene::Material, factor: impl Fn(usize) -> u32) -> Material {

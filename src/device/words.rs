@@ -111,11 +111,21 @@ constants! {
     TEXTURES {
         TEXTURE_WORDS = 5;
     }
+    /// And of each in the list of their placements: scale and offset along u and v, and whether texels are nearest ones.
+    PLACEMENTS {
+        PLACEMENT_WORDS = 5;
+    }
     /// [`Lamp::kind`].
     LAMPS {
         LAMP_POINT = 0;
         LAMP_DIRECTIONAL = 1;
         LAMP_SUN = 2;
+    }
+    /// Further ones: a point that shines into a cone, which is the [`Lamp`] after it. And the kinds of cones: how they end.
+    SPOTS {
+        LAMP_SPOT = 3;
+        CONE_SMOOTH = 0;
+        CONE_LINEAR = 1;
     }
     /// [`Radiator::kind`]: what the surface does, in the low byte.
     RADIATORS {
@@ -298,11 +308,12 @@ pub struct Radiator {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
 pub struct Lamp {
-    /// Position in device units, or the unit vector towards the light.
+    /// Position in device units, or the unit vector towards the light; of a cone its axis.
     pub place: [f32; 3],
-    /// One of `LAMP_…`.
+    /// One of `LAMP_…`, or of a cone, one of `CONE_…`.
     pub kind: u32,
-    /// Of a sun's angular radius: sine squared, and 1 - cos.
+    /// Of a sun's angular radius: sine squared, and 1 - cos. Of a cone where it begins to fall, and where it ends: 1 - cos of
+    /// that, or with `CONE_LINEAR` the angles over π.
     pub sine2: f32,
     pub versine: f32,
     pub unused: [u32; 2],

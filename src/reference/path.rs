@@ -9,7 +9,7 @@ use glam::{DAffine3, DVec3};
 use super::bsdf::{Bsdf, SpectralValues, Vertex};
 use super::camera;
 use super::gas::{self, Piece};
-use super::lights::{LightPoint, Lights, Target, disk_solid_angle, emits, sample_disk};
+use super::lights::{LightPoint, Lights, Target, disk_solid_angle, emits, sample_disk, spot_share};
 use super::primitive::{Ray, SurfacePoint};
 use super::rng::Rng;
 use super::shading::Shading;
@@ -328,6 +328,14 @@ impl<'a> Tracer<'a> {
                         let emitted = Emitted::Spectrum { spectrum: intensity, scale: 1.0 / (distance2 * probability) };
                         let direction = towards.try_normalize()?;
                         Some(Aim { direction, target: Some(position), density: None, emitted })
+                    }
+                    Light::Spot { position, direction: axis, intensity, cone } => {
+                        let towards = position - hit.point.position;
+                        let direction = towards.try_normalize()?;
+                        let share = spot_share(&cone, axis.angle_between(-direction));
+                        let scale = share / (towards.length_squared() * probability);
+                        let emitted = Emitted::Spectrum { spectrum: intensity, scale };
+                        (share > 0.0).then_some(Aim { direction, target: Some(position), density: None, emitted })
                     }
                     Light::Directional { direction, irradiance } => {
                         let emitted = Emitted::Spectrum { spectrum: irradiance, scale: 1.0 / probability };

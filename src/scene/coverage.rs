@@ -58,6 +58,7 @@ fn sources(scene: &Scene) -> Vec<Source> {
     for light in &scene.lights {
         let kind = match light {
             Light::Point { .. } => "point light",
+            Light::Spot { .. } => "spot light",
             Light::Directional { .. } => "directional light",
             Light::Sun { .. } => "sun",
         };

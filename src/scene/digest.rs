@@ -7,9 +7,10 @@ use glam::DVec3;
 use sha2::{Digest, Sha256};
 
 use super::{
-    Absorber, Attributes, Bsdf, Camera, Emission, Environment, EnvironmentMap, Evaluation, Field, Film, Filter, Grid,
-    Integrator, Interior, Light, Material, Medium, Mesh, Object, Projection, Reflectance, Sampler, Scene, Shape, Sides,
-    Spectrum, Temperature, Texels, Texture, TextureKind, Wavelengths, Weight,
+    Absorber, Attributes, Bsdf, Camera, Cone, Emission, Environment, EnvironmentMap, Evaluation, Field, Film, Filter,
+    Grid, Integrator, Interior, Light, Material, Medium, Mesh, Object, Placement, Profile, Projection, Reflectance,
+    Sampler, Scene, Shape, Sides, Spectrum, Temperature, Texels, Texture, TextureFilter, TextureKind, Wavelengths,
+    Weight,
 };
 use crate::spectral::{Channels, Curve, Outside};
 
@@ -272,7 +273,16 @@ impl Hash {
     }
 
     fn texture(&mut self, texture: &Texture) {
-        let Texture { name: _, size, kind, texels } = texture;
+        let Texture { name: _, size, kind, texels, placement } = texture;
+        // Before the tag of its kind, which is less; nothing where it is usual, so that other scenes keep their digests.
+        if *placement != Placement::default() {
+            let Placement { filter, scale, offset } = placement;
+            self.tag(match filter {
+                TextureFilter::Bilinear => 100,
+                TextureFilter::Nearest => 101,
+            });
+            self.numbers(&[scale.x, scale.y, offset.x, offset.y]);
+        }
         match kind {
             TextureKind::Colour => self.tag(0),
             TextureKind::Mixture(endmembers) => {
@@ -388,6 +398,17 @@ impl Hash {
                 self.tag(0);
                 self.vector(*position);
                 self.count(*intensity);
+            }
+            Light::Spot { position, direction, intensity, cone: Cone { half_angle, falloff, profile } } => {
+                self.tag(3);
+                self.vector(*position);
+                self.vector(*direction);
+                self.count(*intensity);
+                self.numbers(&[*half_angle, *falloff]);
+                self.tag(match profile {
+                    Profile::Smooth => 0,
+                    Profile::Linear => 1,
+                });
             }
             Light::Directional { direction, irradiance } => {
                 self.tag(1);

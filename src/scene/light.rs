@@ -3,12 +3,12 @@
 use glam::DVec3;
 use toml::value::Datetime;
 
-use super::Light;
 use super::decode::{Fields, Item};
 use super::keys;
 use super::spectrum::{Handle, Quantity, Spectra};
 use super::sun;
 use super::tree::Value;
+use super::{Cone, Light, Profile};
 
 /// Degrees. Smaller disks are too narrow for a device to tell which directions are inside; larger ones are no disks.
 const ANGULAR_RADIUS: std::ops::RangeInclusive<f64> = 0.001..=90.0;
@@ -27,6 +27,15 @@ fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Light> {
             let position = fields.require("position", "position = [0, 0, 0]").and_then(|item| item.vector());
             let intensity = spectrum(&fields, "intensity", Quantity::Intensity, spectra);
             Some(Light::Point { position: position?, intensity: spectra.take(intensity?) })
+        }
+        Some("spot") => {
+            let fields = kind.table(&keys::SPOT)?;
+            let position = fields.require("position", "position = [0, 0, 0]").and_then(|item| item.vector());
+            let direction = direction(&fields);
+            let intensity = spectrum(&fields, "intensity", Quantity::Intensity, spectra);
+            let cone = cone(&fields);
+            let (position, direction) = (position?, direction?);
+            Some(Light::Spot { position, direction, intensity: spectra.take(intensity?), cone: cone? })
         }
         Some("directional") => {
             let fields = kind.table(&keys::DIRECTIONAL)?;
@@ -61,6 +70,23 @@ fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Light> {
             Some(Light::Sun { direction, angular_radius, irradiance: spectra.take(irradiance) })
         }
     }
+}
+
+fn cone(fields: &Fields) -> Option<Cone> {
+    let half_angle =
+        fields.require("half_angle", "half_angle = 30, in degrees, where the light ends").and_then(|item| {
+            item.number_where(|degrees| degrees > 0.0 && degrees <= 180.0, "an angle in (0, 180] degrees")
+        });
+    let profile = fields
+        .get("profile")
+        .map_or(Some(Profile::Smooth), |item| item.choice(&[("smooth", Profile::Smooth), ("linear", Profile::Linear)]));
+    let half_angle = half_angle?;
+    let falloff = fields.get("falloff").map_or(Some(half_angle), |item| {
+        let range = format!("an angle in [0, {half_angle}] degrees, up to `half_angle`");
+        item.number_where(|degrees| (0.0..=half_angle).contains(&degrees), &range)
+    });
+    let (half_angle, falloff) = (half_angle.to_radians(), falloff?.to_radians());
+    Some(Cone { half_angle, falloff, profile: profile? })
 }
 
 /// A sun in the scene.

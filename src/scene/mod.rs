@@ -310,9 +310,9 @@ pub enum Weight {
     Texture(TextureId),
 }
 
-/// Numbers over a surface by its texture coordinates (u, v): u runs right, v up, both repeat. Texel (x, y), counted from
-/// the top left, is centred at u = (x + ½) / width, 1 - v = (y + ½) / height; between centres everything is bilinear:
-/// of colours the spectra, not their coefficients.
+/// Numbers over a surface by its texture coordinates (u, v), scaled and moved as its placement says: u runs right, v up, both
+/// repeat. Texel (x, y), counted from the top left, is centred at u = (x + ½) / width, 1 - v = (y + ½) / height; between centres
+/// everything is bilinear, of colours the spectra, not their coefficients, unless the placement says otherwise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Texture {
     /// The file, for messages.
@@ -320,8 +320,31 @@ pub struct Texture {
     /// Width and height.
     pub size: [u32; 2],
     pub kind: TextureKind,
-    /// \[y\]\[x\]\[channel\], rows from the top.
+    /// \[y\]\[x\]\[channel\], rows from the top. Those of one picture are shared.
     pub texels: Arc<[f32]>,
+    pub placement: Placement,
+}
+
+/// How a texture lies on a surface: looked up at (u, v) · scale + offset.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Placement {
+    pub filter: TextureFilter,
+    pub scale: DVec2,
+    pub offset: DVec2,
+}
+
+impl Default for Placement {
+    fn default() -> Self {
+        Placement { filter: TextureFilter::Bilinear, scale: DVec2::ONE, offset: DVec2::ZERO }
+    }
+}
+
+/// What a texture is between the centres of its texels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TextureFilter {
+    Bilinear,
+    /// The texel that a point lies in, all over it.
+    Nearest,
 }
 
 /// What the channels of a texture are.
@@ -507,6 +530,15 @@ pub enum Light {
         /// W sr⁻¹ nm⁻¹, the same in all directions.
         intensity: SpectrumId,
     },
+    /// A point that shines into a cone.
+    Spot {
+        position: DVec3,
+        /// In which the light on the cone's axis travels; a unit vector.
+        direction: DVec3,
+        /// W sr⁻¹ nm⁻¹ on the axis.
+        intensity: SpectrumId,
+        cone: Cone,
+    },
     Directional {
         /// In which the light travels; a unit vector.
         direction: DVec3,
@@ -524,11 +556,31 @@ pub enum Light {
     },
 }
 
+/// How the intensity of a spot depends on the angle θ to its axis, in radians: 1 up to `falloff`, 0 from `half_angle` on, and
+/// as the profile says between.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cone {
+    /// In (0, π].
+    pub half_angle: f64,
+    /// In [0, `half_angle`].
+    pub falloff: f64,
+    pub profile: Profile,
+}
+
+/// How a spot's intensity falls from 1 to 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Profile {
+    /// t²(3 - 2t), t = (cos θ - cos `half_angle`) / (cos `falloff` - cos `half_angle`).
+    Smooth,
+    /// t = (`half_angle` - θ) / (`half_angle` - `falloff`).
+    Linear,
+}
+
 impl Light {
     /// Its spectrum: intensity or irradiance.
     pub fn spectrum(&self) -> SpectrumId {
         match self {
-            Light::Point { intensity, .. } => *intensity,
+            Light::Point { intensity, .. } | Light::Spot { intensity, .. } => *intensity,
             Light::Directional { irradiance, .. } | Light::Sun { irradiance, .. } => *irradiance,
         }
     }

@@ -5,11 +5,13 @@ use std::path::PathBuf;
 use std::rc::Rc;
 use std::sync::Arc;
 
-use super::decode::{Item, list};
+use glam::DVec2;
+
+use super::decode::{Fields, Item, list};
 use super::keys;
 use super::spectrum::{self, Quantity, Spectra, report_in_file};
 use super::tree::Value;
-use super::{Texture, TextureId, TextureKind};
+use super::{Placement, Texture, TextureFilter, TextureId, TextureKind};
 use crate::format::image::{self, Format, Image, Plane, Rgb};
 use crate::format::noise::{self, Range};
 use crate::format::primaries::{self, White};
@@ -21,6 +23,9 @@ const MAX_ENDMEMBERS: usize = 32;
 const MOST_ABUNDANT: f64 = 1.01;
 /// Sums beyond this are more than the last digits of f32.
 const NOTICEABLE: f64 = 1e-6;
+
+/// The most that coordinates are scaled and moved by: f32 still tells a thousandth of the picture there.
+const FARTHEST: f64 = 1e4;
 
 /// A checked texture; [`Textures::take`] makes it part of the scene.
 pub type Handle = usize;
@@ -45,6 +50,7 @@ enum Use {
 struct Checked {
     path: PathBuf,
     kind: Use,
+    placement: Placement,
     size: [u32; 2],
     texels: Arc<[f32]>,
     warnings: Vec<String>,
@@ -76,12 +82,14 @@ impl Textures {
             None => None,
             Some(list) => Some((resolve_endmembers(&list, spectra)?, list)),
         };
-        let file = file?;
+        let (file, placement) = (file?, placement(&fields)?);
         match endmembers {
-            None => self.add(&file, Use::Colour, |image, path| colours(&file, image, path, spectra)),
+            None => self.add(&file, Use::Colour, placement, |image, path| colours(&file, image, path, spectra)),
             Some((handles, names)) => {
                 let count = handles.len();
-                self.add(&file, Use::Mixture(handles), |image, path| abundances(&file, &names, count, image, path))
+                self.add(&file, Use::Mixture(handles), placement, |image, path| {
+                    abundances(&file, &names, count, image, path)
+                })
             }
         }
     }
@@ -89,8 +97,10 @@ impl Textures {
     /// The numbers over a surface that `item`, `{ texture }`, spells.
     pub fn number(&mut self, item: &Item, number: Number) -> Option<Handle> {
         let fields = item.table(&keys::TEXTURE_OF_NUMBERS)?;
-        let file = fields.require("texture", "texture = \"mask.png\"")?;
-        self.add(&file, Use::Number(number), |image, path| numbers(&file, number, image, path))
+        let file = fields.require("texture", "texture = \"mask.png\"");
+        let placement = placement(&fields);
+        let file = file?;
+        self.add(&file, Use::Number(number), placement?, |image, path| numbers(&file, number, image, path))
     }
 
     /// The index of a checked texture in the scene. Equal ones share one.
@@ -106,7 +116,7 @@ impl Textures {
             Use::Number(_) => TextureKind::Number,
         };
         let (name, texels) = (checked.path.display().to_string(), Arc::clone(&checked.texels));
-        let texture = Texture { name, size: checked.size, kind, texels };
+        let texture = Texture { name, size: checked.size, kind, texels, placement: checked.placement };
         let id = self.scene.iter().position(|same| *same == texture).unwrap_or_else(|| {
             self.scene.push(texture);
             self.scene.len() - 1
@@ -125,6 +135,7 @@ impl Textures {
         &mut self,
         file: &Item,
         kind: Use,
+        placement: Placement,
         decode: impl FnOnce(&Image, &str) -> Option<(Vec<f32>, Vec<String>)>,
     ) -> Option<Handle> {
         let name = file.text()?;
@@ -137,13 +148,44 @@ impl Textures {
                 read
             }
         }?;
-        if let Some(same) = self.checked.iter().position(|known| known.path == path && known.kind == kind) {
+        let known = |known: &&Checked| known.path == path && known.kind == kind;
+        if let Some(same) = self.checked.iter().position(|other| known(&other) && other.placement == placement) {
             return Some(same);
         }
-        let (texels, warnings) = decode(&image, name)?;
-        self.checked.push(Checked { path, kind, size: image.size, texels: texels.into(), warnings, taken: None });
+        // Another placement of the same picture says again what it warns of only if that is left out.
+        let (texels, warnings) = match self.checked.iter().find(known) {
+            Some(other) => (Arc::clone(&other.texels), other.warnings.clone()),
+            None => decode(&image, name).map(|(texels, warnings)| (texels.into(), warnings))?,
+        };
+        self.checked.push(Checked { path, kind, placement, size: image.size, texels, warnings, taken: None });
         Some(self.checked.len() - 1)
     }
+}
+
+/// How a texture lies on its surface.
+fn placement(fields: &Fields) -> Option<Placement> {
+    let usual = Placement::default();
+    let filter = fields.get("filter").map_or(Some(usual.filter), |item| {
+        item.choice(&[("bilinear", TextureFilter::Bilinear), ("nearest", TextureFilter::Nearest)])
+    });
+    let two = "a number, or two [u, v]";
+    let scale = fields.get("scale").map_or(Some(usual.scale), |item| match item.node.value {
+        Value::Array(_) => item.numbers::<2>(two).map(DVec2::from_array),
+        _ => item.number().map(DVec2::splat),
+    });
+    let offset = fields
+        .get("offset")
+        .map_or(Some(usual.offset), |item| item.numbers::<2>("two numbers [u, v]").map(DVec2::from_array));
+    let (filter, scale, offset) = (filter?, scale?, offset?);
+    // What f32 can tell apart within a picture.
+    for (key, value) in [("scale", scale), ("offset", offset)] {
+        if value.abs().max_element() > FARTHEST {
+            let item = fields.get(key)?;
+            item.error(format!("must lie in [-{FARTHEST}, {FARTHEST}], but is {value}"));
+            return None;
+        }
+    }
+    Some(Placement { filter, scale, offset })
 }
 
 fn resolve_endmembers<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Vec<spectrum::Handle>> {

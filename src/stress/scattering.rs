@@ -9,7 +9,7 @@ use super::probe::{Chosen, SAMPLES, Scattering, bin, random};
 use super::{Bench, Case};
 use crate::Result;
 use crate::device::prepared::Prepared;
-use crate::scene::{Bsdf, Scene, Texture, TextureKind, Weight};
+use crate::scene::{Bsdf, Placement, Scene, Texture, TextureKind, Weight};
 
 pub const CASES: &[Case] = &[Case {
     group: "sampling",
@@ -175,6 +175,7 @@ fn ball(bench: &Bench, material: &Material) -> Result<Scene> {
                 size,
                 kind: TextureKind::Number,
                 texels: texels.into(),
+                placement: Placement::default(),
             });
             *weight = Weight::Texture(0);
         }

@@ -8,5 +8,6 @@ mod lights;
 mod materials;
 mod media;
 mod roulette;
+mod spots;
 mod textures;
 mod wavelengths;

@@ -7,7 +7,9 @@
 use std::f64::consts::{PI, TAU};
 
 use glam::{DMat3, DVec2, DVec3};
-use spectile::scene::{Attributes, Filter, Mesh, Projection, Scene, Shape, Sides, TextureKind};
+use spectile::scene::{
+    Attributes, Filter, Mesh, Placement, Projection, Scene, Shape, Sides, TextureFilter, TextureKind,
+};
 use spectile::spectral::{Channels, Curve, Outside, upsample};
 
 use crate::device::{Settings, render};
@@ -439,4 +441,34 @@ fn weights_of_0_and_1_leave_one_material() {
         let b = b.diffuse(plate.clone(), 0.8).diffuse(plate.clone(), 0.2).masked_last_two(plate, mask);
         exact(&format!("weight {weight}"), &b.attributes(quad_uv()).build(), &[expected], 1e-6);
     }
+}
+
+/// A picture that is scaled, moved, mirrored, and one of whole texels: by hand.
+#[test]
+fn placements_scale_move_and_step() {
+    // Rows from the top: 0.1 0.2 / 0.4 0.8.
+    let texels = [0.1, 0.2, 0.4, 0.8];
+    let at = |placement: Placement, u: f64, v: f64, expected: f64| {
+        let mut b = Builder::new();
+        let texture = b.mixture([2, 2], &texels, &[Curve::Constant(1.0)]);
+        b.0.textures[texture].placement = placement;
+        let camera = straight(DVec3::new(2.0 * u, v, 0.0), DVec3::Z);
+        let plate = quad(DVec3::ZERO, 2.0 * DVec3::X, DVec3::Y);
+        let scene = b.camera(camera).sky(1.0).textured(plate, texture).attributes(quad_uv()).build();
+        exact(&format!("{placement:?} at {u}, {v}"), &scene, &[expected], 4.0 * texel_rounding(2.0));
+    };
+    let usual = Placement::default();
+    let nearest = Placement { filter: TextureFilter::Nearest, ..usual };
+    at(nearest, 0.01, 0.51, 0.1);
+    at(nearest, 0.49, 0.99, 0.1);
+    at(nearest, 0.51, 0.49, 0.8);
+    at(nearest, 0.99, 0.01, 0.8);
+    // Three pictures along u, one along v: u = 0.6 is 0.8 of the second, between the columns' centres by 0.1 beyond the last.
+    let thrice = Placement { scale: DVec2::new(3.0, 1.0), ..usual };
+    at(thrice, 0.6, 0.75, 0.9 * 0.2 + 0.1 * 0.1);
+    at(Placement { filter: TextureFilter::Nearest, ..thrice }, 0.6, 0.75, 0.2);
+    // Mirrored in u, moved half a picture in v.
+    let mirrored = Placement { scale: DVec2::new(-1.0, 1.0), offset: DVec2::new(0.0, 0.5), ..usual };
+    at(mirrored, 0.25, 0.25, 0.2);
+    at(mirrored, 0.75, 0.75, 0.4);
 }

@@ -8,7 +8,7 @@ use exr::prelude::{
     f16,
 };
 use glam::DVec3;
-use spectile::scene::{self, Environment, EnvironmentMap, Light, Scene, Texels};
+use spectile::scene::{self, Environment, EnvironmentMap, Light, Profile, Scene, Texels};
 use spectile::spectral::{Curve, upsample};
 use spectile::{Error, Result};
 
@@ -55,10 +55,29 @@ fn lights_resolve() {
 }
 
 #[test]
+fn spots_resolve() {
+    let spot = |more: &str| {
+        let text = format!(
+            "[[lights]]\nspot = {{ position = [1, 2, 3], direction = [0, 0, -2], intensity = \"lamp\", half_angle = 30{more} }}"
+        );
+        let scene = good(&with(&text), &[], &[]);
+        let [Light::Spot { position, direction, cone, .. }] = scene.lights[..] else { panic!("{:?}", scene.lights) };
+        assert_eq!((position, direction), (DVec3::new(1.0, 2.0, 3.0), DVec3::NEG_Z));
+        (cone.half_angle.to_degrees().round(), cone.falloff.to_degrees().round(), cone.profile)
+    };
+    assert_eq!(spot(""), (30.0, 30.0, Profile::Smooth));
+    assert_eq!(spot(", falloff = 0, profile = \"linear\""), (30.0, 0.0, Profile::Linear));
+}
+
+#[test]
 fn wrong_lights() {
     #[rustfmt::skip]
-    let cases: [(&str, &str, &str, &[&str]); 13] = [
-        ("no kind", "[[lights]] #!", "lights.0", &["has no kind of light", "point, directional, sun"]),
+    let cases: [(&str, &str, &str, &[&str]); 17] = [
+        ("no half angle", "[[lights]]\nspot = { position = [0, 0, 0], direction = [0, 0, 1], intensity = 1 } #!", "lights.0.spot.half_angle", &["`half_angle` is missing"]),
+        ("wide spot", "[[lights]]\nspot = { position = [0, 0, 0], direction = [0, 0, 1], intensity = 1, half_angle = 181 } #!", "lights.0.spot.half_angle", &["(0, 180] degrees, but is 181"]),
+        ("falls beyond its end", "[[lights]]\nspot = { position = [0, 0, 0], direction = [0, 0, 1], intensity = 1, half_angle = 20, falloff = 25 } #!", "lights.0.spot.falloff", &["[0, 20] degrees, up to `half_angle`, but is 25"]),
+        ("unknown profile", "[[lights]]\nspot = { position = [0, 0, 0], direction = [0, 0, 1], intensity = 1, half_angle = 20, profile = \"cubic\" } #!", "lights.0.spot.profile", &["must be one of", "\"linear\""]),
+        ("no kind", "[[lights]] #!", "lights.0", &["has no kind of light", "point, spot, directional, sun"]),
         ("two kinds", "[[lights]]\npoint = { position = [0, 0, 0], intensity = 1 }\nsun = { direction = [0, 0, 1], angular_radius = 1, irradiance = 1 } #!", "lights.0.sun", &["only one kind of light"]),
         ("misspelt", "[[lights]]\npiont = { position = [0, 0, 0], intensity = 1 } #!", "lights.0.piont", &["did you mean `point`?"]),
         ("key of point", "[[lights]]\npoint = { position = [0, 0, 0], intensity = 1, irradiance = 1 } #!", "lights.0.point.irradiance", &["unknown key"]),

@@ -6,7 +6,7 @@ use exr::prelude::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer,
 use glam::{DMat3, DVec2, DVec3};
 use spectile::Error;
 use spectile::error::Problem;
-use spectile::scene::{self, Bsdf, Reflectance, Scene, Temperature, TextureKind, Weight};
+use spectile::scene::{self, Bsdf, Placement, Reflectance, Scene, Temperature, TextureFilter, TextureKind, Weight};
 
 use super::BASE;
 
@@ -156,7 +156,7 @@ fn wrong_textures() {
         ("{ texture = \"two.exr\", endmembers = [0.1, \"gravel\"] }", ".endmembers.1", &["no spectrum is named"]),
         ("{ texture = \"negative.exr\", endmembers = [0.1, 0.2] }", ".texture", &["[0, 1]", "channel a is -0.02"]),
         ("{ endmembers = [0.1] }", ".texture", &["missing"]),
-        ("{ texture = \"grey.png\", scale = 2 }", ".scale", &["unknown key"]),
+        ("{ texture = \"grey.png\", scales = 2 }", ".scales", &["unknown key", "did you mean `scale`"]),
     ] {
         let problems = load(&with_reflectance(reflectance), &files).expect_err(reflectance);
         let [problem] = &problems[..] else { panic!("{reflectance}: {problems:?}") };
@@ -337,4 +337,34 @@ fn digests_count_textures() {
         assert!(all[..i].iter().all(|b| a != b), "{i}");
     }
     assert_eq!(all[0], digest(colour, 0.25));
+}
+
+#[test]
+fn placements_resolve_and_share_their_picture() {
+    let files = [("albedo.png", png([1, 1], png::ColorType::Rgb, &[255, 0, 188]))];
+    let text =
+        with_reflectance("{ texture = \"albedo.png\", filter = \"nearest\", scale = [2, -3], offset = [0.5, 0] }")
+            .replace(
+                "[materials.soot.black]",
+                "[materials.soot.diffuse]\nreflectance = { texture = \"albedo.png\", scale = 4 }",
+            );
+    let text =
+        text.replace("mesh = \"tri.obj\"", "quad = { corner = [0, 0, 1], edge_u = [1, 0, 0], edge_v = [0, 1, 0] }");
+    let scene = load(&text, &files).unwrap_or_else(|e| panic!("{e:?}"));
+    let [a, b] = &scene.textures[..] else { panic!("{:?}", scene.textures) };
+    let placed =
+        Placement { filter: TextureFilter::Nearest, scale: DVec2::new(2.0, -3.0), offset: DVec2::new(0.5, 0.0) };
+    assert_eq!(a.placement, placed);
+    assert_eq!(b.placement, Placement { scale: DVec2::splat(4.0), ..Placement::default() });
+    assert!(std::sync::Arc::ptr_eq(&a.texels, &b.texels));
+    for (wrong, words) in [
+        ("filter = \"cubic\"", "must be one of \"bilinear\", \"nearest\""),
+        ("scale = 1e5", "must lie in [-10000, 10000]"),
+        ("offset = [0, 2e4]", "must lie in [-10000, 10000]"),
+        ("offset = 1", "must be two numbers [u, v]"),
+    ] {
+        let text = with_reflectance(&format!("{{ texture = \"albedo.png\", {wrong} }}"));
+        let problems = load(&text, &files).expect_err(wrong);
+        assert!(problems[0].to_string().contains(words), "{wrong}: {problems:?}");
+    }
 }

@@ -26,6 +26,15 @@ fn aim_at_lamp(emitter: Emitter, origin: vec3<f32>, u: vec2<f32>) -> LampAim {
         let distance2 = dot(towards, towards);
         return LampAim(towards, select(0.0, emitter.pick, distance2 > 0.0), emitter.area / max(distance2, 1.0e-30), LAMP_POINT);
     }
+#if SPOTS
+    if (lamp.w == LAMP_SPOT) {
+        let towards = place - origin;
+        let distance2 = dot(towards, towards);
+        let share = spot_share(2u * emitter.primitive, towards);
+        let density = select(0.0, emitter.pick, distance2 > 0.0 && share > 0.0);
+        return LampAim(towards, density, emitter.area * share / max(distance2, 1.0e-30), LAMP_POINT);
+    }
+#endif
     if (lamp.w == LAMP_DIRECTIONAL) {
         return LampAim(place, emitter.pick, emitter.area, LAMP_DIRECTIONAL);
     }

@@ -15,13 +15,33 @@ struct Around {
     weight: vec4<f32>,
 }
 
+#if PLACED
+#constants PLACEMENTS
+
+fn placed_number(texture: u32, word: u32) -> vec2<f32> {
+    let at = FIRST_PLACEMENT + PLACEMENT_WORDS * texture + word;
+    return vec2<f32>(bitcast<f32>(textures[at]), bitcast<f32>(textures[at + 1u]));
+}
+#endif
+
 // Bilinear, repeated, v up.
+#if PLACED
+fn texels_around(texture: u32, uv_of_surface: vec2<f32>) -> Around {
+    let uv = uv_of_surface * placed_number(texture, 0u) + placed_number(texture, 2u);
+#else
 fn texels_around(texture: u32, uv: vec2<f32>) -> Around {
+#endif
     let size = vec2<u32>(textures[TEXTURE_WORDS * texture + 1u], textures[TEXTURE_WORDS * texture + 2u]);
     // From the top left, 0 at the centre of the first texel.
     let place = fract(vec2<f32>(uv.x, 1.0 - uv.y)) * vec2<f32>(size) - 0.5;
     let before = floor(place);
+#if PLACED
+    // All of the weight is the nearest texel's.
+    let nearest = textures[FIRST_PLACEMENT + PLACEMENT_WORDS * texture + 4u] != 0u;
+    let share = select(place - before, floor(place - before + 0.5), nearest);
+#else
     let share = place - before;
+#endif
     let low = (vec2<u32>(vec2<i32>(before) + vec2<i32>(size))) % size;
     let high = (low + 1u) % size;
     return Around(

@@ -9,7 +9,10 @@ pub const ATTRIBUTES: Part = Part {
     used: |scene| scene.surfaces.as_ref().is_some_and(|surfaces| surfaces.attributes),
     effect: |scene| format_bytes(size_of_val(scene.accel.attributes.as_slice()) as u64),
     is_planned: true,
-    modules: &[(Place::Generate, module!("parts/attributes/attributes.wgsl"))],
+    modules: &[
+        (Place::Generate, module!("common/turn.wgsl")),
+        (Place::Generate, module!("parts/attributes/attributes.wgsl")),
+    ],
     defines: |_, _, defines| _ = defines.set("ATTRIBUTES", true),
     buffers: |scene| {
         let content = "the texture coordinates and normals of the scene";

@@ -1,10 +1,15 @@
 //! Decision probabilities of next-event estimation, common to all channels (docs/METHOD.md, Decisions).
 
+use std::f64::consts::FRAC_1_PI;
+
+use glam::DVec3;
+
 use crate::device::accel::Accel;
 use crate::device::emission::{Emitted, area, radiance};
 use crate::device::part::{OnDevice, Part, Place, Records, SceneBuffer};
 use crate::device::text::module;
-use crate::scene::{Light, Scene};
+use crate::device::words::{CONE_LINEAR, CONE_SMOOTH, LAMP_SPOT, Lamp};
+use crate::scene::{Cone, Light, Profile, Scene};
 use crate::spectral::Curve;
 
 pub const AREA_LIGHTS: Part = Part {
@@ -65,6 +70,17 @@ pub const LAMPS: Part = Part {
     ..Part::NOTHING
 };
 
+pub const SPOTS: Part = Part {
+    name: "spot lights",
+    used: |scene| scene.lamps.iter().any(|lamp| lamp.kind == LAMP_SPOT),
+    effect: |_| "32 bytes more of each".into(),
+    is_planned: true,
+    modules: &[(Place::Generate, module!("common/turn.wgsl")), (Place::Generate, module!("parts/lights/spot.wgsl"))],
+    defines: |_, _, defines| _ = defines.set("SPOTS", true),
+    example: Some(|exhibit| exhibit.add_spots()),
+    ..Part::NOTHING
+};
+
 pub const SUNS: Part = Part {
     name: "suns",
     used: |scene| scene.suns > 0,
@@ -87,6 +103,17 @@ pub const SURFACES: Part = Part {
     lines: &[("AIM_AT_EMITTER", "aim_at_surface(&aim, path, emitter, seen_from, u);")],
     ..Part::NOTHING
 };
+
+/// The cone of a spot, as it stands after it among the lamps.
+pub fn cone(direction: DVec3, cone: &Cone) -> Lamp {
+    let versine = |angle: f64| 2.0 * (0.5 * angle).sin().powi(2);
+    let (kind, [falls, ends]) = match cone.profile {
+        Profile::Smooth => (CONE_SMOOTH, [cone.falloff, cone.half_angle].map(versine)),
+        Profile::Linear => (CONE_LINEAR, [cone.falloff, cone.half_angle].map(|angle| angle * FRAC_1_PI)),
+    };
+    let place = direction.as_vec3().to_array();
+    Lamp { place, kind, sine2: falls as f32, versine: ends as f32, ..Lamp::default() }
+}
 
 /// With which probability next-event estimation asks which light.
 #[derive(Debug, Clone, PartialEq, Default)]

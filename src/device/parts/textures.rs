@@ -1,11 +1,12 @@
 //! Textures as devices get them (`shaders/parts/textures/texture.wgsl`), and bounds of what they reflect.
 
 use std::collections::HashSet;
+use std::sync::Arc;
 
 use crate::device::part::{Part, Place, SceneBuffer};
 use crate::device::text::module;
 use crate::device::words::{NONE, TEXTURE_WORDS};
-use crate::scene::{Scene, SpectrumId, Texture, TextureId, TextureKind};
+use crate::scene::{Placement, Scene, SpectrumId, Texture, TextureFilter, TextureId, TextureKind};
 use crate::spectral::upsample::{self, smooth_of};
 use crate::spectral::{Curve, Outside};
 
@@ -36,6 +37,9 @@ pub const TEXTURES: Part = Part {
         defines.set("PRODUCTS", shares || hot.numbers);
         if let Some(first) = textures.first_share {
             defines.constant("FIRST_SHARE", first);
+        }
+        if let Some(first) = textures.first_placement {
+            defines.set("PLACED", true).constant("FIRST_PLACEMENT", first);
         }
         if let Some(place) = surfaces.visible_place {
             defines.constant("VISIBLE_PLACE", place);
@@ -69,6 +73,8 @@ pub struct Textures {
     ids: Vec<usize>,
     pub colours: bool,
     pub mixtures: bool,
+    /// Where the placements of all textures start in `words`, where any is unusual.
+    pub first_placement: Option<u32>,
 }
 
 impl Textures {
@@ -76,6 +82,12 @@ impl Textures {
     pub fn new(scene: &Scene, mut position: impl FnMut(SpectrumId) -> u32) -> Textures {
         let mut textures = Textures { words: vec![0; HEAD * scene.textures.len()], ..Textures::default() };
         for (i, texture) in scene.textures.iter().enumerate() {
+            // Where the same picture lies otherwise on another surface it is there already.
+            let known = |other: &&Texture| Arc::ptr_eq(&other.texels, &texture.texels) && other.kind == texture.kind;
+            if let Some(other) = scene.textures[..i].iter().position(|other| known(&other)) {
+                textures.words.copy_within(HEAD * other..HEAD * (other + 1), HEAD * i);
+                continue;
+            }
             let first = textures.texels.len() as u32;
             let mut spectra_at = NONE;
             match &texture.kind {
@@ -98,6 +110,14 @@ impl Textures {
             let [width, height] = texture.size;
             let head = [first, width, height, texture.channels() as u32, spectra_at];
             textures.words[HEAD * i..HEAD * (i + 1)].copy_from_slice(&head);
+        }
+        if scene.textures.iter().any(|texture| texture.placement != Placement::default()) {
+            textures.first_placement = Some(textures.words.len() as u32);
+            for Texture { placement: Placement { filter, scale, offset }, .. } in &scene.textures {
+                let numbers = [scale.x, scale.y, offset.x, offset.y].map(|number| (number as f32).to_bits());
+                textures.words.extend(numbers);
+                textures.words.push(u32::from(*filter == TextureFilter::Nearest));
+            }
         }
         textures
     }

@@ -19,7 +19,7 @@ fn material(bsdf: Bsdf) -> Material {
 }
 
 fn texture(kind: TextureKind, texels: &[f32]) -> Texture {
-    Texture { name: "t".into(), size: [1, 2], kind, texels: texels.into() }
+    Texture { name: "t".into(), size: [1, 2], kind, texels: texels.into(), placement: Placement::default() }
 }
 
 /// One of everything, with numbers that are no two alike. It need not make sense.

@@ -1,24 +1,25 @@
 //! Light that comes from no surface.
 
-use super::Kind::{Direction, File, Number, Spectrum, Table, Text, Vector};
+use super::Kind::{Choice, Direction, File, Number, Spectrum, Table, Text, Vector};
 use super::{CELSIUS, Key, Section};
 use crate::scene::Quantity;
 
 pub static LIGHT: Section = Section {
     path: "lights.N",
     heading: "`[[lights]]`",
-    summary: "light from a point, a direction or a sun",
-    about: "A light has one of three kinds. Lamps with a surface are objects with `emission`.",
+    summary: "light from a point, a spot, a direction or a sun",
+    about: "A light has one of four kinds. Lamps with a surface are objects with `emission`.",
     keys: &[
         Key::one_of("point", Table, "Shines from a point, the same in all directions.").tables(&[&POINT]),
+        Key::one_of("spot", Table, "Shines from a point into a cone.").tables(&[&SPOT]),
         Key::one_of("directional", Table, "Parallel light from far away.").tables(&[&DIRECTIONAL]),
         Key::one_of("sun", Table, "Light from a disk far away, which the camera sees and whose shadows are soft.")
             .tables(&[&SUN]),
     ],
     later: &[],
     at: "lights.0",
-    examples: &[A_POINT, A_DIRECTIONAL, A_SUN],
-    notes: "Points and directional light are seen neither by the camera nor in smooth mirrors; suns are. `direction` \
+    examples: &[A_POINT, A_SPOT, A_DIRECTIONAL, A_SUN],
+    notes: "Points, spots and directional light are seen neither by the camera nor in smooth mirrors; suns are. `direction` \
             is where light *travels*: a sun in the zenith has `[0, -1, 0]` in scenes whose up is +y, `[0, 0, -1]` \
             where it is +z.",
 };
@@ -26,6 +27,14 @@ pub static LIGHT: Section = Section {
 const A_POINT: &str = r#"
 [[lights]]
 point = { position = [2, -2, 4], intensity = { blackbody = 3000, scale = 1e-3 } }
+"#;
+const A_SPOT: &str = r#"
+[[lights]]
+spot = { position = [0, 0, 3], direction = [0, 0, -1], intensity = 20, half_angle = 30 }
+"#;
+const A_SOFT_SPOT: &str = r#"
+[[lights]]
+spot = { position = [0, 0, 3], direction = [0, 0, -1], intensity = 20, half_angle = 30, falloff = 25, profile = "linear" }
 "#;
 const A_DIRECTIONAL: &str = r#"
 [[lights]]
@@ -71,6 +80,43 @@ pub static POINT: Section = Section {
     at: "lights.0.point",
     examples: &[A_POINT],
     notes: "",
+};
+
+pub static SPOT: Section = Section {
+    path: "lights.N.spot",
+    heading: "`spot = { … }`",
+    summary: "light from a point into a cone",
+    about: "",
+    keys: &[
+        Key::required("position", Vector, "Where it is.").unit("m"),
+        Key::required("direction", Direction, "The direction that the light on its axis travels in."),
+        Key::required(
+            "intensity",
+            Spectrum(Quantity::Intensity),
+            "Radiant intensity on the axis: irradiance is it divided by the square of the distance in metres.",
+        ),
+        Key::required("half_angle", Number, "From the axis to where the light ends.").unit("degrees").range("(0, 180]"),
+        Key::optional(
+            "falloff",
+            Number,
+            "`half_angle`: a sharp edge",
+            "From the axis to where the intensity begins to fall.",
+        )
+        .unit("degrees")
+        .range("[0, 180], at most `half_angle`"),
+        Key::default(
+            "profile",
+            Choice(&["smooth", "linear"]),
+            "\"smooth\"",
+            "How the intensity falls over the angle θ to the axis, from `falloff` to `half_angle`: `smooth` as t²(3 - 2t), t linear \
+             in cos θ; `linear` as t, linear in θ.",
+        ),
+    ],
+    later: &[],
+    at: "lights.0.spot",
+    examples: &[A_SPOT, A_SOFT_SPOT],
+    notes: "`smooth` is the spot of pbrt (`coneangle` is `half_angle`, less `conedeltaangle` it is `falloff`), `linear` that of \
+            Mitsuba (`cutoff_angle` and `beam_width`).",
 };
 
 pub static DIRECTIONAL: Section = Section {

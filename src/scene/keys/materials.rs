@@ -1,6 +1,6 @@
 //! What surfaces do with light.
 
-use super::Kind::{Boolean, File, List, Name, Number, Refused, Spectrum, Table};
+use super::Kind::{Boolean, Choice, File, List, Name, Number, Refused, Spectrum, Table};
 use super::{CELSIUS, Key, Section};
 use crate::scene::Quantity;
 
@@ -260,6 +260,28 @@ pub static BLACK: Section = Section {
     notes: "",
 };
 
+const FILTER: Key = Key::default(
+    "filter",
+    Choice(&["bilinear", "nearest"]),
+    "\"bilinear\"",
+    "What is between the centres of texels: their mean by distance, or each texel all over itself.",
+);
+const SCALE: Key = Key::default(
+    "scale",
+    Number,
+    "1.0",
+    "Multiplies the texture coordinates of the surface, before `offset` is added: 2 shows the picture twice along each side; \
+     negative values mirror.",
+)
+.or("`[u, v]`")
+.range("[-1e4, 1e4]");
+const OFFSET: Key = Key::default(
+    "offset",
+    List("`[u, v]`"),
+    "[0, 0]",
+    "Added to the scaled texture coordinates, each from -1e4 to 1e4.",
+);
+
 pub static TEXTURE: Section = Section {
     path: "texture",
     heading: "`{ texture = …, endmembers = … }`",
@@ -282,6 +304,9 @@ pub static TEXTURE: Section = Section {
              name in an OpenEXR: they sort by the alphabet. Shares that sum to less than 1 leave the rest black.",
         )
         .tables(&[&super::SPECTRUM]),
+        FILTER,
+        SCALE,
+        OFFSET,
     ],
     later: &[],
     at: "materials.ground.diffuse.reflectance",
@@ -297,7 +322,7 @@ outside = "hold"
 "#,
         r#"
 [materials.ground.diffuse]
-reflectance = { texture = "albedo.png" }
+reflectance = { texture = "albedo.png", filter = "nearest", scale = [4, 2], offset = [0.5, 0] }
 "#,
     ],
     notes: "",
@@ -308,12 +333,17 @@ pub static TEXTURE_OF_NUMBERS: Section = Section {
     heading: "`{ texture = … }`",
     summary: "a weight or temperature that differs from place to place",
     about: "In the place of the `weight` of a blend or of a surface's `temperature`.",
-    keys: &[Key::required(
-        "texture",
-        File,
-        "A grey picture, or one whose R, G and B are the same. Of weights: PNG or OpenEXR, in [0, 1], taken as they \
-         are. Of temperatures: OpenEXR, in K, in [0, 1e9]; what is at 0 emits nothing.",
-    )],
+    keys: &[
+        Key::required(
+            "texture",
+            File,
+            "A grey picture, or one whose R, G and B are the same. Of weights: PNG or OpenEXR, in [0, 1], taken as they \
+             are. Of temperatures: OpenEXR, in K, in [0, 1e9]; what is at 0 emits nothing.",
+        ),
+        FILTER,
+        SCALE,
+        OFFSET,
+    ],
     later: &[],
     at: "materials.roof.diffuse.temperature",
     examples: &[r#"
@@ -322,6 +352,9 @@ reflectance = 0.2
 
 [materials.roof.diffuse.temperature]
 texture = "kelvin.exr"
+filter = "nearest"
+scale = 0.5
+offset = [0.25, 0.25]
 "#],
     notes: "",
 };

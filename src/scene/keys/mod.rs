@@ -278,6 +278,7 @@ pub static SECTIONS: &[&Section] = &[
     &TRANSFORM,
     &LIGHT,
     &POINT,
+    &SPOT,
     &DIRECTIONAL,
     &SUN,
     &ENVIRONMENT,

@@ -6,9 +6,9 @@ pub mod surfaces;
 
 use glam::{DMat3, DVec2, DVec3};
 use spectile::scene::{
-    Attributes, Bsdf, Camera, Emission, Environment, EnvironmentMap, Evaluation, Evaluator, Film, Filter, Integrator,
-    Light, Material, Mesh, Object, Projection, Reflectance, Sampler, Scene, Shape, Sides, Spectrum, Texels, Texture,
-    TextureKind, Wavelengths, Weight,
+    Attributes, Bsdf, Camera, Cone, Emission, Environment, EnvironmentMap, Evaluation, Evaluator, Film, Filter,
+    Integrator, Light, Material, Mesh, Object, Placement, Projection, Reflectance, Sampler, Scene, Shape, Sides,
+    Spectrum, Texels, Texture, TextureKind, Wavelengths, Weight,
 };
 use spectile::spectral::{Channels, Curve, Outside, upsample};
 
@@ -95,6 +95,12 @@ impl Builder {
     pub fn point(mut self, position: DVec3, intensity: impl IntoCurve) -> Self {
         let intensity = self.spectrum(intensity);
         self.0.lights.push(Light::Point { position, intensity });
+        self
+    }
+
+    pub fn spot(mut self, position: DVec3, direction: DVec3, intensity: impl IntoCurve, cone: Cone) -> Self {
+        let (direction, intensity) = (direction.normalize(), self.spectrum(intensity));
+        self.0.lights.push(Light::Spot { position, direction, intensity, cone });
         self
     }
 
@@ -204,7 +210,8 @@ impl Builder {
     }
 
     pub fn texture(&mut self, size: [u32; 2], texels: &[f32], kind: TextureKind) -> usize {
-        let texture = Texture { name: "texture".into(), size, kind, texels: texels.into() };
+        let placement = Placement::default();
+        let texture = Texture { name: "texture".into(), size, kind, texels: texels.into(), placement };
         assert_eq!(texels.len(), size[0] as usize * size[1] as usize * texture.channels());
         self.0.textures.push(texture);
         self.0.textures.len() - 1
