@@ -125,6 +125,11 @@ impl Exhibit {
         }
     }
 
+    pub fn add_leaf(&mut self) {
+        let grey = Reflectance::Spectrum(self.spectrum(Curve::Constant(0.4)));
+        self.add_ball(Bsdf::Translucent { reflectance: grey, transmittance: grey }, None);
+    }
+
     pub fn add_brushed_metal(&mut self) {
         let metal = self.metal([0.3, 0.1]);
         self.add_ball(metal, None);
@@ -181,6 +186,8 @@ impl Exhibit {
         self.add_ball(metal, cold);
         self.add_ball(Bsdf::Diffuse { reflectance: mixture }, cold);
         self.add_ball(Bsdf::Plastic { reflectance: mixture, eta, roughness: 0.2 }, cold);
+        let dark = Reflectance::Spectrum(self.spectrum(Curve::Constant(0.1)));
+        self.add_ball(Bsdf::Translucent { reflectance: mixture, transmittance: dark }, cold);
     }
 
     pub fn add_lamp(&mut self) {

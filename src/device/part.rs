@@ -58,6 +58,7 @@ pub const PARTS: &[&Part] = &[
     &spectra::KNOTS,
     &spectra::REGISTERS,
     &surfaces::LOBES,
+    &surfaces::TRANSMISSION,
     &surfaces::BRUSHED,
     &surfaces::TABLES_IN_EVALUATION,
     &textures::TEXTURES,

@@ -91,6 +91,10 @@ constants! {
         LOBE_ROUGH_COAT = 9;
         LOBE_BASE = 10;
     }
+    /// A further one: Lambert's law on the other side.
+    LOBE_THROUGH {
+        LOBE_TRANSMITTED = 11;
+    }
     /// And the bits above it.
     LOBE_FLAGS {
         LOBE_OPAQUE = 0x100;
@@ -143,6 +147,12 @@ constants! {
         RADIATOR_TWO_SIDED = 0x100;
         /// What is inside absorbs as spectrum `inner` says: below a coat, or what facets have scattered more than once.
         RADIATOR_ABSORBS = 0x200;
+    }
+    /// Further bits: what is inside keeps, beside its textured reflectance, what spectrum a says; or what the texture in the
+    /// upper half of the word says.
+    RADIATORS_THROUGH {
+        RADIATOR_PASSES_SPECTRUM = 0x400;
+        RADIATOR_PASSES_TEXTURE = 0x800;
     }
     /// Facets that a rough metal shows at once; cosines at which the emission of a side is known.
     HEAT {

@@ -214,6 +214,11 @@ impl Hash {
         match bsdf {
             Bsdf::Diffuse { reflectance } => self.reflectance([0, 6], reflectance),
             Bsdf::Black => self.tag(1),
+            Bsdf::Translucent { reflectance, transmittance } => {
+                self.tag(9);
+                self.reflectance([0, 6], reflectance);
+                self.reflectance([0, 6], transmittance);
+            }
             Bsdf::Conductor { eta, k, roughness, energy_compensation } => {
                 self.tag(2);
                 self.count(*eta);

@@ -5,6 +5,7 @@ use super::decode::{Fields, Item, did_you_mean, list};
 use super::keys;
 use super::spectrum::{Handle, Quantity, Spectra};
 use super::texture::{self, Number, Textures, is_texture};
+use super::translucent;
 use super::tree::Value;
 use super::{Bsdf, Material, MaterialId, Reflectance, SMOOTH, Temperature, Texture, Weight};
 use crate::format::unit;
@@ -21,6 +22,7 @@ const TRANSPARENT: &str = "absorbs nothing, so it emits nothing and has no tempe
 /// A material as the file defines it.
 pub enum Kind<'a> {
     Diffuse { reflectance: Reflects },
+    Translucent { reflectance: Reflects, transmittance: Reflects },
     Conductor { eta: Handle, k: Handle, roughness: [f64; 2], energy_compensation: bool },
     Dielectric { eta: Handle, dispersion: bool, roughness: f64 },
     Plastic { reflectance: Reflects, eta: Handle, roughness: f64 },
@@ -119,6 +121,10 @@ impl<'a> Materials<'a> {
         });
         let bsdf = match declared.kind {
             Kind::Diffuse { reflectance } => Bsdf::Diffuse { reflectance: self.take_reflectance(reflectance, spectra) },
+            Kind::Translucent { reflectance, transmittance } => Bsdf::Translucent {
+                reflectance: self.take_reflectance(reflectance, spectra),
+                transmittance: self.take_reflectance(transmittance, spectra),
+            },
             Kind::Conductor { eta, k, roughness, energy_compensation } => {
                 Bsdf::Conductor { eta: spectra.take(eta), k: spectra.take(k), roughness, energy_compensation }
             }
@@ -167,6 +173,10 @@ impl<'a> Materials<'a> {
         let material = &self.scene[id];
         let needs = match material.bsdf {
             Bsdf::Diffuse { reflectance } | Bsdf::Plastic { reflectance, .. } => textured(reflectance),
+            Bsdf::Translucent { reflectance, transmittance } => {
+                let (a, b) = (textured(reflectance), textured(transmittance));
+                Needs { uv: a.uv || b.uv, ..a }
+            }
             Bsdf::Conductor { roughness: [x, y], .. } => Needs { uv: false, tangent: x != y, normal: true },
             Bsdf::Dielectric { .. } => Needs { uv: false, tangent: false, normal: true },
             Bsdf::Blend { a, b, weight } => {
@@ -241,8 +251,8 @@ fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>, textures: &mut Texture
     let (fields, kind) = match kind.path.rsplit('.').next() {
         Some("diffuse") => {
             let fields = kind.table(&keys::DIFFUSE)?;
-            let reflectance = diffusely_reflects(&fields, spectra, textures);
-            (fields, reflectance.map(|reflectance| Kind::Diffuse { reflectance }))
+            let kind = diffuse(&fields, spectra, textures);
+            (fields, kind)
         }
         Some("conductor") => {
             let fields = kind.table(&keys::CONDUCTOR)?;
@@ -382,11 +392,43 @@ fn blend<'a>(fields: &Fields<'a>, textures: &mut Textures) -> Option<Kind<'a>> {
 }
 
 fn reflects<'a>(fields: &Fields<'a>, spectra: &mut Spectra<'a>, textures: &mut Textures) -> Option<Reflects> {
-    let item = fields.require("reflectance", REFLECTANCE)?;
-    if is_texture(&item) {
-        return textures.reflectance(&item, spectra).map(Reflects::Texture);
+    share_of_light(&fields.require("reflectance", REFLECTANCE)?, spectra, textures)
+}
+
+/// A spectrum or texture of what becomes of light.
+fn share_of_light<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>, textures: &mut Textures) -> Option<Reflects> {
+    if is_texture(item) {
+        return textures.reflectance(item, spectra).map(Reflects::Texture);
     }
-    spectra.resolve(&item, Quantity::Reflectance).map(Reflects::Spectrum)
+    spectra.resolve(item, Quantity::Reflectance).map(Reflects::Spectrum)
+}
+
+/// A surface that scatters by Lambert's law, on one side or on both.
+fn diffuse<'a>(fields: &Fields<'a>, spectra: &mut Spectra<'a>, textures: &mut Textures) -> Option<Kind<'a>> {
+    let reflectance = diffusely_reflects(fields, spectra, textures);
+    let Some(item) = fields.get("transmittance") else {
+        return reflectance.map(|reflectance| Kind::Diffuse { reflectance });
+    };
+    let transmittance = share_of_light(&item, spectra, textures);
+    if let Some(emissivity) = fields.get("emissivity") {
+        emissivity.error_help(
+            "does not say how much is reflected beside `transmittance`",
+            "give `reflectance`: the emissivity is 1 - reflectance - transmittance",
+        );
+        return None;
+    }
+    if let Some(sides) = fields.get("two_sided")
+        && sides.boolean() == Some(false)
+    {
+        sides.error_help(
+            "a surface with a `transmittance` has two sides: light that passes through it comes from the other one",
+            "remove `two_sided`, or `transmittance`",
+        );
+        return None;
+    }
+    let (reflectance, transmittance) = (reflectance?, transmittance?);
+    translucent::check(&item, [reflectance, transmittance], spectra, textures)?;
+    Some(Kind::Translucent { reflectance, transmittance })
 }
 
 /// Of a diffuse surface, whose emissivity is the same in all directions, that may be given instead.

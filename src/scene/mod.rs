@@ -23,6 +23,7 @@ mod spectrum;
 mod sun;
 mod texture;
 mod transform;
+mod translucent;
 mod tree;
 mod words;
 
@@ -262,6 +263,11 @@ pub enum Temperature {
 pub enum Bsdf {
     Diffuse {
         reflectance: Reflectance,
+    },
+    /// Lambert's law on both sides: of what arrives from either, some is reflected and some transmitted, together 1 at most.
+    Translucent {
+        reflectance: Reflectance,
+        transmittance: Reflectance,
     },
     /// Complex index of refraction η + i k, k > 0 absorbs.
     Conductor {

@@ -281,6 +281,16 @@ impl<'a> Spectra<'a> {
     }
 
     /// Says `warning` to the user, once.
+    /// The curve of a checked spectrum.
+    pub fn checked_curve(&self, handle: Handle) -> &Curve {
+        &self.checked[handle].curve
+    }
+
+    /// The channels, where they are right.
+    pub fn channels(&self) -> Option<&Channels> {
+        self.channels.as_ref()
+    }
+
     pub fn warn(&self, warning: String) {
         self.cx.warn(warning);
     }

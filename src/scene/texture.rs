@@ -57,6 +57,15 @@ struct Checked {
     taken: Option<TextureId>,
 }
 
+/// A texture of colours, or of shares of spectra.
+pub struct Picture<'t> {
+    pub endmembers: Option<&'t [spectrum::Handle]>,
+    pub placement: Placement,
+    pub size: [u32; 2],
+    /// \[y\]\[x\]\[channel\].
+    pub texels: &'t [f32],
+}
+
 /// All textures of a scene; a file is read once.
 #[derive(Default)]
 pub struct Textures {
@@ -101,6 +110,17 @@ impl Textures {
         let placement = placement(&fields);
         let file = file?;
         self.add(&file, Use::Number(number), placement?, |image, path| numbers(&file, number, image, path))
+    }
+
+    /// A checked texture of colours or mixtures, as it is.
+    pub fn picture(&self, handle: Handle) -> Picture<'_> {
+        let Checked { kind, placement, size, texels, .. } = &self.checked[handle];
+        let endmembers = match kind {
+            Use::Mixture(endmembers) => Some(&endmembers[..]),
+            Use::Colour => None,
+            Use::Number(_) => unreachable!("numbers are no reflectance"),
+        };
+        Picture { endmembers, placement: *placement, size: *size, texels }
     }
 
     /// The index of a checked texture in the scene. Equal ones share one.

@@ -368,3 +368,35 @@ fn placements_resolve_and_share_their_picture() {
         assert!(problems[0].to_string().contains(words), "{wrong}: {problems:?}");
     }
 }
+
+/// What leaves reflect and let through is 1 at most, at every wavelength and in every texel.
+#[test]
+fn what_passes_and_is_reflected_is_no_more_than_all() {
+    let files = [
+        ("a.png", png([2, 1], png::ColorType::Grayscale, &[204, 51])),
+        ("b.png", png([2, 1], png::ColorType::Grayscale, &[51, 204])),
+    ];
+    let leaf = |transmittance: &str, more: &str| {
+        let text = format!("[materials.white.diffuse]\n{more}\ntransmittance = {transmittance} #!");
+        load(&BASE.replace("[materials.white.diffuse]\nreflectance = \"grey\"", &text), &files)
+    };
+    let of = |name: &str, more: &str| format!("{{ texture = \"{name}\", endmembers = [1.0]{more} }}");
+    let (a, b) = (format!("reflectance = {}", of("a.png", "")), of("b.png", ""));
+    for (transmittance, more) in [("0.5", "reflectance = 0.5"), (b.as_str(), a.as_str()), ("0.2", a.as_str())] {
+        let scene = leaf(transmittance, more).unwrap_or_else(|e| panic!("{transmittance}: {e:?}"));
+        assert!(matches!(scene.materials[0].bsdf, Bsdf::Translucent { .. }));
+    }
+    let step = "{ samples = [[400, 0.2], [550, 0.2], [551, 0.7], [552, 0.2], [700, 0.2]] }";
+    for (transmittance, more, words) in [
+        ("0.51", "reflectance = 0.5", "must be 1 at most together, but are 1.010000"),
+        (step, "reflectance = 0.4", "but are 1.100000 at 551.0 nm"),
+        ("0.3", a.as_str(), "but are 1.100000"),
+        // Placed otherwise, what is dark here may lie on what is bright there.
+        (of("b.png", ", scale = 2").as_str(), a.as_str(), "but are 1.600000"),
+        ("0.1", "emissivity = 0.5", "does not say how much is reflected"),
+        ("0.1", "reflectance = 0.5\ntwo_sided = false", "has two sides"),
+    ] {
+        let problems = leaf(transmittance, more).expect_err(transmittance);
+        assert!(problems[0].to_string().contains(words), "{transmittance}: {problems:?}");
+    }
+}

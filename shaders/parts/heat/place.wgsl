@@ -44,6 +44,14 @@ fn append_heat(list: ptr<function, RecordList>, emitted: u32, v: Vertex, scale: 
 #if HOT_TEXTURED
             if (r.reflectance != NONE) {
                 append_reflectance(list, r.reflectance, v.uv, 1.0, MODE_KEEP);
+#if HOT_TRANSLUCENT
+                if ((r.kind & RADIATOR_PASSES_SPECTRUM) != 0u) {
+                    append(list, OP_SPECTRUM | MODE_KEEP, r.spectra & 0xffffu, 1.0, 0.0);
+                }
+                if ((r.kind & RADIATOR_PASSES_TEXTURE) != 0u) {
+                    append_reflectance(list, r.kind >> 16u, v.uv, 1.0, MODE_KEEP);
+                }
+#endif
                 append(list, OP_ABSORBED | MODE_START, r.inner & 0xffffu, 1.0, select(1.0, 0.0, kind == RADIATOR_OPEN));
                 mode = 0u;
             }

@@ -18,5 +18,8 @@ struct Radiator {
 }
 
 #constants RADIATORS EMITS_BY_PLACE
+#if HOT_TRANSLUCENT
+#constants RADIATORS_THROUGH
+#endif
 
 @group(0) @binding(15) var<storage, read> radiators: array<Radiator>;

@@ -172,6 +172,11 @@ fn lobe_density(lobe: Lobe, v: Vertex, i: vec3<f32>) -> f32 {
             return max(-i.z, 0.0) * INV_PI;
         }
 #endif
+#if TRANSMITTED
+        case LOBE_TRANSMITTED: {
+            return max(-i.z, 0.0) * INV_PI;
+        }
+#endif
         default: {
             return max(i.z, 0.0) * INV_PI;
         }
@@ -231,6 +236,20 @@ fn append_lobe(list: ptr<function, RecordList>, lobe: Lobe, v: Vertex, i: vec3<f
 #endif
             append(list, OP_SPECTRUM | MODE_SINGLE, a, weight * cosine, 0.0);
         }
+#if TRANSMITTED
+        case LOBE_TRANSMITTED: {
+            if (i.z < 0.0) {
+                let passed = weight * -i.z * INV_PI;
+#if TEXTURED
+                if ((lobe.kind & LOBE_TEXTURED) != 0u) {
+                    append_reflectance(list, lobe.loss, v.uv, passed, MODE_SINGLE);
+                    return;
+                }
+#endif
+                append(list, OP_SPECTRUM | MODE_SINGLE, a, passed, 0.0);
+            }
+        }
+#endif
 #if ROUGH_CONDUCTOR
         case LOBE_ROUGH_CONDUCTOR: {
             if (i.z > 0.0) {

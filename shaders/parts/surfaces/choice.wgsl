@@ -140,6 +140,11 @@ fn choose_direction(material: SurfaceMaterial, vertex: ptr<function, Vertex>, u_
             choice.direction.z = -choice.direction.z;
         }
 #endif
+#if TRANSMITTED
+        case LOBE_TRANSMITTED: {
+            choice.direction.z = -choice.direction.z;
+        }
+#endif
         default: {
         }
     }

@@ -36,6 +36,9 @@ struct Lobe {
 }
 
 #constants LOBE_KINDS LOBE_FLAGS
+#if TRANSMITTED
+#constants LOBE_THROUGH
+#endif
 
 @group(0) @binding(12) var<storage, read> surface_materials: array<SurfaceMaterial>;
 @group(0) @binding(13) var<storage, read> lobes: array<Lobe>;

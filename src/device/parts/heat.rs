@@ -70,6 +70,7 @@ pub const BY_PLACE: Part = Part {
         defines.set("RADIATORS", true).set("HOT_LAMPS", features.lamps);
         defines.set("HOT_FACETS", features.facets).set("HOT_MIRRORS", features.mirrors);
         defines.set("HOT_VARNISH", features.varnish).set("HOT_COATS", features.coats);
+        defines.set("HOT_TRANSLUCENT", features.translucent);
         defines.set("HOT_TEXTURED", features.textured).set("HOT_NUMBERS", features.numbers);
     },
     buffers: |scene| {
@@ -171,6 +172,7 @@ struct Seen<'l> {
 enum Absorber {
     Black,
     Diffuse,
+    Translucent,
     Mirror,
     RoughMetal { facets: Arc<FacetCosines>, again: Option<Arc<ReflectionAlbedo>> },
     Varnish,
@@ -224,6 +226,7 @@ impl Seen<'_> {
         let emittance = match &self.leaf.absorber {
             Absorber::Black => 1.0,
             Absorber::Diffuse => 1.0 - values[0],
+            Absorber::Translucent => 1.0 - values[0] - values[1],
             Absorber::Mirror => 1.0 - conductor(cosine, values[0], values[1]),
             Absorber::RoughMetal { again, .. } => {
                 let (eta, k) = (values[0], values[1]);
@@ -259,7 +262,7 @@ impl Leaf<'_> {
     /// Whether ε is the same in all directions.
     fn is_even(&self) -> bool {
         match self.absorber {
-            Absorber::Black => true,
+            Absorber::Black | Absorber::Translucent => true,
             Absorber::Diffuse => self.two_sided,
             _ => false,
         }
@@ -382,6 +385,9 @@ impl HotLeaf {
             Bsdf::Diffuse { reflectance } | Bsdf::Plastic { reflectance, .. } => {
                 matches!(reflectance, Reflectance::Texture(_))
             }
+            Bsdf::Translucent { reflectance, transmittance } => {
+                [reflectance, transmittance].iter().any(|share| matches!(share, Reflectance::Texture(_)))
+            }
             Bsdf::Conductor { roughness: [x, y], .. } => x != y && *x >= SMOOTH,
             Bsdf::Dielectric { .. } | Bsdf::Blend { .. } | Bsdf::Black => false,
         };
@@ -400,6 +406,9 @@ impl HotLeaf {
         let (absorber, curves) = match material.bsdf {
             Bsdf::Black => (Absorber::Black, vec![]),
             Bsdf::Diffuse { reflectance } => (Absorber::Diffuse, vec![all_over(reflectance)]),
+            Bsdf::Translucent { reflectance, transmittance } => {
+                (Absorber::Translucent, vec![all_over(reflectance), all_over(transmittance)])
+            }
             Bsdf::Conductor { eta, k, roughness, energy_compensation } => {
                 let absorber = match roughness[0] < SMOOTH {
                     true => Absorber::Mirror,
@@ -454,6 +463,9 @@ impl HotLeaf {
             let (absorber, curves) = match material.bsdf {
                 Bsdf::Black => (Absorber::Black, vec![]),
                 Bsdf::Diffuse { reflectance } => (Absorber::Diffuse, vec![mean(reflectance)]),
+                Bsdf::Translucent { reflectance, transmittance } => {
+                    (Absorber::Translucent, vec![mean(reflectance), mean(transmittance)])
+                }
                 Bsdf::Conductor { eta, k, .. } => (Absorber::Mirror, vec![curve(eta), curve(k)]),
                 Bsdf::Plastic { reflectance, eta, .. } => (Absorber::Varnish, vec![mean(reflectance), curve(eta)]),
                 Bsdf::Dielectric { .. } | Bsdf::Blend { .. } => unreachable!("`collect` has none"),

@@ -5,7 +5,7 @@ use crate::device::parts::heat::{HotLeaf, Radiating};
 use crate::device::parts::surfaces::{self, Surfaces, texture_records};
 use crate::device::words::{
     HOT_FACET_COUNT, NONE, RADIATOR_ABSORBS, RADIATOR_COAT, RADIATOR_FACETS, RADIATOR_LAMP, RADIATOR_MIRROR,
-    RADIATOR_OPEN, RADIATOR_TWO_SIDED, RADIATOR_VARNISH, Radiator,
+    RADIATOR_OPEN, RADIATOR_PASSES_SPECTRUM, RADIATOR_PASSES_TEXTURE, RADIATOR_TWO_SIDED, RADIATOR_VARNISH, Radiator,
 };
 use crate::scene::{Bsdf, Reflectance, SMOOTH, Scene, Temperature};
 use crate::spectral::Curve;
@@ -48,6 +48,8 @@ pub struct Features {
     pub mirrors: bool,
     pub varnish: bool,
     pub coats: bool,
+    /// Some reflectance is a texture, and some light passes beside it.
+    pub translucent: bool,
     pub lamps: bool,
     /// Some reflectance is a texture; some temperature or share is.
     pub textured: bool,
@@ -73,6 +75,10 @@ impl Radiators {
             }
             radiators.features.records = radiators.features.records.max(records);
             radiators.words.push(first as u32 | ((radiators.all.len() - first) as u32) << COUNT_SHIFT);
+        }
+        if scene.textures.len() > MOST {
+            let message = format!("{} textures beside hot ones, at most {MOST} are supported", scene.textures.len());
+            return Err(Error::input(&scene.file, message));
         }
         if radiators.all.len() > MOST {
             let message =
@@ -125,6 +131,29 @@ impl Radiators {
                 }
                 (Kind::Open, 2)
             }
+            Bsdf::Translucent { reflectance, transmittance } => match (reflectance, transmittance) {
+                (Reflectance::Spectrum(a), Reflectance::Spectrum(b)) => {
+                    let absorbed = Curve::derived(&[curve(a), curve(b)], &scene.channels, |v| 1.0 - v[0] - v[1]);
+                    radiator.inner = surfaces.derived(format!("{name}, absorbed"), absorbed);
+                    radiator.kind |= RADIATOR_ABSORBS;
+                    (Kind::Open, 2)
+                }
+                // Which of both is reflected makes no difference to what is kept.
+                (Reflectance::Texture(texture), Reflectance::Spectrum(other))
+                | (Reflectance::Spectrum(other), Reflectance::Texture(texture)) => {
+                    radiator.reflectance = texture as u32;
+                    radiator.spectra = surfaces.spectrum(other);
+                    radiator.kind |= RADIATOR_PASSES_SPECTRUM;
+                    self.features.translucent = true;
+                    (Kind::Open, 3)
+                }
+                (Reflectance::Texture(texture), Reflectance::Texture(other)) => {
+                    radiator.reflectance = texture as u32;
+                    radiator.kind |= RADIATOR_PASSES_TEXTURE | (other as u32) << 16;
+                    self.features.translucent = true;
+                    (Kind::Open, 2 + texture_records(&scene.textures[other]))
+                }
+            },
             Bsdf::Conductor { eta, k, roughness, .. } if roughness[0] < SMOOTH => {
                 radiator.spectra = surfaces.spectrum(eta) | surfaces.spectrum(k) << 16;
                 self.features.mirrors = true;

@@ -12,8 +12,8 @@ use crate::device::text::{Module, module};
 use crate::device::words::{
     ALBEDO_ROW, COSINE_INTERVALS, LOBE_BASE, LOBE_BEYOND_AGAIN, LOBE_BOUNDARY_AGAIN, LOBE_CONDUCTOR,
     LOBE_CONDUCTOR_AGAIN, LOBE_DISPERSES, LOBE_LAMBERT, LOBE_MIRROR, LOBE_NARROW, LOBE_OPAQUE, LOBE_REFRACTION,
-    LOBE_ROUGH_BOUNDARY, LOBE_ROUGH_COAT, LOBE_ROUGH_CONDUCTOR, LOBE_TEXTURED, LOBE_TWO_SIDED, Lobe, MATERIAL_DIFFUSE,
-    MATERIAL_TRANSMITS, SurfaceMaterial,
+    LOBE_ROUGH_BOUNDARY, LOBE_ROUGH_COAT, LOBE_ROUGH_CONDUCTOR, LOBE_TEXTURED, LOBE_TRANSMITTED, LOBE_TWO_SIDED, Lobe,
+    MATERIAL_DIFFUSE, MATERIAL_TRANSMITS, SurfaceMaterial,
 };
 use crate::scene::{
     Attributes, Bsdf, MaterialId, Reflectance, SMOOTH, Scene, SpectrumId, Texture, TextureKind, Weight,
@@ -37,6 +37,7 @@ pub enum Kind {
     BeyondAgain = LOBE_BEYOND_AGAIN,
     RoughCoat = LOBE_ROUGH_COAT,
     Base = LOBE_BASE,
+    Transmitted = LOBE_TRANSMITTED,
 }
 
 /// Intervals of the device's tables over the cosine.
@@ -131,7 +132,7 @@ pub const LOBES: Part = Part {
 const TABLES: Module = module!("common/tables.wgsl");
 
 /// Code that some kinds of lobes share, by its switch.
-const LOBES_OF_CODE: [(&str, &[Kind]); 13] = [
+const LOBES_OF_CODE: [(&str, &[Kind]); 14] = [
     ("MIRRORS", &[Kind::Conductor, Kind::Mirror, Kind::Refraction]),
     ("MICROFACETS", &[Kind::RoughConductor, Kind::RoughCoat, Kind::RoughBoundary]),
     ("GLASS", &[Kind::Mirror, Kind::RoughBoundary]),
@@ -143,9 +144,20 @@ const LOBES_OF_CODE: [(&str, &[Kind]); 13] = [
     ("ROUGH_GLASS", &[Kind::RoughBoundary]),
     ("ROUGH_COAT", &[Kind::RoughCoat]),
     ("BASE", &[Kind::Base]),
+    ("TRANSMITTED", &[Kind::Transmitted]),
     ("OP_CONDUCTOR", &[Kind::Conductor, Kind::RoughConductor]),
     ("OP_FRESNEL", &[Kind::Mirror, Kind::Refraction, Kind::RoughBoundary, Kind::RoughCoat, Kind::Base]),
 ];
+
+/// Light that passes through leaves; `LOBES` has its code.
+pub const TRANSMISSION: Part = Part {
+    name: "diffuse transmission",
+    used: |scene| scene.surfaces.as_ref().is_some_and(|surfaces| surfaces.has(Kind::Transmitted)),
+    effect: |_| "shadow rays on both sides".into(),
+    is_planned: true,
+    example: Some(|exhibit| exhibit.add_leaf()),
+    ..Part::NOTHING
+};
 
 pub const BRUSHED: Part = Part {
     name: "roughness along and across",
@@ -249,7 +261,8 @@ impl Surfaces {
         for lobe in &mut self.lobes {
             match lobe.kind & 0xff {
                 // A texture has its own.
-                k if k == Kind::Lambert as u32 && lobe.kind & LOBE_TEXTURED != 0 => {}
+                k if (k == Kind::Lambert as u32 || k == Kind::Transmitted as u32) && lobe.kind & LOBE_TEXTURED != 0 => {
+                }
                 k if k == Kind::Conductor as u32 || k == Kind::RoughConductor as u32 => lobe.ab = both(lobe.ab),
                 k if k == Kind::Base as u32 && lobe.kind & LOBE_TEXTURED != 0 => {
                     (lobe.ab, lobe.cd) = (low(lobe.ab), both(lobe.cd));
@@ -315,6 +328,15 @@ impl Surfaces {
         let (opaque, leaves) = match description.bsdf {
             Bsdf::Black => (true, Vec::new()),
             Bsdf::Diffuse { reflectance } => (true, self.diffuse(scene, reflectance)),
+            Bsdf::Translucent { reflectance, transmittance } => {
+                let mut leaves = self.diffuse(scene, reflectance);
+                let through = self.diffuse(scene, transmittance).into_iter().map(|mut leaf| {
+                    leaf.lobe.kind += Kind::Transmitted as u32 - Kind::Lambert as u32;
+                    leaf
+                });
+                leaves.extend(through);
+                (false, leaves)
+            }
             Bsdf::Conductor { eta, k, roughness, energy_compensation } => {
                 let rough = (roughness[0] >= SMOOTH).then_some(roughness);
                 (true, self.conductor(scene, &description.name, [eta, k], rough, energy_compensation))

@@ -179,6 +179,11 @@ impl Bsdf {
                 self.add_reflectance(reflectance);
                 (true, vec![Box::new(Lambert { reflectance })])
             }
+            Description::Translucent { reflectance, transmittance } => {
+                self.add_reflectance(reflectance);
+                self.add_reflectance(transmittance);
+                (false, vec![Box::new(Lambert { reflectance }), Box::new(LambertBeyond { transmittance })])
+            }
             Description::Conductor { eta, k, roughness, energy_compensation } => {
                 self.spectra.extend([eta, k]);
                 let roughness = (!smooth(roughness[0])).then_some(roughness);
@@ -340,6 +345,32 @@ impl Lobe for Lambert {
 
     fn density(&self, _at: &Vertex, i: DVec3) -> f64 {
         cosine_density(i)
+    }
+}
+
+/// Lambert's law on the other side.
+struct LambertBeyond {
+    transmittance: Reflectance,
+}
+
+impl Lobe for LambertBeyond {
+    fn albedo(&self, at: &Vertex, k: usize) -> f64 {
+        at.spectra.reflectance(self.transmittance, k)
+    }
+
+    fn sample(&self, _at: &Vertex, u: [f64; 3]) -> Option<Choice> {
+        Some(Choice::Spread(-cosine_direction([u[1], u[2]])))
+    }
+
+    fn evaluate(&self, at: &Vertex, i: DVec3, scale: f64, out: &mut [f64]) {
+        let density = scale * cosine_density(-i);
+        for k in at.alive.clone() {
+            out[k] += density * at.spectra.reflectance(self.transmittance, k);
+        }
+    }
+
+    fn density(&self, _at: &Vertex, i: DVec3) -> f64 {
+        cosine_density(-i)
     }
 }
 

@@ -29,6 +29,10 @@ enum Absorber {
     Diffuse {
         reflectance: Reflectance,
     },
+    Translucent {
+        reflectance: Reflectance,
+        transmittance: Reflectance,
+    },
     Mirror {
         eta: SpectrumId,
         k: SpectrumId,
@@ -66,6 +70,9 @@ impl Hot {
         let absorber = match material.bsdf {
             Description::Black => Absorber::Black,
             Description::Diffuse { reflectance } => Absorber::Diffuse { reflectance },
+            Description::Translucent { reflectance, transmittance } => {
+                Absorber::Translucent { reflectance, transmittance }
+            }
             Description::Conductor { eta, k, roughness, .. } if smooth(roughness[0]) => Absorber::Mirror { eta, k },
             Description::Conductor { eta, k, roughness, energy_compensation } => Absorber::RoughMetal {
                 eta,
@@ -116,6 +123,10 @@ impl Hot {
         match &self.absorber {
             Absorber::Black => 1.0,
             Absorber::Diffuse { reflectance } => 1.0 - at.spectra.reflectance(*reflectance, k),
+            Absorber::Translucent { reflectance, transmittance } => {
+                let sent_on = [reflectance, transmittance].map(|share| at.spectra.reflectance(*share, k));
+                (1.0 - sent_on[0] - sent_on[1]).max(0.0)
+            }
             Absorber::Mirror { eta, k } => 1.0 - fresnel::conductor(at.o.z, value(*eta), value(*k)),
             Absorber::RoughMetal { eta, k, facets, again } => {
                 let (eta, k) = (value(*eta), value(*k));

@@ -56,6 +56,14 @@ const EMISSIVITY: Key = Key::required(
      `reflectance`.",
 )
 .unless("`reflectance`");
+const TRANSMITTANCE: Key = Key::optional(
+    "transmittance",
+    Spectrum(Quantity::Reflectance),
+    "nothing passes",
+    "The share of light that passes through and is scattered on the other side, the same in all directions: leaves, paper, cloth. \
+     Both sides are alike, and with `reflectance` it is 1 at most at every wavelength; the rest is absorbed.",
+)
+.tables(COLOURS);
 const ROUGHNESS: Key = Key::default("roughness", Number, "0.0", "GGX's α; 0 is smooth.").range("[0, 1]");
 
 const A_DIFFUSE: &str = r#"
@@ -68,6 +76,11 @@ const A_WARM_SKIN: &str = r#"
 [materials.paint.diffuse]
 emissivity = 0.98
 temperature = "33.5 C"
+"#;
+const A_LEAF: &str = r#"
+[materials.paint.diffuse]
+reflectance = { samples = [[400, 0.05], [550, 0.12], [680, 0.05], [750, 0.48], [900, 0.48]], outside = "hold" }
+transmittance = { samples = [[400, 0.01], [550, 0.1], [680, 0.02], [750, 0.45], [900, 0.47]], outside = "hold" }
 "#;
 const A_CONDUCTOR: &str = r#"
 [materials.paint.conductor]
@@ -112,11 +125,11 @@ pub static DIFFUSE: Section = Section {
     heading: "`[materials.NAME.diffuse]`",
     summary: "Lambert's law",
     about: "",
-    keys: &[REFLECTANCE.unless("`emissivity`"), EMISSIVITY, TWO_SIDED, TEMPERATURE],
+    keys: &[REFLECTANCE.unless("`emissivity`"), EMISSIVITY, TRANSMITTANCE, TWO_SIDED, TEMPERATURE],
     later: &[],
     at: "materials.paint.diffuse",
-    examples: &[A_DIFFUSE, A_WARM_SKIN],
-    notes: "",
+    examples: &[A_DIFFUSE, A_WARM_SKIN, A_LEAF],
+    notes: "With a `temperature` it emits 1 - reflectance - transmittance of what a black body does.",
 };
 
 pub static CONDUCTOR: Section = Section {

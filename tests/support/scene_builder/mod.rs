@@ -176,6 +176,13 @@ impl Builder {
         )
     }
 
+    /// A leaf: a spectrum each for what it reflects and transmits.
+    pub fn translucent(mut self, shape: Shape, reflectance: impl IntoCurve, transmittance: impl IntoCurve) -> Self {
+        let [reflectance, transmittance] =
+            [self.spectrum(reflectance), self.spectrum(transmittance)].map(Reflectance::Spectrum);
+        self.object(shape, Bsdf::Translucent { reflectance, transmittance }, true, None)
+    }
+
     /// A blend of the materials of the last two objects, which only lend theirs.
     pub fn blend_of_last_two(mut self, shape: Shape, weight: f64) -> Self {
         let last = self.0.materials.len() - 1;
