@@ -125,6 +125,15 @@ impl Exhibit {
         }
     }
 
+    /// A number, and a texture.
+    pub fn add_masks(&mut self) {
+        let texture = self.texture(TextureKind::Number, &[0.5; 4]);
+        for opacity in [Weight::Constant(0.5), Weight::Texture(texture)] {
+            let material = self.add_ball(Bsdf::Black, None);
+            self.scene.materials[material].opacity = Some(opacity);
+        }
+    }
+
     pub fn add_leaf(&mut self) {
         let grey = Reflectance::Spectrum(self.spectrum(Curve::Constant(0.4)));
         self.add_ball(Bsdf::Translucent { reflectance: grey, transmittance: grey }, None);
@@ -276,7 +285,8 @@ impl Exhibit {
     }
 
     fn material(&mut self, bsdf: Bsdf, temperature: Option<Temperature>) -> usize {
-        self.scene.materials.push(Material { name: "of everything".into(), bsdf, two_sided: true, temperature });
+        let name = "of everything".into();
+        self.scene.materials.push(Material { name, bsdf, two_sided: true, temperature, opacity: None });
         self.scene.materials.len() - 1
     }
 

@@ -5,7 +5,7 @@ use std::ops::Deref;
 
 use crate::device::example::Exhibit;
 use crate::device::parts::{
-    attributes, camera, geometry, heat, lights, media, paths, sky, spectra, surfaces, textures,
+    attributes, camera, geometry, heat, lights, media, opacity, paths, sky, spectra, surfaces, textures,
 };
 use crate::device::prepared::Prepared;
 use crate::device::text::{Defines, Module};
@@ -75,6 +75,8 @@ pub const PARTS: &[&Part] = &[
     &heat::EITHER,
     &media::MEDIA,
     &media::VACUUM,
+    &opacity::OPACITY,
+    &opacity::IN_VACUUM,
     &media::CAMERA_CUT,
     &media::VOXELS,
     &media::PLANCK,

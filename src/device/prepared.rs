@@ -285,6 +285,7 @@ impl General {
             || !scene.lights.is_empty()
             || sky.is_some()
             || !scene.media.is_empty()
+            || scene.materials.iter().any(|material| material.opacity.is_some())
             || !heat.by_angle.is_empty()
             || !heat.radiating.is_empty();
         if !is_general {

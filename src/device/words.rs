@@ -77,6 +77,12 @@ constants! {
         /// One lobe, Lambert's law: a vertex is one record.
         MATERIAL_DIFFUSE = 2;
     }
+    /// Further bits: some rays pass. From bit 8 on the place of its opacity in the tables, or its texture.
+    MASKS {
+        MATERIAL_MASKED = 4;
+        MATERIAL_MASK_IS_TEXTURE = 8;
+        MASK_SHIFT = 8;
+    }
     /// [`Lobe::kind`]: what it does, in the low byte.
     LOBE_KINDS {
         LOBE_LAMBERT = 0;
@@ -268,7 +274,7 @@ pub struct Material {
 pub struct SurfaceMaterial {
     pub first_lobe: u32,
     pub lobe_count: u32,
-    /// [`MATERIAL_TRANSMITS`].
+    /// [`MATERIAL_TRANSMITS`] and others.
     pub flags: u32,
     pub survival: f32,
 }

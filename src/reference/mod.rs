@@ -159,6 +159,7 @@ mod tests {
                 bsdf: crate::scene::Bsdf::Diffuse { reflectance: crate::scene::Reflectance::Spectrum(0) },
                 two_sided: true,
                 temperature: None,
+                opacity: None,
             }],
             textures: vec![],
             objects: vec![crate::scene::Object {

@@ -14,8 +14,9 @@ use super::primitive::{Ray, SurfacePoint};
 use super::rng::Rng;
 use super::shading::Shading;
 use super::sky::Sky;
+use super::texture;
 use super::world::{Hit, World};
-use crate::scene::{Bsdf as Description, Environment, Interior, Light, Projection, Scene, SpectrumId};
+use crate::scene::{Bsdf as Description, Environment, Interior, Light, Projection, Scene, SpectrumId, Weight};
 
 /// What tracing needs of a scene, prepared once and shared by all threads.
 pub struct Tracer<'a> {
@@ -32,6 +33,8 @@ pub struct Tracer<'a> {
     glass: HashMap<usize, (SpectrumId, Option<f64>)>,
     /// The interiors around the camera, the innermost last.
     around_camera: Vec<Interior>,
+    /// Whether some surface lets rays pass.
+    masked: bool,
 }
 
 /// The K-channel state of the path under way; reused from path to path.
@@ -136,7 +139,9 @@ impl<'a> Tracer<'a> {
         let glass = glass(scene);
         let mut gas_spectra = gas::spectra(scene);
         gas_spectra.extend(glass.values().map(|(eta, _)| *eta));
-        let mut tracer = Tracer { scene, world, sky, lights, materials, gas_spectra, glass, around_camera: Vec::new() };
+        let masked = scene.materials.iter().any(|material| material.opacity.is_some());
+        let around_camera = Vec::new();
+        let mut tracer = Tracer { scene, world, sky, lights, materials, gas_spectra, glass, around_camera, masked };
         tracer.around_camera = tracer.interiors_around(scene.camera.position);
         tracer
     }
@@ -160,7 +165,7 @@ impl<'a> Tracer<'a> {
 
         for event in 0..=integrator.max_bounces {
             let mut pieces = Vec::new();
-            let hit = self.follow(&ray, &mut path.interiors, &mut pieces);
+            let hit = self.follow(&ray, &mut path.interiors, &mut pieces, rng);
             let Path { spectra, throughput, alive, radiance, .. } = &mut *path;
             pieces.iter().for_each(|piece| piece.pass(spectra, alive.clone(), throughput, Some(radiance)));
             let Some(hit) = hit else {
@@ -193,7 +198,7 @@ impl<'a> Tracer<'a> {
             let Path { spectra, throughput, alive, radiance, factor, emitted, interiors } = &mut *path;
             let Some(scattering) = bsdf.at(Vertex { o, inside, spectra, alive: alive.clone() }) else { return };
             let kept = aim.filter(|aim| shading.keeps_side(geometric, &frame, aim.direction));
-            let pieces = kept.as_ref().and_then(|aim| self.way_to(&hit, inside, aim, interiors));
+            let pieces = kept.as_ref().and_then(|aim| self.way_to(&hit, inside, aim, interiors, rng));
             if let Some((aim, pieces)) = kept.zip(pieces) {
                 pieces.iter().for_each(|piece| piece.pass(spectra, alive.clone(), emitted, None));
                 let scattered = scattering.evaluate(frame.transpose() * aim.direction, factor);
@@ -285,6 +290,9 @@ impl<'a> Tracer<'a> {
                 if !self.emit(*primitive, point, *towards, path) {
                     path.emitted.fill(0.0);
                 }
+                // What is aimed at may let the ray pass.
+                let opacity = self.opacity(*primitive, point);
+                path.emitted.iter_mut().for_each(|emitted| *emitted *= opacity);
             }
             other => path.look_up(other, self.sky.as_ref()),
         }
@@ -378,9 +386,16 @@ impl<'a> Tracer<'a> {
     }
 
     /// The ways through media from a vertex to what is aimed at, if nothing but null boundaries stands between.
-    fn way_to(&self, hit: &Hit, inside: bool, aim: &Aim, interiors: &[Interior]) -> Option<Vec<Piece<'_>>> {
+    fn way_to(
+        &self,
+        hit: &Hit,
+        inside: bool,
+        aim: &Aim,
+        interiors: &[Interior],
+        rng: &mut Rng,
+    ) -> Option<Vec<Piece<'_>>> {
         let origin = self.world.leave(hit.primitive, &hit.point, aim.direction);
-        if self.scene.media.is_empty() {
+        if self.scene.media.is_empty() && !self.masked {
             let clear = match aim.target {
                 Some(target) => !self.world.occluded(origin, target),
                 None => self.world.closest_hit(&Ray { origin, direction: aim.direction }).is_none(),
@@ -407,7 +422,7 @@ impl<'a> Tracer<'a> {
                 return Some(pieces);
             };
             let object = &self.scene.objects[self.world.primitives[hit.primitive].object];
-            if object.material.is_some() {
+            if object.material.is_some() && !self.lets_pass(&hit, rng) {
                 return None;
             }
             pieces.extend(self.piece(&interiors, ray.origin, ray.origin + hit.t * ray.direction));
@@ -419,7 +434,13 @@ impl<'a> Tracer<'a> {
     /// The first surface with a material along `ray`, at its distance from the start; null boundaries on the way change
     /// what is around. `pieces`: the ways through media, but outside all interiors none that leads to infinity: what
     /// arrives from there has been measured at the scene.
-    fn follow<'s>(&'s self, ray: &Ray, interiors: &mut Vec<Interior>, pieces: &mut Vec<Piece<'s>>) -> Option<Hit> {
+    fn follow<'s>(
+        &'s self,
+        ray: &Ray,
+        interiors: &mut Vec<Interior>,
+        pieces: &mut Vec<Piece<'s>>,
+        rng: &mut Rng,
+    ) -> Option<Hit> {
         let (mut ray, mut passed) = (*ray, 0.0);
         loop {
             let Some(mut hit) = self.world.closest_hit(&ray) else {
@@ -428,7 +449,7 @@ impl<'a> Tracer<'a> {
             };
             pieces.extend(self.piece(interiors, ray.origin, ray.origin + hit.t * ray.direction));
             let object = &self.scene.objects[self.world.primitives[hit.primitive].object];
-            if object.material.is_some() {
+            if object.material.is_some() && !self.lets_pass(&hit, rng) {
                 hit.t += passed;
                 return Some(hit);
             }
@@ -436,6 +457,26 @@ impl<'a> Tracer<'a> {
             let beyond = self.world.beyond(&ray, &hit);
             passed += beyond;
             ray.origin += beyond * ray.direction;
+        }
+    }
+
+    /// Whether a ray goes on through a surface that has a material.
+    fn lets_pass(&self, hit: &Hit, rng: &mut Rng) -> bool {
+        let opacity = self.opacity(hit.primitive, &hit.point);
+        opacity < 1.0 && rng.uniform() >= opacity
+    }
+
+    /// The share of rays that a point of a surface is there for.
+    fn opacity(&self, primitive: usize, point: &SurfacePoint) -> f64 {
+        let primitive = &self.world.primitives[primitive];
+        let object = &self.scene.objects[primitive.object];
+        match object.material.and_then(|material| self.scene.materials[material].opacity) {
+            None => 1.0,
+            Some(Weight::Constant(opacity)) => opacity,
+            Some(Weight::Texture(texture)) => {
+                let uv = Shading::new(&object.attributes, primitive, point).uv;
+                texture::channel(&self.scene.textures[texture], uv, 0)
+            }
         }
     }
 

@@ -210,7 +210,19 @@ impl Hash {
     }
 
     fn material(&mut self, material: &Material) {
-        let Material { name: _, bsdf, two_sided, temperature } = material;
+        let Material { name: _, bsdf, two_sided, temperature, opacity } = material;
+        // Before the tag of its kind, which is less; nothing without one, so that other scenes keep their digests.
+        match opacity {
+            None => {}
+            Some(Weight::Constant(opacity)) => {
+                self.tag(100);
+                self.number(*opacity);
+            }
+            Some(Weight::Texture(texture)) => {
+                self.tag(101);
+                self.count(*texture);
+            }
+        }
         match bsdf {
             Bsdf::Diffuse { reflectance } => self.reflectance([0, 6], reflectance),
             Bsdf::Black => self.tag(1),

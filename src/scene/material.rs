@@ -59,6 +59,7 @@ pub struct Declared<'a> {
     pub kind: Kind<'a>,
     two_sided: bool,
     temperature: Option<Varying>,
+    opacity: Option<Varying>,
     taken: Option<MaterialId>,
 }
 
@@ -119,6 +120,10 @@ impl<'a> Materials<'a> {
             Varying::Constant(kelvin) => Temperature::Constant(kelvin),
             Varying::Texture(handle) => Temperature::Texture(self.textures.take(handle, spectra)),
         });
+        let opacity = declared.opacity.map(|opacity| match opacity {
+            Varying::Constant(opacity) => Weight::Constant(opacity),
+            Varying::Texture(handle) => Weight::Texture(self.textures.take(handle, spectra)),
+        });
         let bsdf = match declared.kind {
             Kind::Diffuse { reflectance } => Bsdf::Diffuse { reflectance: self.take_reflectance(reflectance, spectra) },
             Kind::Translucent { reflectance, transmittance } => Bsdf::Translucent {
@@ -146,7 +151,7 @@ impl<'a> Materials<'a> {
             }
             Kind::Black => Bsdf::Black,
         };
-        self.scene.push(Material { name, bsdf, two_sided, temperature });
+        self.scene.push(Material { name, bsdf, two_sided, temperature, opacity });
         let id = self.scene.len() - 1;
         if let Some(declared) = &mut self.declared[index].1 {
             declared.taken = Some(id);
@@ -189,7 +194,9 @@ impl<'a> Materials<'a> {
             }
             Bsdf::Black => Needs::default(),
         };
-        Needs { uv: needs.uv || matches!(material.temperature, Some(Temperature::Texture(_))), ..needs }
+        let by_place = matches!(material.temperature, Some(Temperature::Texture(_)))
+            || matches!(material.opacity, Some(Weight::Texture(_)));
+        Needs { uv: needs.uv || by_place, ..needs }
     }
 
     pub fn finish(self) -> (Vec<Material>, Vec<Texture>) {
@@ -232,6 +239,14 @@ impl<'a> Materials<'a> {
                 if index.is_none() {
                     item.error_help(format!("no material is named \"{name}\""), self.help(name));
                 }
+                let declared = index.and_then(|index| self.declared[index].1.as_ref());
+                if declared.is_some_and(|declared| declared.opacity.is_some()) {
+                    item.error_help(
+                        format!("\"{name}\" has an `opacity`, which a part of a blend cannot have"),
+                        "give the `opacity` to the blend",
+                    );
+                    return None;
+                }
                 index
             });
             let indices = match found {
@@ -263,6 +278,7 @@ fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>, textures: &mut Texture
             let fields = kind.table(&keys::DIELECTRIC)?;
             let eta = spectrum(&fields, "eta", ETA, Quantity::Index, spectra);
             let (dispersion, roughness) = (boolean(&fields, "dispersion", true), roughness(&fields));
+            let opacity = opacity(&fields, textures);
             if let Some(item) = fields.get("temperature") {
                 item.error_help(
                     format!("a dielectric {TRANSPARENT}"),
@@ -274,6 +290,7 @@ fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>, textures: &mut Texture
                 kind: Kind::Dielectric { eta: eta?, dispersion: dispersion?, roughness: roughness? },
                 two_sided: true,
                 temperature: None,
+                opacity: opacity?,
                 taken: None,
             });
         }
@@ -290,12 +307,14 @@ fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>, textures: &mut Texture
         Some("blend") => {
             let fields = kind.table(&keys::BLEND)?;
             let (kind, temperature) = (blend(&fields, textures), temperature(&fields, textures));
-            return Some(Declared { kind: kind?, two_sided: true, temperature: temperature?, taken: None });
+            let (opacity, temperature) = (opacity(&fields, textures), temperature?);
+            return Some(Declared { kind: kind?, two_sided: true, temperature, opacity: opacity?, taken: None });
         }
         _ => (kind.table(&keys::BLACK)?, Some(Kind::Black)),
     };
     let (two_sided, temperature) = (boolean(&fields, "two_sided", true), temperature(&fields, textures));
-    Some(Declared { kind: kind?, two_sided: two_sided?, temperature: temperature?, taken: None })
+    let opacity = opacity(&fields, textures);
+    Some(Declared { kind: kind?, two_sided: two_sided?, temperature: temperature?, opacity: opacity?, taken: None })
 }
 
 fn conductor<'a>(fields: &Fields<'a>, spectra: &mut Spectra<'a>) -> Option<Kind<'a>> {
@@ -355,6 +374,18 @@ fn temperature(fields: &Fields, textures: &mut Textures) -> Option<Option<Varyin
         _ => kelvin(&item).map(Varying::Constant),
     };
     temperature.map(Some)
+}
+
+/// The outer `None` is a mistake that has been said.
+fn opacity(fields: &Fields, textures: &mut Textures) -> Option<Option<Varying>> {
+    let Some(item) = fields.get("opacity") else { return Some(None) };
+    if matches!(item.node.value, Value::Table(_)) {
+        return textures.number(&item, Number::Weight).map(|handle| Some(Varying::Texture(handle)));
+    }
+    let opacity =
+        item.number_where(|opacity| (0.0..=1.0).contains(&opacity), "the share of rays that it stops, in [0, 1]");
+    // What is there for all rays is as without one.
+    opacity.map(|opacity| (opacity < 1.0).then_some(Varying::Constant(opacity)))
 }
 
 /// A temperature that `item` holds: a number of kelvins, or text with its unit.

@@ -247,6 +247,9 @@ pub struct Material {
     /// Emits ε(λ, ω) B(λ, T), ε = 1 - what the very same surface sends on of flux along ω, on either side. Of a blend: for
     /// those of its parts that have none of their own. `None` on dielectrics, which absorb nothing.
     pub temperature: Option<Temperature>,
+    /// The share of rays that the surface is there for; the others pass as if it were not, into its interior if it has one.
+    /// `None`: it is there for all of them. Parts of blends have none.
+    pub opacity: Option<Weight>,
 }
 
 /// How hot a surface is.
@@ -308,7 +311,7 @@ pub enum Reflectance {
     Texture(TextureId),
 }
 
-/// The share of a blend's second part, in [0, 1].
+/// The share of a blend's second part, or an opacity, in [0, 1].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Weight {
     Constant(f64),

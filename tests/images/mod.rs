@@ -8,6 +8,7 @@ mod leaves;
 mod lights;
 mod materials;
 mod media;
+mod opacity;
 mod roulette;
 mod spots;
 mod textures;

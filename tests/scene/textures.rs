@@ -400,3 +400,31 @@ fn what_passes_and_is_reflected_is_no_more_than_all() {
         assert!(problems[0].to_string().contains(words), "{transmittance}: {problems:?}");
     }
 }
+
+#[test]
+fn opacities_resolve() {
+    let files = [("mask.png", png([1, 1], png::ColorType::Grayscale, &[51]))];
+    let with = |opacity: &str| {
+        let text = BASE.replace("reflectance = \"grey\"", &format!("reflectance = \"grey\"\nopacity = {opacity} #!"));
+        load(&text, &files)
+    };
+    let resolved = |opacity: &str| {
+        let scene = with(opacity).unwrap_or_else(|e| panic!("{e:?}"));
+        (scene.materials[0].opacity, scene.objects[0].attributes.uv.is_some())
+    };
+    assert_eq!(resolved("0.25"), (Some(Weight::Constant(0.25)), false));
+    assert_eq!(resolved("0"), (Some(Weight::Constant(0.0)), false));
+    // What is there for all rays is as without one.
+    assert_eq!(resolved("1"), (None, false));
+    assert_eq!(resolved("{ texture = \"mask.png\" }"), (Some(Weight::Texture(0)), true));
+    for (wrong, words) in [("1.5", "in [0, 1], but is 1.5"), ("\"half\"", "must be a number")] {
+        let problems = with(wrong).expect_err(wrong);
+        assert!(problems[0].to_string().contains(words), "{wrong}: {problems:?}");
+    }
+    let blend = "[materials.mix.blend]\na = \"white\"\nb = \"soot\"\nweight = 0.5\n\n[materials.soot.black]";
+    let text = BASE
+        .replace("[materials.soot.black]", blend)
+        .replace("reflectance = \"grey\"", "reflectance = \"grey\"\nopacity = 0.5");
+    let problems = load(&text, &files).expect_err("a part with an opacity");
+    assert!(problems[0].to_string().contains("which a part of a blend cannot have"), "{problems:?}");
+}

@@ -3,8 +3,8 @@
 const STACK_SIZE: u32 = $STACK_SIZE;
 
 // A driver in use ends loops silently after 65,535 iterations of an invocation: two traversals must stay below half.
-#if MEDIA
-// All traversals of an invocation share the steps, since paths pass boundaries of media without number.
+#if LONG_WAYS
+// All traversals of an invocation share the steps, since paths pass boundaries of media, and what lets them pass, without number.
 const MAX_STEPS: u32 = 24000u;
 var<private> steps_taken: u32;
 #else
@@ -55,7 +55,7 @@ fn traverse(ray: Ray, limit: f32, any_hit: bool, overflow: ptr<function, bool>) 
     var nodes_left = vec2<u32>(0u, 0x80000000u);
     // (first primitive, hit bits in the low 24).
     var primitives_left = vec2<u32>(0u, 0u);
-#if MEDIA
+#if LONG_WAYS
     var steps = steps_taken;
 #else
     var steps = 0u;
@@ -141,7 +141,7 @@ fn traverse(ray: Ray, limit: f32, any_hit: bool, overflow: ptr<function, bool>) 
             nodes_left = stack[stack_size];
         }
     }
-#if MEDIA
+#if LONG_WAYS
     steps_taken = steps;
 #endif
     return hit;

@@ -52,6 +52,12 @@ fn light_density(emitter_index: u32, origin: vec3<f32>, direction: vec3<f32>, di
         let to_center = shape.a - origin;
         let cap = sphere_cap(dot(to_center, to_center), shape.b.x);
         if (cap > 0.0) {
+#if OPACITY
+            // Seen through its near half, which alone is aimed at.
+            if (dot(normal, direction) > 0.0) {
+                return 0.0;
+            }
+#endif
             return emitter.pick / (2.0 * PI * cap);
         }
     }

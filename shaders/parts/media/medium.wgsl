@@ -50,6 +50,14 @@ fn add_stretch(way: ptr<function, Way>, around: vec2<u32>, start: f32, to: f32) 
     if (number == 0u || !(to > start)) {
         return true;
     }
+#if OPACITY
+    // A surface that was passed parts nothing.
+    let last = max((*way).count, 1u) - 1u;
+    if ((*way).count > 0u && (*way).volume[last] == number - 1u && (*way).to[last] == start) {
+        (*way).to[last] = to;
+        return true;
+    }
+#endif
     if ((*way).count == MOST_STRETCHES) {
         return false;
     }
@@ -78,9 +86,15 @@ fn walk(ray: Ray, limit: f32, around: ptr<function, vec2<u32>>, way: ptr<functio
         if (!add_stretch(way, *around, walked.passed, select(limit, walked.passed + walked.hit.distance, met))) {
             *overflow = true;
         }
+#if OPACITY
+        if (!met || *overflow || ((boundaries[walked.hit.primitive] & NULL_BOUNDARY) == 0u && !lets_pass(walked.ray, walked.hit))) {
+            return walked;
+        }
+#else
         if (!met || (boundaries[walked.hit.primitive] & NULL_BOUNDARY) == 0u || *overflow) {
             return walked;
         }
+#endif
         let surface = surface_at(walked.ray, walked.hit);
         let entering = dot(surface.normal, ray.direction) < 0.0;
         let number = boundaries[walked.hit.primitive] & 0xffu;

@@ -8,6 +8,9 @@ fn meet(path: ptr<function, Path>, list: ptr<function, RecordList>, overflow: pt
 #lines CAMERA_STARTS
     }
     var way: Way;
+#if OPACITY
+    begin_way((*path).number, SALT_FOLLOWED);
+#endif
     let walked = walk(ray, INFINITE, &nested, &way, overflow);
     (*path).nested = nested;
     append_way(list, &way, ray, walked.hit.primitive == NONE, 0u, (*path).scale);

@@ -37,7 +37,7 @@ pub const MEDIA: Part = Part {
     ],
     defines: |scene, _, defines| {
         let Some(media) = &scene.media else { return };
-        defines.set("MEDIA", true);
+        defines.set("MEDIA", true).set("LONG_WAYS", true);
         defines.constant("OUTER_VOLUME", media.outer).constant("MOST_STRETCHES", media.stretches);
     },
     buffers: |scene| {
@@ -64,7 +64,7 @@ const CONTENT: &str = "the media of the scene";
 /// In the place of media, in general scenes.
 pub const VACUUM: Part = Part {
     name: "vacuum",
-    used: |scene| scene.is_general() && scene.media.is_none(),
+    used: |scene| scene.is_general() && scene.media.is_none() && !(super::opacity::OPACITY.used)(scene),
     modules: &[(Place::Stage, module!("stages/meet/vacuum.wgsl"))],
     ..Part::NOTHING
 };

@@ -7,6 +7,7 @@ pub mod geometry;
 pub mod heat;
 pub mod lights;
 pub mod media;
+pub mod opacity;
 pub mod origins;
 pub mod paths;
 pub mod radiators;

@@ -13,7 +13,7 @@ use crate::device::words::{
     ALBEDO_ROW, COSINE_INTERVALS, LOBE_BASE, LOBE_BEYOND_AGAIN, LOBE_BOUNDARY_AGAIN, LOBE_CONDUCTOR,
     LOBE_CONDUCTOR_AGAIN, LOBE_DISPERSES, LOBE_LAMBERT, LOBE_MIRROR, LOBE_NARROW, LOBE_OPAQUE, LOBE_REFRACTION,
     LOBE_ROUGH_BOUNDARY, LOBE_ROUGH_COAT, LOBE_ROUGH_CONDUCTOR, LOBE_TEXTURED, LOBE_TRANSMITTED, LOBE_TWO_SIDED, Lobe,
-    MATERIAL_DIFFUSE, MATERIAL_TRANSMITS, SurfaceMaterial,
+    MASK_SHIFT, MATERIAL_DIFFUSE, MATERIAL_MASK_IS_TEXTURE, MATERIAL_MASKED, MATERIAL_TRANSMITS, SurfaceMaterial,
 };
 use crate::scene::{
     Attributes, Bsdf, MaterialId, Reflectance, SMOOTH, Scene, SpectrumId, Texture, TextureKind, Weight,
@@ -85,6 +85,9 @@ pub struct Surfaces {
     /// Some surface carries texture coordinates, normals or axes; some of them shading normals.
     pub attributes: bool,
     pub smooth: bool,
+    /// Some material lets rays pass; some of them by a texture.
+    pub masked: bool,
+    pub masks: bool,
     /// Most records of a scattering event.
     pub vertex_records: u32,
 }
@@ -229,10 +232,12 @@ impl Surfaces {
             smooth: carries(&|attributes| attributes.normals.is_some()),
             ..Surfaces::default()
         };
-        for material in 0..scene.materials.len() {
+        // First in the tables, where few bits tell their places.
+        let masks: Vec<u32> = scene.materials.iter().map(|material| surfaces.mask(material.opacity)).collect();
+        for (material, mask) in masks.into_iter().enumerate() {
             let mut leaves = Vec::new();
             surfaces.collect(scene, material, 1.0, &[], &mut leaves);
-            surfaces.add(scene, leaves);
+            surfaces.add(scene, leaves, mask);
         }
         if !scene.textures.is_empty() {
             let mut textures = Textures::new(scene, |spectrum| surfaces.spectrum(spectrum));
@@ -280,8 +285,21 @@ impl Surfaces {
         }
     }
 
+    /// The flags of a material of some opacity.
+    fn mask(&mut self, opacity: Option<Weight>) -> u32 {
+        let Some(opacity) = opacity else { return 0 };
+        self.masked = true;
+        match opacity {
+            Weight::Constant(opacity) => MATERIAL_MASKED | self.table(&[opacity as f32]) << MASK_SHIFT,
+            Weight::Texture(texture) => {
+                self.masks = true;
+                MATERIAL_MASKED | MATERIAL_MASK_IS_TEXTURE | (texture as u32) << MASK_SHIFT
+            }
+        }
+    }
+
     /// Appends a material of these leaves, with the probabilities of choosing each.
-    fn add(&mut self, scene: &Scene, leaves: Vec<Leaf>) {
+    fn add(&mut self, scene: &Scene, leaves: Vec<Leaf>, mask: u32) {
         let channels = scene.channels.len();
         let mut survival = 0.0f64;
         let mut picks = vec![Vec::with_capacity(2 * (INTERVALS + 1)); leaves.len()];
@@ -306,7 +324,7 @@ impl Surfaces {
         self.materials.push(SurfaceMaterial {
             first_lobe: self.lobes.len() as u32,
             lobe_count: leaves.len() as u32,
-            flags: if transmits { MATERIAL_TRANSMITS } else { 0 } | if diffuse { MATERIAL_DIFFUSE } else { 0 },
+            flags: if transmits { MATERIAL_TRANSMITS } else { 0 } | if diffuse { MATERIAL_DIFFUSE } else { 0 } | mask,
             survival: ((survival.min(1.0) * STEPS).ceil() / STEPS) as f32,
         });
         let spread: u32 = leaves.iter().map(|leaf| leaf.records).sum();

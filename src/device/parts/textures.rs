@@ -33,7 +33,7 @@ pub const TEXTURES: Part = Part {
         defines.set("TEXTURES", true).set("TEXTURED", surfaces.textured || hot.textured);
         defines.set("KEPT", surfaces.textured_base || hot.textured);
         defines.set("COLOURS", textures.colours).set("MIXTURES", textures.mixtures).set("SHARES", shares);
-        defines.set("TEXEL_NUMBERS", textures.mixtures || shares || hot.numbers);
+        defines.set("TEXEL_NUMBERS", textures.mixtures || shares || hot.numbers || surfaces.masks);
         defines.set("PRODUCTS", shares || hot.numbers);
         if let Some(first) = textures.first_share {
             defines.constant("FIRST_SHARE", first);

@@ -15,7 +15,7 @@ fn object(shape: Shape, attributes: Attributes) -> Object {
 }
 
 fn material(bsdf: Bsdf) -> Material {
-    Material { name: "m".into(), bsdf, two_sided: true, temperature: None }
+    Material { name: "m".into(), bsdf, two_sided: true, temperature: None, opacity: None }
 }
 
 fn texture(kind: TextureKind, texels: &[f32]) -> Texture {

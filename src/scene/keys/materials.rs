@@ -43,6 +43,15 @@ const TEMPERATURE: Key = Key::optional(
 .unit("K")
 .range("(0, 1e9]")
 .tables(NUMBERS);
+const OPACITY: Key = Key::default(
+    "opacity",
+    Number,
+    "1.0",
+    "The share of rays that meet the surface; the others pass as if it were not there, which is no bounce. What it emits, by \
+     `emission` and by heat, is less by the same share. A mask of 0 and 1 cuts leaves and fences out.",
+)
+.range("[0, 1]")
+.tables(NUMBERS);
 const REFLECTANCE: Key = Key::required(
     "reflectance",
     Spectrum(Quantity::Reflectance),
@@ -71,11 +80,17 @@ const A_DIFFUSE: &str = r#"
 reflectance = { samples = [[380, 0.05], [500, 0.1], [600, 0.7], [780, 0.8]] }
 two_sided = false
 temperature = 300.0
+opacity = 0.5
 "#;
 const A_WARM_SKIN: &str = r#"
 [materials.paint.diffuse]
 emissivity = 0.98
 temperature = "33.5 C"
+"#;
+const A_SCREEN: &str = r#"
+[materials.paint.diffuse]              # a screen that is looked at from behind
+reflectance = 0.0
+transmittance = 0.8
 "#;
 const A_LEAF: &str = r#"
 [materials.paint.diffuse]
@@ -88,18 +103,21 @@ nk = "gold.csv"
 roughness = [0.1, 0.3]
 energy_compensation = true
 two_sided = true
+opacity = { texture = "mask.png" }
 "#;
 const A_DIELECTRIC: &str = r#"
 [materials.paint.dielectric]
 eta = { file = "n-bk7.yml", column = "n" }
 dispersion = true
 roughness = 0.0
+opacity = 1.0
 "#;
 const A_PLASTIC: &str = r#"
 [materials.paint.plastic]
 reflectance = { rgb = [0.1, 0.2, 0.6] }
 eta = 1.5
 roughness = 0.05
+opacity = 0.9
 "#;
 const A_BLEND: &str = r#"
 [materials.paint.blend]
@@ -107,6 +125,7 @@ a = "primer"
 b = "rust"
 weight = { texture = "mask.png" }
 temperature = 310.0
+opacity = 0.8
 
 [materials.primer.diffuse]
 reflectance = 0.6
@@ -118,6 +137,7 @@ const A_BLACK: &str = r#"
 [materials.paint.black]
 two_sided = true
 temperature = 2856.0
+opacity = 0.5
 "#;
 
 pub static DIFFUSE: Section = Section {
@@ -125,10 +145,10 @@ pub static DIFFUSE: Section = Section {
     heading: "`[materials.NAME.diffuse]`",
     summary: "Lambert's law",
     about: "",
-    keys: &[REFLECTANCE.unless("`emissivity`"), EMISSIVITY, TRANSMITTANCE, TWO_SIDED, TEMPERATURE],
+    keys: &[REFLECTANCE.unless("`emissivity`"), EMISSIVITY, TRANSMITTANCE, TWO_SIDED, TEMPERATURE, OPACITY],
     later: &[],
     at: "materials.paint.diffuse",
-    examples: &[A_DIFFUSE, A_WARM_SKIN, A_LEAF],
+    examples: &[A_DIFFUSE, A_WARM_SKIN, A_SCREEN, A_LEAF],
     notes: "With a `temperature` it emits 1 - reflectance - transmittance of what a black body does.",
 };
 
@@ -167,6 +187,7 @@ pub static CONDUCTOR: Section = Section {
         ),
         TWO_SIDED,
         TEMPERATURE,
+        OPACITY,
     ],
     later: &[],
     at: "materials.paint.conductor",
@@ -206,6 +227,7 @@ pub static DIELECTRIC: Section = Section {
             "Always an error, since what absorbs nothing emits nothing. Glass that absorbs has an `interior` on its \
              object, whose medium may have a temperature.",
         ),
+        OPACITY,
     ],
     later: &[],
     at: "materials.paint.dielectric",
@@ -224,6 +246,7 @@ pub static PLASTIC: Section = Section {
         ROUGHNESS,
         TWO_SIDED,
         TEMPERATURE,
+        OPACITY,
     ],
     later: &[],
     at: "materials.paint.plastic",
@@ -254,6 +277,7 @@ pub static BLEND: Section = Section {
             .unit("K")
             .range("(0, 1e9]")
             .tables(NUMBERS),
+        OPACITY,
     ],
     later: &[],
     at: "materials.paint.blend",
@@ -266,7 +290,7 @@ pub static BLACK: Section = Section {
     heading: "`[materials.NAME.black]`",
     summary: "absorbs everything",
     about: "It needs no keys.",
-    keys: &[TWO_SIDED, TEMPERATURE],
+    keys: &[TWO_SIDED, TEMPERATURE, OPACITY],
     later: &[],
     at: "materials.paint.black",
     examples: &[A_BLACK],
@@ -344,13 +368,13 @@ reflectance = { texture = "albedo.png", filter = "nearest", scale = [4, 2], offs
 pub static TEXTURE_OF_NUMBERS: Section = Section {
     path: "texture-of-numbers",
     heading: "`{ texture = … }`",
-    summary: "a weight or temperature that differs from place to place",
-    about: "In the place of the `weight` of a blend or of a surface's `temperature`.",
+    summary: "a weight, temperature or opacity that differs from place to place",
+    about: "In the place of the `weight` of a blend or of a surface's `temperature` or `opacity`.",
     keys: &[
         Key::required(
             "texture",
             File,
-            "A grey picture, or one whose R, G and B are the same. Of weights: PNG or OpenEXR, in [0, 1], taken as they \
+            "A grey picture, or one whose R, G and B are the same. Of weights and opacities: PNG or OpenEXR, in [0, 1], taken as they \
              are. Of temperatures: OpenEXR, in K, in [0, 1e9]; what is at 0 emits nothing.",
         ),
         FILTER,

@@ -176,6 +176,12 @@ impl Builder {
         )
     }
 
+    /// The last material lets rays pass.
+    pub fn opacity(mut self, opacity: Weight) -> Self {
+        self.0.materials.last_mut().expect("a material").opacity = Some(opacity);
+        self
+    }
+
     /// A leaf: a spectrum each for what it reflects and transmits.
     pub fn translucent(mut self, shape: Shape, reflectance: impl IntoCurve, transmittance: impl IntoCurve) -> Self {
         let [reflectance, transmittance] =
@@ -242,7 +248,8 @@ impl Builder {
 
     fn object(mut self, shape: Shape, bsdf: Bsdf, two_sided: bool, emission: Option<Emission>) -> Self {
         let material = self.0.materials.len();
-        self.0.materials.push(Material { name: format!("material {material}"), bsdf, two_sided, temperature: None });
+        let name = format!("material {material}");
+        self.0.materials.push(Material { name, bsdf, two_sided, temperature: None, opacity: None });
         let name = format!("objects.{}", self.0.objects.len());
         let (attributes, material) = (Attributes::default(), Some(material));
         self.0.objects.push(Object { name, shape, attributes, material, emission, interior: None });
