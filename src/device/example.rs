@@ -197,12 +197,20 @@ impl Exhibit {
         self.add_ball(Bsdf::Plastic { reflectance: mixture, eta, roughness: 0.2 }, cold);
         let dark = Reflectance::Spectrum(self.spectrum(Curve::Constant(0.1)));
         self.add_ball(Bsdf::Translucent { reflectance: mixture, transmittance: dark }, cold);
+        self.add_picture_lamp();
+    }
+
+    fn add_picture_lamp(&mut self) {
+        let dark = self.spectrum(Curve::Constant(DARK));
+        let texture = self.texture(TextureKind::Light(dark), &[1.0; 12]);
+        self.add_ball(Bsdf::Black, None);
+        self.last().emission = Some(Emission { radiance: dark, sides: Sides::Front, texture: Some(texture) });
     }
 
     pub fn add_lamp(&mut self) {
         let dark = self.spectrum(Curve::Constant(DARK));
         self.add_black_ball();
-        self.last().emission = Some(Emission { radiance: dark, sides: Sides::Front });
+        self.last().emission = Some(Emission { radiance: dark, sides: Sides::Front, texture: None });
     }
 
     pub fn add_gas(&mut self) {

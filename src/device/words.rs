@@ -313,7 +313,7 @@ pub struct Radiator {
     pub weight: f32,
     pub alpha: [f32; 2],
     pub kelvin: f32,
-    /// Textures, or [`NONE`].
+    /// Textures, or [`NONE`]: of the temperature, and of the reflectance or a lamp.
     pub temperature: u32,
     pub reflectance: u32,
     /// Where the textures of its share are, and how many.

@@ -262,7 +262,8 @@ impl<'a> Tracer<'a> {
     fn emit(&self, primitive: usize, point: &SurfacePoint, towards: DVec3, path: &mut Path) -> bool {
         let object = &self.scene.objects[self.world.primitives[primitive].object];
         let inside = point.normal.dot(towards) < 0.0;
-        let emission = object.emission.as_ref().filter(|e| emits(e, !inside)).map(|e| e.radiance);
+        let lamp = object.emission.as_ref().filter(|e| emits(e, !inside));
+        let (emission, picture) = (lamp.map(|lamp| lamp.radiance), lamp.and_then(|lamp| lamp.texture));
         let bsdf = object.material.map(|material| &self.materials[material]).filter(|bsdf| bsdf.is_hot());
         if emission.is_none() && bsdf.is_none() {
             return false;
@@ -272,9 +273,14 @@ impl<'a> Tracer<'a> {
         let geometric = if inside { -point.normal } else { point.normal };
         let shading = Shading::new(&object.attributes, &self.world.primitives[primitive], point);
         path.spectra.look_up(bsdf.map_or(&[], |bsdf| bsdf.textures()), shading.uv);
+        path.spectra.look_up(picture.as_slice(), shading.uv);
         let Path { spectra, alive, emitted, .. } = path;
         for k in alive.clone() {
-            emitted[k] = emission.map_or(0.0, |spectrum| spectra.value(spectrum, k));
+            emitted[k] = match (picture, emission) {
+                (Some(texture), _) => spectra.textured(texture, k),
+                (None, Some(spectrum)) => spectra.value(spectrum, k),
+                (None, None) => 0.0,
+            };
         }
         if let Some(bsdf) = bsdf {
             let o = shading.frame(geometric, inside, towards).transpose() * towards;

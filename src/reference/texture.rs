@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use glam::DVec2;
 
 use crate::scene::{Texture, TextureFilter, TextureKind};
+use crate::spectral::skylight::{self, Tint};
 use crate::spectral::{Curve, upsample};
 
 /// The texels around a point with their weights, which sum to 1, as positions in [`Texture::texels`] divided by the number
@@ -40,9 +41,9 @@ pub fn channel(texture: &Texture, uv: DVec2, channel: usize) -> f64 {
     around(texture, uv).iter().map(|(i, w)| w * f64::from(texture.texels[i * channels + channel])).sum()
 }
 
-/// Spectra of the colours met so far.
+/// Spectra of the colours met so far, of surfaces and of lamps.
 #[derive(Default)]
-pub struct Colours(HashMap<[u32; 3], Curve>);
+pub struct Colours(HashMap<[u32; 3], Curve>, HashMap<[u32; 3], Tint>);
 
 impl Colours {
     /// Calls `add(spectrum, weight)` for what makes up a texture of colours at a point.
@@ -52,6 +53,15 @@ impl Colours {
             let rgb = std::array::from_fn(|c| texture.texels[3 * i + c]);
             let spectrum = self.0.entry(rgb.map(f32::to_bits));
             add(spectrum.or_insert_with(|| upsample::reflectance(rgb.map(f64::from))), weight);
+        }
+    }
+
+    /// Calls `add(tint, weight)` for what makes up a texture of light at a point; daylight multiplies all of it.
+    pub fn of_light(&mut self, texture: &Texture, uv: DVec2, mut add: impl FnMut(&Tint, f64)) {
+        for (i, weight) in around(texture, uv) {
+            let rgb: [f32; 3] = std::array::from_fn(|c| texture.texels[3 * i + c]);
+            let tint = self.1.entry(rgb.map(f32::to_bits));
+            add(tint.or_insert_with(|| skylight::tints(&rgb)[0]), weight);
         }
     }
 }

@@ -307,6 +307,10 @@ impl Hash {
                 self.list(endmembers, |hash, spectrum| hash.count(*spectrum));
             }
             TextureKind::Number => self.tag(2),
+            TextureKind::Light(daylight) => {
+                self.tag(3);
+                self.count(*daylight);
+            }
         }
         self.counts(size);
         self.floats(texels);
@@ -319,12 +323,15 @@ impl Hash {
         self.option(*material, Hash::count);
         match emission {
             None => self.tag(0),
-            Some(Emission { radiance, sides }) => {
-                self.tag(match sides {
-                    Sides::Front => 1,
-                    Sides::Both => 2,
+            Some(Emission { radiance, sides, texture }) => {
+                self.tag(match (sides, texture) {
+                    (Sides::Front, None) => 1,
+                    (Sides::Both, None) => 2,
+                    (Sides::Front, Some(_)) => 3,
+                    (Sides::Both, Some(_)) => 4,
                 });
                 self.count(*radiance);
+                texture.iter().for_each(|texture| self.count(*texture));
             }
         }
         self.option(*interior, |hash, Interior { body, medium, to_grid }| {

@@ -166,6 +166,11 @@ impl<'a> Materials<'a> {
         }
     }
 
+    /// The textures of the file, which emissions have too.
+    pub fn textures(&mut self) -> &mut Textures {
+        &mut self.textures
+    }
+
     /// The name of a material of the scene.
     pub fn name(&self, id: MaterialId) -> &str {
         &self.scene[id].name

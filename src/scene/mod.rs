@@ -361,8 +361,11 @@ pub enum TextureFilter {
 pub enum TextureKind {
     /// Linear sRGB in [0, 1]; each texel's spectrum is that of `rgb` ([`crate::spectral::upsample::reflectance`]).
     Colour,
-    /// The share of each of these reflectances; they sum to 1 at most, and what is missing is black.
+    /// The share of each of these reflectances, which sum to 1 at most, and what is missing is black; or how much there is of each
+    /// of these radiances.
     Mixture(Vec<SpectrumId>),
+    /// Linear sRGB of at least 0; each texel's radiance is that of [`crate::spectral::skylight::Tint`], times this daylight.
+    Light(SpectrumId),
     /// One number: a weight, or kelvins.
     Number,
 }
@@ -371,7 +374,7 @@ impl Texture {
     /// Numbers in a texel.
     pub fn channels(&self) -> usize {
         match &self.kind {
-            TextureKind::Colour => 3,
+            TextureKind::Colour | TextureKind::Light(_) => 3,
             TextureKind::Mixture(endmembers) => endmembers.len(),
             TextureKind::Number => 1,
         }
@@ -521,8 +524,11 @@ pub struct Mesh {
 /// Radiance leaving a surface, W m⁻² sr⁻¹ nm⁻¹, the same in all directions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Emission {
+    /// Where it is textured, what it is on the whole: for choosing lights and wavelengths.
     pub radiance: SpectrumId,
     pub sides: Sides,
+    /// A texture of [`TextureKind::Light`] or [`TextureKind::Mixture`], of radiances, in its place.
+    pub texture: Option<TextureId>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

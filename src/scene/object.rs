@@ -13,6 +13,7 @@ use super::material::{Materials, Needs};
 use super::medium::Media;
 use super::shape::{self, Replaced};
 use super::spectrum::{Handle, Quantity, Spectra, report_in_file};
+use super::texture;
 use super::transform;
 use super::tree::Value;
 use super::{Attributes, Emission, Interior, MaterialId, MediumId, Object, Shape, Sides};
@@ -35,8 +36,15 @@ pub struct Objects<'s, 'a> {
 /// still looked at.
 struct Common {
     affine: Option<DAffine3>,
-    emission: Option<Option<(Handle, Sides)>>,
+    emission: Option<Option<(Radiates, Sides)>>,
     interior: Option<Option<Filling>>,
+}
+
+/// What an emission is: on the whole, and by a texture.
+#[derive(Clone, Copy)]
+struct Radiates {
+    mean: Handle,
+    texture: Option<texture::Handle>,
 }
 
 /// The medium of an interior, and the box around it in the object's own space.
@@ -104,7 +112,7 @@ impl<'s, 'a> Objects<'s, 'a> {
             common.interior = self.filling(&fields, &local);
         }
         let kind = shape.path.rsplit('.').next().unwrap_or_default();
-        let attributes = shape::attributes(&local, self.needs(covering));
+        let attributes = shape::attributes(&local, self.needs(covering, &common));
         let name = format!("{} ({kind})", item.path);
         self.push(&fields, name, (local, attributes), covering, &common);
     }
@@ -115,7 +123,14 @@ impl<'s, 'a> Objects<'s, 'a> {
 
     fn common(&mut self, fields: &Fields<'a>) -> Common {
         let affine = fields.get("transform").map_or(Some(DAffine3::IDENTITY), |item| transform::decode(&item));
-        let emission = fields.get("emission").map(|item| self.spectra.resolve(&item, Quantity::Radiance));
+        let emission = fields.get("emission").map(|item| {
+            if texture::is_texture(&item) {
+                let (texture, mean) = self.materials.textures().light(&item, self.spectra)?;
+                return Some(Radiates { mean, texture: Some(texture) });
+            }
+            let mean = self.spectra.resolve(&item, Quantity::Radiance)?;
+            Some(Radiates { mean, texture: None })
+        });
         let sides = match fields.get("emission_sides") {
             Some(item) => {
                 if emission.is_none() {
@@ -243,14 +258,16 @@ impl<'s, 'a> Objects<'s, 'a> {
         covering: Option<Covering>,
         common: &Common,
     ) {
-        let needs = self.needs(covering);
+        let needs = self.needs(covering, common);
         let bare = parts.iter().find(|part| (needs.uv || needs.tangent) && part.uv.is_none());
         if let (Some(part), Some(Covering::Of(material))) = (bare, covering) {
-            let why = if needs.uv { "is textured" } else { "has two roughnesses" };
-            let message = format!(
-                "material \"{}\" {why}, but the faces from here on have no texture coordinates (vt)",
-                self.materials.name(material)
-            );
+            let of_material = self.materials.needs(material);
+            let what = match (of_material.uv, of_material.tangent) {
+                (true, _) => format!("material \"{}\" is textured", self.materials.name(material)),
+                (_, true) => format!("material \"{}\" has two roughnesses", self.materials.name(material)),
+                _ => "the emission is textured".to_owned(),
+            };
+            let message = format!("{what}, but the faces from here on have no texture coordinates (vt)");
             shape.cx.push(Problem {
                 file: shape.cx.path(shape.text().unwrap_or_default()),
                 line: Some(part.line),
@@ -276,11 +293,13 @@ impl<'s, 'a> Objects<'s, 'a> {
         self.push(fields, name, (Shape::Mesh(mesh), attributes), covering, common);
     }
 
-    fn needs(&self, covering: Option<Covering>) -> Needs {
-        match covering {
+    fn needs(&self, covering: Option<Covering>, common: &Common) -> Needs {
+        let needs = match covering {
             Some(Covering::Of(material)) => self.materials.needs(material),
             _ => Needs::default(),
-        }
+        };
+        let lit = common.emission.flatten().is_some_and(|(radiates, _)| radiates.texture.is_some());
+        Needs { uv: needs.uv || lit, ..needs }
     }
 
     /// Moves `local` into the world and adds it to the scene.
@@ -337,7 +356,11 @@ impl<'s, 'a> Objects<'s, 'a> {
             let to_unit = DAffine3::from_scale((high - low).recip()) * DAffine3::from_translation(-low);
             Interior { body, medium, to_grid: to_unit * affine.inverse() }
         });
-        let emission = emission.map(|(radiance, sides)| Emission { radiance: self.spectra.take(radiance), sides });
+        let emission = emission.map(|(Radiates { mean, texture }, sides)| Emission {
+            radiance: self.spectra.take(mean),
+            sides,
+            texture: texture.map(|texture| self.materials.textures().take(texture, self.spectra)),
+        });
         self.scene.push(Object { name, shape, attributes, material, emission, interior });
     }
 }

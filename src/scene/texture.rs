@@ -15,7 +15,7 @@ use super::{Placement, Texture, TextureFilter, TextureId, TextureKind};
 use crate::format::image::{self, Format, Image, Plane, Rgb};
 use crate::format::noise::{self, Range};
 use crate::format::primaries::{self, White};
-use crate::spectral::upsample;
+use crate::spectral::{Curve, upsample};
 
 /// Spectra that one texture may mix: each costs a record at every vertex.
 const MAX_ENDMEMBERS: usize = 32;
@@ -26,6 +26,9 @@ const NOTICEABLE: f64 = 1e-6;
 
 /// The most that coordinates are scaled and moved by: f32 still tells a thousandth of the picture there.
 const FARTHEST: f64 = 1e4;
+
+/// The most radiance of a texel.
+const BRIGHTEST: f64 = 1e30;
 
 /// A checked texture; [`Textures::take`] makes it part of the scene.
 pub type Handle = usize;
@@ -45,6 +48,10 @@ enum Use {
     /// Of these spectra.
     Mixture(Vec<spectrum::Handle>),
     Number(Number),
+    /// Of a lamp: colours, and how much brighter it is.
+    Light(f64),
+    /// Of these lamps.
+    Lamps(Vec<spectrum::Handle>, f64),
 }
 
 struct Checked {
@@ -76,10 +83,11 @@ pub struct Textures {
     scene: Vec<Texture>,
 }
 
-/// Whether `item` is a table that names a texture.
+/// Whether `item` is a table that names a texture, or has keys that only textures have.
 pub fn is_texture(item: &Item) -> bool {
+    const OWN: [&str; 5] = ["texture", "endmembers", "filter", "offset", "strength"];
     let Value::Table(entries) = &item.node.value else { return false };
-    entries.iter().any(|entry| matches!(entry.key.as_str(), "texture" | "endmembers"))
+    entries.iter().any(|entry| OWN.contains(&entry.key.as_str()))
 }
 
 impl Textures {
@@ -89,7 +97,7 @@ impl Textures {
         let file = fields.require("texture", "texture = \"abundance.exr\"");
         let endmembers = match fields.get("endmembers") {
             None => None,
-            Some(list) => Some((resolve_endmembers(&list, spectra)?, list)),
+            Some(list) => Some((resolve_endmembers(&list, Quantity::Reflectance, spectra)?, list)),
         };
         let (file, placement) = (file?, placement(&fields)?);
         match endmembers {
@@ -101,6 +109,52 @@ impl Textures {
                 })
             }
         }
+    }
+
+    /// The radiance over a surface that `item` spells: `{ texture, endmembers }`, so much of each of some lamps, or `{ texture }`,
+    /// colours. And what it is on the whole.
+    pub fn light<'a>(&mut self, item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<(Handle, spectrum::Handle)> {
+        let fields = item.table(&keys::TEXTURE_OF_LIGHT)?;
+        let file = fields.require("texture", "texture = \"screen.png\"");
+        let endmembers = match fields.get("endmembers") {
+            None => None,
+            Some(list) => Some((resolve_endmembers(&list, Quantity::Radiance, spectra)?, list)),
+        };
+        let strength = fields.get("strength").map_or(Some(1.0), |item| {
+            item.number_where(|strength| (0.0..=BRIGHTEST).contains(&strength), "a factor in [0, 1e30]")
+        });
+        let (file, placement, strength) = (file?, placement(&fields)?, strength?);
+        let handle = match endmembers {
+            None => {
+                let kind = Use::Light(strength);
+                self.add(&file, kind, placement, |image, path| light(&file, image, path, strength))?
+            }
+            Some((handles, names)) => {
+                let kind = Use::Lamps(handles, strength);
+                self.add(&file, kind, placement, |image, path| amounts(&file, &names, image, path, strength))?
+            }
+        };
+        let checked = &self.checked[handle];
+        let channels = match &checked.kind {
+            Use::Lamps(handles, _) => handles.len(),
+            _ => 3,
+        };
+        let texels = (checked.texels.len() / channels) as f64;
+        let mean = |channel: usize| {
+            checked.texels.iter().skip(channel).step_by(channels).map(|v| f64::from(*v)).sum::<f64>() / texels
+        };
+        let means: Vec<f64> = (0..channels).map(mean).collect();
+        let curve = match (&checked.kind, spectra.channels()) {
+            (Use::Lamps(handles, _), Some(channels)) => {
+                let curves: Vec<&Curve> = handles.iter().map(|handle| spectra.checked_curve(*handle)).collect();
+                let sum = |_: f64, v: &[f64]| v.iter().zip(&means).map(|(v, mean)| v * mean).sum();
+                Curve::derived_by_stretch(&curves, channels, sum)
+            }
+            // Wrong channels are reported elsewhere.
+            (Use::Lamps(..), None) => Curve::Constant(1.0),
+            _ => upsample::emission([means[0], means[1], means[2]]),
+        };
+        Some((handle, spectra.add(&format!("the mean of {}", file.text()?), curve)))
     }
 
     /// The numbers over a surface that `item`, `{ texture }`, spells.
@@ -118,7 +172,7 @@ impl Textures {
         let endmembers = match kind {
             Use::Mixture(endmembers) => Some(&endmembers[..]),
             Use::Colour => None,
-            Use::Number(_) => unreachable!("numbers are no reflectance"),
+            Use::Number(_) | Use::Light(_) | Use::Lamps(..) => unreachable!("neither is a reflectance"),
         };
         Picture { endmembers, placement: *placement, size: *size, texels }
     }
@@ -133,6 +187,12 @@ impl Textures {
         let kind = match &checked.kind {
             Use::Colour => TextureKind::Colour,
             Use::Mixture(handles) => TextureKind::Mixture(handles.iter().map(|handle| spectra.take(*handle)).collect()),
+            Use::Lamps(handles, _) => {
+                TextureKind::Mixture(handles.iter().map(|handle| spectra.take(*handle)).collect())
+            }
+            Use::Light(_) => {
+                TextureKind::Light(spectra.curve(&format!("D65 of {}", checked.path.display()), upsample::daylight()))
+            }
             Use::Number(_) => TextureKind::Number,
         };
         let (name, texels) = (checked.path.display().to_string(), Arc::clone(&checked.texels));
@@ -208,22 +268,25 @@ fn placement(fields: &Fields) -> Option<Placement> {
     Some(Placement { filter, scale, offset })
 }
 
-fn resolve_endmembers<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Vec<spectrum::Handle>> {
+fn resolve_endmembers<'a>(
+    item: &Item<'a>,
+    quantity: Quantity,
+    spectra: &mut Spectra<'a>,
+) -> Option<Vec<spectrum::Handle>> {
     let items = item.array()?;
     if !(1..=MAX_ENDMEMBERS).contains(&items.len()) {
         let message = format!("must be 1 to {MAX_ENDMEMBERS} spectra, but are {}", items.len());
         item.error_help(message, "name one for each channel of the texture");
         return None;
     }
-    let handles: Vec<_> = items.iter().map(|item| spectra.resolve(item, Quantity::Reflectance)).collect();
+    let handles: Vec<_> = items.iter().map(|item| spectra.resolve(item, quantity)).collect();
     handles.into_iter().collect()
 }
 
-/// Linear sRGB in [0, 1], \[y\]\[x\]\[3\].
-fn colours(file: &Item, image: &Image, name: &str, spectra: &Spectra) -> Option<(Vec<f32>, Vec<String>)> {
-    let opaque = without_alpha(file, image, name)?;
+/// The planes of a picture of colours, which are sRGB's unless OpenEXR says others.
+fn rgb_of<'p>(file: &Item, opaque: &[&'p Plane], image: &Image, name: &str) -> Option<Rgb<'p>> {
     let help = "for a mixture of spectra give their names: endmembers = [\"soil\", …]";
-    let rgb = match Rgb::of(&opaque) {
+    let rgb = match Rgb::of(opaque) {
         Ok(Some(rgb)) => rgb,
         Ok(None) => {
             let message = format!("{name} has {}, but a colour needs R, G and B, or Y", channels(&image.planes));
@@ -239,6 +302,13 @@ fn colours(file: &Item, image: &Image, name: &str, spectra: &Spectra) -> Option<
         file.error_help(format!("{name}: its colours are those of {foreign}"), "convert it to sRGB");
         return None;
     }
+    Some(rgb)
+}
+
+/// Linear sRGB in [0, 1], \[y\]\[x\]\[3\].
+fn colours(file: &Item, image: &Image, name: &str, spectra: &Spectra) -> Option<(Vec<f32>, Vec<String>)> {
+    let opaque = without_alpha(file, image, name)?;
+    let rgb = rgb_of(file, &opaque, image, name)?;
     let mut warnings = Vec::new();
     let mut planes = Vec::new();
     for plane in rgb.planes() {
@@ -344,6 +414,75 @@ fn abundances(
     );
     warnings.extend((rounded > 0).then_some(warning));
     Some((texels, warnings))
+}
+
+/// Numbers of at least 0, as they are stored times `strength`, \[y\]\[x\]; noise below 0 is 0, with a warning.
+fn amounts_of(
+    file: &Item,
+    image: &Image,
+    name: &str,
+    plane: &Plane,
+    decode: impl Fn(f32) -> f32,
+    strength: f64,
+    warnings: &mut Vec<String>,
+) -> Option<Vec<f32>> {
+    let mut samples = plane.samples.clone();
+    if let Ok(Some(clipped)) = noise::clip(&mut samples, Range::NotNegative, |v| v as f32) {
+        warnings.push(format!("texture {name} holds {}", clipped.words(Range::NotNegative)));
+    }
+    let brightest = BRIGHTEST as f32;
+    let scaled: Vec<f32> = samples.iter().map(|v| (f64::from(decode(*v)) * strength) as f32).collect();
+    if let Some(i) = scaled.iter().position(|v| !(0.0..=brightest).contains(v)) {
+        let (channel, value) = (&plane.name, plane.samples[i]);
+        let message = format!(
+            "{name}: a radiance must lie in [0, 1e30], but channel {channel} is {value} {}, times `strength` {strength}",
+            place(image, i)
+        );
+        file.error(message);
+        return None;
+    }
+    Some(scaled)
+}
+
+/// Linear sRGB of light, \[y\]\[x\]\[3\].
+fn light(file: &Item, image: &Image, name: &str, strength: f64) -> Option<(Vec<f32>, Vec<String>)> {
+    let opaque = without_alpha(file, image, name)?;
+    let rgb = rgb_of(file, &opaque, image, name)?;
+    if image.colours.primaries.is_some() {
+        file.error_help(format!("{name} has primaries other than sRGB's"), "convert it to sRGB");
+        return None;
+    }
+    let mut warnings = Vec::new();
+    let mut planes = Vec::new();
+    for plane in rgb.planes() {
+        let decode = |v: f32| image.colours.transfer.decode(v);
+        planes.push(amounts_of(file, image, name, plane, decode, strength, &mut warnings)?);
+    }
+    warnings.dedup();
+    Some(((0..planes[0].len()).flat_map(|i| [0, 1, 2].map(|c| planes[c][i])).collect(), warnings))
+}
+
+/// How much there is of each of some lamps, \[y\]\[x\]\[lamp\].
+fn amounts(
+    file: &Item,
+    endmembers: &Item,
+    image: &Image,
+    name: &str,
+    strength: f64,
+) -> Option<(Vec<f32>, Vec<String>)> {
+    let count = endmembers.array()?.len();
+    if image.planes.len() != count {
+        let message = format!("names {count} spectra, but {name} has {}", channels(&image.planes));
+        endmembers.error_help(message, "name one for each channel, in this order");
+        return None;
+    }
+    let mut warnings = Vec::new();
+    let order = pair(endmembers, image, name, &mut warnings)?;
+    let mut planes = Vec::with_capacity(count);
+    for plane in order.iter().map(|&i| &image.planes[i]) {
+        planes.push(amounts_of(file, image, name, plane, |v| v, strength, &mut warnings)?);
+    }
+    Some(((0..planes[0].len()).flat_map(|i| planes.iter().map(move |plane| plane[i])).collect(), warnings))
 }
 
 /// The channel of each endmember: by name where all names match, whatever their case and the layers before them; in the order of

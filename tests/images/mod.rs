@@ -9,6 +9,7 @@ mod lights;
 mod materials;
 mod media;
 mod opacity;
+mod pictures;
 mod roulette;
 mod spots;
 mod textures;

@@ -7,6 +7,7 @@ use glam::{DMat3, DVec2, DVec3};
 use spectile::Error;
 use spectile::error::Problem;
 use spectile::scene::{self, Bsdf, Placement, Reflectance, Scene, Temperature, TextureFilter, TextureKind, Weight};
+use spectile::spectral::upsample;
 
 use super::BASE;
 
@@ -427,4 +428,51 @@ fn opacities_resolve() {
         .replace("reflectance = \"grey\"", "reflectance = \"grey\"\nopacity = 0.5");
     let problems = load(&text, &files).expect_err("a part with an opacity");
     assert!(problems[0].to_string().contains("which a part of a blend cannot have"), "{problems:?}");
+}
+
+#[test]
+fn pictures_of_light_resolve() {
+    let files = [
+        ("screen.png", png([2, 1], png::ColorType::Rgb, &[255, 255, 255, 0, 0, 0])),
+        ("bright.exr", float_exr((1, 1), &[("R", &[20.0]), ("G", &[10.0]), ("B", &[5.0])])),
+        ("negative.exr", float_exr((1, 1), &[("R", &[-20.0]), ("G", &[10.0]), ("B", &[5.0])])),
+        ("amounts.exr", float_exr((1, 1), &[("a", &[3.0]), ("b", &[0.5])])),
+    ];
+    let with = |emission: &str| {
+        let text = BASE.replace("material = \"white\"", &format!("material = \"white\"\nemission = {emission} #!"));
+        load(&text, &files)
+    };
+    let lit = |emission: &str| {
+        let scene = with(emission).unwrap_or_else(|e| panic!("{e:?}"));
+        let of_object = scene.objects[0].emission.clone().expect("an emission");
+        assert!(scene.objects[0].attributes.uv.is_some() && scene.objects[1].attributes.uv.is_none());
+        (
+            scene.textures[of_object.texture.expect("a texture")].clone(),
+            scene.spectra[of_object.radiance].curve.clone(),
+            scene,
+        )
+    };
+    let (screen, mean, scene) = lit("{ texture = \"screen.png\", strength = 4, filter = \"nearest\" }");
+    let TextureKind::Light(daylight) = screen.kind else { panic!("{:?}", screen.kind) };
+    assert_eq!(scene.spectra[daylight].curve, upsample::daylight());
+    assert_eq!(
+        (&screen.texels[..], screen.placement.filter),
+        (&[4.0, 4.0, 4.0, 0.0, 0.0, 0.0][..], TextureFilter::Nearest)
+    );
+    assert_eq!(mean, upsample::emission([2.0; 3]));
+    assert_eq!(lit("{ texture = \"bright.exr\" }").0.texels[..], [20.0, 10.0, 5.0]);
+    let (amounts, mean, scene) = lit("{ texture = \"amounts.exr\", endmembers = [0.25, 2.0], strength = 2 }");
+    let TextureKind::Mixture(lamps) = amounts.kind else { panic!("{:?}", amounts.kind) };
+    assert_eq!(lamps.iter().map(|lamp| scene.spectra[*lamp].curve.eval(500.0)).collect::<Vec<_>>(), [0.25, 2.0]);
+    assert_eq!(amounts.texels[..], [6.0, 1.0]);
+    assert!((mean.mean(400.0, 700.0) - (6.0 * 0.25 + 2.0)).abs() < 1e-4, "{mean:?}");
+    for (wrong, words) in [
+        ("{ texture = \"negative.exr\" }", "a radiance must lie in [0, 1e30], but channel R is -20"),
+        ("{ texture = \"screen.png\", strength = -1 }", "a factor in [0, 1e30], but is -1"),
+        ("{ texture = \"amounts.exr\", endmembers = [1] }", "names 1 spectra"),
+        ("{ texture = \"nothing.png\" }", "nothing.png"),
+    ] {
+        let problems = with(wrong).expect_err(wrong);
+        assert!(problems[0].to_string().contains(words), "{wrong}: {problems:?}");
+    }
 }

@@ -15,6 +15,12 @@ fn append_heat(list: ptr<function, RecordList>, emitted: u32, v: Vertex, scale: 
         let closed = v.inside && (r.kind & RADIATOR_TWO_SIDED) == 0u;
 #if HOT_LAMPS
         if (kind == RADIATOR_LAMP) {
+#if HOT_PICTURES
+            if (!closed && r.reflectance != NONE) {
+                append_light_picture(list, r, v.uv, scale);
+                continue;
+            }
+#endif
             if (!closed) {
                 append(list, OP_SPECTRUM | MODE_SINGLE, r.spectra & 0xffffu, scale, 0.0);
             }
@@ -80,6 +86,28 @@ fn append_heat(list: ptr<function, RecordList>, emitted: u32, v: Vertex, scale: 
         append(list, OP_PLANCK | mode | MODE_ADD, 0u, weight, kelvin);
     }
 }
+
+#if HOT_PICTURES
+// Appends what adds `scale` times the radiance of a lamp that is a picture to F: so much of each of its spectra, or colours times
+// daylight.
+fn append_light_picture(list: ptr<function, RecordList>, r: Radiator, uv: vec2<f32>, scale: f32) {
+    if (textures[TEXTURE_WORDS * r.reflectance + 4u] != NONE) {
+        append_reflectance(list, r.reflectance, uv, scale, MODE_SINGLE);
+        return;
+    }
+#if COLOURS
+    let around = texels_around(r.reflectance, uv);
+    for (var n = 0u; n < 4u; n += 1u) {
+        let at = textures[TEXTURE_WORDS * r.reflectance] + 4u * around.texel[n];
+        let weight = scale * around.weight[n] * texels[at + 3u];
+        if (weight > 0.0) {
+            append(list, OP_SMOOTH | MODE_START, at, weight, 0.0);
+            append(list, OP_SPECTRUM | MODE_ADD, r.spectra & 0xffffu, 1.0, 0.0);
+        }
+    }
+#endif
+}
+#endif
 
 #if HOT_FACETS
 // A metal of facets absorbs where light meets them first, 1 - F; and of what meets others, a share that `inner` says, or all.

@@ -19,7 +19,7 @@ use crate::device::parts::textures::{self, Share};
 use crate::device::text::module;
 use crate::device::words::HOT_COSINES;
 use crate::scene::{
-    Bsdf, Emission, MaterialId, Reflectance, SMOOTH, Scene, Sides, Spectrum, SpectrumId, Temperature, Weight,
+    Bsdf, Emission, MaterialId, Reflectance, SMOOTH, Scene, Sides, Spectrum, SpectrumId, Temperature, TextureId, Weight,
 };
 use crate::spectral::hemisphere::fresnel::{conductor, dielectric, mean_conductor, mean_dielectric};
 use crate::spectral::hemisphere::{
@@ -70,7 +70,7 @@ pub const BY_PLACE: Part = Part {
         defines.set("RADIATORS", true).set("HOT_LAMPS", features.lamps);
         defines.set("HOT_FACETS", features.facets).set("HOT_MIRRORS", features.mirrors);
         defines.set("HOT_VARNISH", features.varnish).set("HOT_COATS", features.coats);
-        defines.set("HOT_TRANSLUCENT", features.translucent);
+        defines.set("HOT_TRANSLUCENT", features.translucent).set("HOT_PICTURES", features.pictures);
         defines.set("HOT_TEXTURED", features.textured).set("HOT_NUMBERS", features.numbers);
     },
     buffers: |scene| {
@@ -123,8 +123,8 @@ pub enum Kind {
     ByPlace(usize),
 }
 
-/// The spectrum of an object's lamp, and whether that is on both sides.
-type OfLamp = Option<(SpectrumId, bool)>;
+/// The spectrum of an object's lamp, whether that is on both sides, and the texture that takes its place.
+type OfLamp = Option<(SpectrumId, bool, Option<TextureId>)>;
 
 /// A surface of hot parts, and its lamp.
 pub struct Radiating {
@@ -273,24 +273,27 @@ impl Leaf<'_> {
 pub fn as_emission(scene: &Scene) -> Heat<'_> {
     let kinds = vec![Kind::Lamp; scene.objects.len()];
     let mut heat = Heat { scene: Cow::Borrowed(scene), by_angle: Vec::new(), radiating: Vec::new(), kinds };
-    if scene.materials.iter().all(|material| material.temperature.is_none()) {
+    let is_picture = |emission: &Emission| emission.texture.is_some();
+    let pictures = scene.objects.iter().any(|object| object.emission.as_ref().is_some_and(is_picture));
+    if scene.materials.iter().all(|material| material.temperature.is_none()) && !pictures {
         return heat;
     }
     let mut lit = scene.clone();
     let mut made: Vec<((MaterialId, OfLamp), (SpectrumId, Kind))> = Vec::new();
     for (index, object) in scene.objects.iter().enumerate() {
         let Some(material) = object.material else { continue };
-        let emitted = object.emission.as_ref().map(|e| (e.radiance, e.sides == Sides::Both));
+        let emitted = object.emission.as_ref().map(|e| (e.radiance, e.sides == Sides::Both, e.texture));
         let known = made.iter().find(|(key, _)| *key == (material, emitted)).map(|(_, made)| *made);
         let (radiance, kind) = match known {
             Some(known) => known,
             None => {
                 let mut parts = Vec::new();
                 collect(scene, material, 1.0, &[], None, &mut parts);
-                if parts.is_empty() {
+                let is_picture = emitted.is_some_and(|(_, _, texture)| texture.is_some());
+                if parts.is_empty() && !is_picture {
                     continue;
                 }
-                let by_place = parts.iter().any(|part| part.differs_by_place(scene));
+                let by_place = is_picture || parts.iter().any(|part| part.differs_by_place(scene));
                 let leaves = || -> Vec<Leaf> {
                     match by_place {
                         true => parts.iter().flat_map(|part| part.typical(scene)).collect(),
@@ -299,14 +302,14 @@ pub fn as_emission(scene: &Scene) -> Heat<'_> {
                 };
                 let name = format!("heat of \"{}\"", scene.materials[material].name);
                 let of_lamp = |back: bool| {
-                    emitted.filter(|(_, both)| *both || !back).map(|(spectrum, _)| &scene.spectra[spectrum].curve)
+                    emitted.filter(|(_, both, _)| *both || !back).map(|(spectrum, ..)| &scene.spectra[spectrum].curve)
                 };
                 let mut push = |curve: Curve| {
                     lit.spectra.push(Spectrum { name: name.clone(), curve });
                     lit.spectra.len() - 1
                 };
                 let of_all = leaves();
-                let even = of_all.iter().all(Leaf::is_even) && emitted.is_none_or(|(_, both)| both);
+                let even = of_all.iter().all(Leaf::is_even) && emitted.is_none_or(|(_, both, _)| both);
                 let new = if by_place {
                     let typical = radiance(of_lamp(false), &of_all, TYPICAL_COSINE, false, &scene.channels);
                     heat.radiating.push(Radiating { parts, lamp: emitted });
@@ -326,7 +329,7 @@ pub fn as_emission(scene: &Scene) -> Heat<'_> {
                     let front = row(false);
                     // Lights are chosen by what they send typically.
                     let typical = front[(TYPICAL_COSINE.cbrt() * (COSINES - 1) as f64) as usize].clone();
-                    let same = of_all.iter().all(|leaf| leaf.two_sided) && emitted.is_none_or(|(_, both)| both);
+                    let same = of_all.iter().all(|leaf| leaf.two_sided) && emitted.is_none_or(|(_, both, _)| both);
                     let front: Vec<SpectrumId> = front.into_iter().map(&mut push).collect();
                     let back = if same { front.clone() } else { row(true).into_iter().map(&mut push).collect() };
                     heat.by_angle.push([front, back]);
@@ -339,7 +342,7 @@ pub fn as_emission(scene: &Scene) -> Heat<'_> {
         heat.kinds[index] = kind;
         // A white surface is hot in vain.
         if lit.spectra[radiance].curve != Curve::Constant(0.0) {
-            lit.objects[index].emission = Some(Emission { radiance, sides: Sides::Both });
+            lit.objects[index].emission = Some(Emission { radiance, sides: Sides::Both, texture: None });
         }
     }
     lit.materials.iter_mut().for_each(|material| material.temperature = None);

@@ -7,7 +7,7 @@ use crate::device::words::{
     HOT_FACET_COUNT, NONE, RADIATOR_ABSORBS, RADIATOR_COAT, RADIATOR_FACETS, RADIATOR_LAMP, RADIATOR_MIRROR,
     RADIATOR_OPEN, RADIATOR_PASSES_SPECTRUM, RADIATOR_PASSES_TEXTURE, RADIATOR_TWO_SIDED, RADIATOR_VARNISH, Radiator,
 };
-use crate::scene::{Bsdf, Reflectance, SMOOTH, Scene, Temperature};
+use crate::scene::{Bsdf, Reflectance, SMOOTH, Scene, Temperature, TextureKind};
 use crate::spectral::Curve;
 use crate::spectral::hemisphere::fresnel::{mean_conductor, mean_dielectric};
 use crate::spectral::hemisphere::{DielectricAlbedo, ReflectionAlbedo, index_range};
@@ -51,6 +51,8 @@ pub struct Features {
     /// Some reflectance is a texture, and some light passes beside it.
     pub translucent: bool,
     pub lamps: bool,
+    /// Some lamp is a picture.
+    pub pictures: bool,
     /// Some reflectance is a texture; some temperature or share is.
     pub textured: bool,
     pub numbers: bool,
@@ -67,11 +69,25 @@ impl Radiators {
             for part in &surface.parts {
                 records += radiators.add(scene, part, surfaces);
             }
-            if let Some((spectrum, both)) = surface.lamp {
+            if let Some((spectrum, both, texture)) = surface.lamp {
                 radiators.features.lamps = true;
                 let kind = Kind::Lamp as u32 | if both { RADIATOR_TWO_SIDED } else { 0 };
-                radiators.all.push(Radiator { spectra: surfaces.spectrum(spectrum), ..blank(kind) });
-                records += 1;
+                let mut lamp = blank(kind);
+                match texture {
+                    None => {
+                        lamp.spectra = surfaces.spectrum(spectrum);
+                        records += 1;
+                    }
+                    Some(texture) => {
+                        lamp.reflectance = texture as u32;
+                        if let TextureKind::Light(daylight) = scene.textures[texture].kind {
+                            lamp.spectra = surfaces.spectrum(daylight);
+                        }
+                        radiators.features.pictures = true;
+                        records += texture_records(&scene.textures[texture]);
+                    }
+                }
+                radiators.all.push(lamp);
             }
             radiators.features.records = radiators.features.records.max(records);
             radiators.words.push(first as u32 | ((radiators.all.len() - first) as u32) << COUNT_SHIFT);

@@ -649,12 +649,14 @@ impl Surfaces {
     }
 }
 
-/// Most records that a textured reflectance takes.
+/// Most records that a textured reflectance or radiance takes.
 pub(super) fn texture_records(texture: &Texture) -> u32 {
     match &texture.kind {
         TextureKind::Colour => 4,
         TextureKind::Mixture(endmembers) => endmembers.len() as u32,
-        TextureKind::Number => unreachable!("numbers are no reflectance"),
+        // Its colour and daylight.
+        TextureKind::Light(_) => 8,
+        TextureKind::Number => unreachable!("numbers are no spectra"),
     }
 }
 

@@ -7,6 +7,7 @@ use crate::device::part::{Part, Place, SceneBuffer};
 use crate::device::text::module;
 use crate::device::words::{NONE, TEXTURE_WORDS};
 use crate::scene::{Placement, Scene, SpectrumId, Texture, TextureFilter, TextureId, TextureKind};
+use crate::spectral::skylight::{self, Tint};
 use crate::spectral::upsample::{self, smooth_of};
 use crate::spectral::{Curve, Outside};
 
@@ -30,10 +31,10 @@ pub const TEXTURES: Part = Part {
         };
         let hot = scene.radiators.as_ref().map(|radiators| radiators.features).unwrap_or_default();
         let shares = textures.first_share.is_some();
-        defines.set("TEXTURES", true).set("TEXTURED", surfaces.textured || hot.textured);
+        defines.set("TEXTURES", true).set("TEXTURED", surfaces.textured || hot.textured || hot.pictures);
         defines.set("KEPT", surfaces.textured_base || hot.textured);
         defines.set("COLOURS", textures.colours).set("MIXTURES", textures.mixtures).set("SHARES", shares);
-        defines.set("TEXEL_NUMBERS", textures.mixtures || shares || hot.numbers || surfaces.masks);
+        defines.set("TEXEL_NUMBERS", textures.mixtures || shares || hot.numbers || hot.pictures || surfaces.masks);
         defines.set("PRODUCTS", shares || hot.numbers);
         if let Some(first) = textures.first_share {
             defines.constant("FIRST_SHARE", first);
@@ -65,7 +66,7 @@ pub struct Textures {
     /// For each texture: first number, width, height, channels, place of the spectra of its channels or [`NONE`]; then
     /// those, as positions among the spectra that materials need until [`Textures::name_spectra`]; then the shares.
     pub words: Vec<u32>,
-    /// Three coefficients for each texel of colours, the numbers of others.
+    /// Three coefficients for each texel of colours, of light those and a factor; the numbers of others.
     pub texels: Vec<f32>,
     /// Where the shares of lobes start in `words`, where any lobe has some.
     pub first_share: Option<u32>,
@@ -104,6 +105,14 @@ impl Textures {
                         textures.words.push(position(*spectrum));
                     }
                     textures.texels.extend_from_slice(&texture.texels);
+                }
+                TextureKind::Light(_) => {
+                    textures.colours = true;
+                    let words = |tint: &Tint| {
+                        let [a, b, c] = tint.smooth.0;
+                        [a, b, c, tint.scale].map(|v| v as f32)
+                    };
+                    textures.texels.extend(skylight::tints(&texture.texels).iter().flat_map(words));
                 }
                 TextureKind::Number => textures.texels.extend_from_slice(&texture.texels),
             }
@@ -189,7 +198,7 @@ pub fn mean_reflectance(scene: &Scene, texture: TextureId) -> Curve {
             Curve::derived(&curves, &scene.channels, |v| v.iter().zip(&means).map(|(v, mean)| v * mean).sum())
         }
         TextureKind::Colour => upsample::reflectance([means[0], means[1], means[2]]),
-        TextureKind::Number => unreachable!("numbers are no reflectance"),
+        TextureKind::Number | TextureKind::Light(_) => unreachable!("neither is a reflectance"),
     }
 }
 
@@ -197,7 +206,7 @@ pub fn mean_reflectance(scene: &Scene, texture: TextureId) -> Curve {
 pub fn bound(scene: &Scene, texture: &Texture) -> Vec<f64> {
     let bounds = &scene.channels.bounds;
     match &texture.kind {
-        TextureKind::Number => vec![1.0; bounds.len()],
+        TextureKind::Number | TextureKind::Light(_) => vec![1.0; bounds.len()],
         TextureKind::Mixture(endmembers) => {
             // Of those that occur.
             let occurs =

@@ -95,6 +95,15 @@ impl<'a> SpectralValues<'a> {
                         }
                     }
                 }
+                TextureKind::Light(daylight) => {
+                    let wavelength = &self.wavelength;
+                    self.colours.of_light(texture, uv, |tint, weight| {
+                        for (value, nm) in values.iter_mut().zip(wavelength) {
+                            *value += weight * tint.eval(*nm);
+                        }
+                    });
+                    values.iter_mut().zip(self.get(*daylight)).for_each(|(value, white)| *value *= white);
+                }
                 TextureKind::Number => values = vec![texture::channel(texture, uv, 0)],
             }
             self.textured[id] = values;
@@ -107,6 +116,11 @@ impl<'a> SpectralValues<'a> {
             Reflectance::Spectrum(spectrum) => self.value(spectrum, k),
             Reflectance::Texture(texture) => self.textured[texture][k],
         }
+    }
+
+    /// A spectrum of a texture that has been looked up, in channel `k`.
+    pub fn textured(&self, texture: TextureId, k: usize) -> f64 {
+        self.textured[texture][k]
     }
 
     /// The number of a texture that has been looked up.

@@ -61,8 +61,8 @@ fn full() -> Scene {
         object(Shape::Disk { center: DVec3::X, normal: DVec3::Z, radius: 0.85 }, Attributes::default()),
         object(Shape::Cylinder { from: DVec3::X, to: DVec3::Y, radius: 0.95 }, Attributes::default()),
     ];
-    objects[1].emission = Some(Emission { radiance: 3, sides: Sides::Front });
-    objects[2].emission = Some(Emission { radiance: 0, sides: Sides::Both });
+    objects[1].emission = Some(Emission { radiance: 3, sides: Sides::Front, texture: None });
+    objects[2].emission = Some(Emission { radiance: 0, sides: Sides::Both, texture: None });
     objects[3].material = None;
     let to_grid = DAffine3::from_scale(DVec3::new(2.0, 3.0, 5.0));
     objects[3].interior = Some(Interior { body: 7, medium: 1, to_grid });

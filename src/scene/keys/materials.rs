@@ -395,3 +395,57 @@ offset = [0.25, 0.25]
 "#],
     notes: "",
 };
+
+pub static TEXTURE_OF_LIGHT: Section = Section {
+    path: "texture-of-light",
+    heading: "`{ texture = …, strength = … }`",
+    summary: "a radiance that differs from place to place",
+    about: "In the place of the `emission` of an object. With `endmembers` each channel of the picture says how much there is of one \
+            lamp; without, the picture is a colour: a screen, a sign, a window.",
+    keys: &[
+        Key::required(
+            "texture",
+            File,
+            "A picture, PNG or OpenEXR. Of colours: R, G and B, or grey, at least 0; a PNG is sRGB, an OpenEXR linear; each texel's \
+             radiance is that of `rgb` as emission, D65 with Y = 1 where it is [1, 1, 1]. With `endmembers`: at least 0, taken as \
+             they are.",
+        ),
+        Key::optional(
+            "endmembers",
+            List("list of spectra"),
+            "the picture is a colour",
+            "Radiances, 1 to 32: one for each channel of the picture, as for textures of reflectances.",
+        )
+        .tables(&[&super::SPECTRUM]),
+        Key::default("strength", Number, "1.0", "Multiplies the radiance.").range("[0, 1e30]"),
+        FILTER,
+        SCALE,
+        OFFSET,
+    ],
+    later: &[],
+    at: "objects.0.emission",
+    examples: &[
+        r#"
+[[objects]]
+quad = { corner = [0, 0, 0], edge_u = [1, 0, 0], edge_v = [0, 1, 0] }
+material = "lamp"
+
+[objects.emission]
+texture = "albedo.png"
+strength = 2.5
+filter = "nearest"
+scale = 1.5
+offset = [0.25, 0.5]
+"#,
+        r#"
+[[objects]]
+quad = { corner = [0, 0, 0], edge_u = [1, 0, 0], edge_v = [0, 1, 0] }
+material = "lamp"
+
+[objects.emission]
+texture = "abundance.png"
+endmembers = [0.1, { blackbody = 3000 }, { blackbody = 5000, scale = 1e-3 }]
+"#,
+    ],
+    notes: "Light is aimed at evenly over such a surface: a few bright texels on a dark one are noisy.",
+};

@@ -269,6 +269,7 @@ pub static SECTIONS: &[&Section] = &[
     &BLACK,
     &TEXTURE,
     &TEXTURE_OF_NUMBERS,
+    &TEXTURE_OF_LIGHT,
     &OBJECT,
     &SPHERE,
     &QUAD,

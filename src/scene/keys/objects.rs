@@ -29,7 +29,8 @@ pub static OBJECT: Section = Section {
             "none",
             "Radiance that leaves the surface, the same in all directions. It adds to what heat emits and to what the \
              material scatters: a lamp that reflects nothing is `black`.",
-        ),
+        )
+        .tables(&[&super::TEXTURE_OF_LIGHT]),
         Key::default(
             "emission_sides",
             Choice(&["front", "both"]),

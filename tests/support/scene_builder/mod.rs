@@ -140,14 +140,14 @@ impl Builder {
             shape,
             Bsdf::Diffuse { reflectance: Reflectance::Spectrum(reflectance) },
             true,
-            Some(Emission { radiance, sides }),
+            Some(Emission { radiance, sides, texture: None }),
         )
     }
 
     /// A shape that emits and reflects nothing.
     pub fn lamp(mut self, shape: Shape, radiance: impl IntoCurve, sides: Sides) -> Self {
         let radiance = self.spectrum(radiance);
-        self.object(shape, Bsdf::Black, true, Some(Emission { radiance, sides }))
+        self.object(shape, Bsdf::Black, true, Some(Emission { radiance, sides, texture: None }))
     }
 
     pub fn black(self, shape: Shape) -> Self {
