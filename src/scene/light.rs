@@ -6,12 +6,75 @@ use toml::value::Datetime;
 use super::decode::{Fields, Item};
 use super::keys;
 use super::spectrum::{Handle, Quantity, Spectra};
-use super::sun;
 use super::tree::Value;
-use super::{Cone, Light, Profile};
+use super::{SpectrumId, sun};
 
 /// Degrees. Smaller disks are too narrow for a device to tell which directions are inside; larger ones are no disks.
 const ANGULAR_RADIUS: std::ops::RangeInclusive<f64> = 0.001..=90.0;
+
+/// Light that comes from no surface.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Light {
+    Point {
+        position: DVec3,
+        /// W sr⁻¹ nm⁻¹, the same in all directions.
+        intensity: SpectrumId,
+    },
+    /// A point that shines into a cone.
+    Spot {
+        position: DVec3,
+        /// In which the light on the cone's axis travels; a unit vector.
+        direction: DVec3,
+        /// W sr⁻¹ nm⁻¹ on the axis.
+        intensity: SpectrumId,
+        cone: Cone,
+    },
+    Directional {
+        /// In which the light travels; a unit vector.
+        direction: DVec3,
+        /// W m⁻² nm⁻¹ on a plane facing the light.
+        irradiance: SpectrumId,
+    },
+    /// A disk at infinity, the same radiance all over, visible also to the camera.
+    Sun {
+        /// In which the light of its centre travels; a unit vector.
+        direction: DVec3,
+        /// Between centre and rim, radians, up to π/2.
+        angular_radius: f64,
+        /// W m⁻² nm⁻¹ on a plane facing its centre.
+        irradiance: SpectrumId,
+    },
+}
+
+/// How the intensity of a spot depends on the angle θ to its axis, in radians: 1 up to `falloff`, 0 from `half_angle` on, and
+/// as the profile says between.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cone {
+    /// In (0, π].
+    pub half_angle: f64,
+    /// In [0, `half_angle`].
+    pub falloff: f64,
+    pub profile: Profile,
+}
+
+/// How a spot's intensity falls from 1 to 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Profile {
+    /// t²(3 - 2t), t = (cos θ - cos `half_angle`) / (cos `falloff` - cos `half_angle`).
+    Smooth,
+    /// t = (`half_angle` - θ) / (`half_angle` - `falloff`).
+    Linear,
+}
+
+impl Light {
+    /// Its spectrum: intensity or irradiance.
+    pub fn spectrum(&self) -> SpectrumId {
+        match self {
+            Light::Point { intensity, .. } | Light::Spot { intensity, .. } => *intensity,
+            Light::Directional { irradiance, .. } | Light::Sun { irradiance, .. } => *irradiance,
+        }
+    }
+}
 
 /// Decodes every light that is right; mistakes are recorded.
 pub fn decode_lights<'a>(item: Option<Item<'a>>, spectra: &mut Spectra<'a>) -> Vec<Light> {

@@ -364,6 +364,13 @@ fn anisotropic_roughness(item: &Item) -> Option<[f64; 2]> {
 }
 
 fn alpha(item: &Item) -> Option<f64> {
+    if is_texture(item) {
+        item.error_help(
+            "a roughness by texture is not supported yet",
+            "give one number, or `blend` a rough and a smooth material by the texture",
+        );
+        return None;
+    }
     item.number_where(|alpha| (0.0..=1.0).contains(&alpha), "a GGX roughness in [0, 1]")
 }
 

@@ -476,3 +476,13 @@ fn pictures_of_light_resolve() {
         assert!(problems[0].to_string().contains(words), "{wrong}: {problems:?}");
     }
 }
+
+#[test]
+fn a_textured_roughness_is_refused_by_name() {
+    for material in ["conductor]\neta = 0.2\nk = 3", "dielectric]\neta = 1.5", "plastic]\nreflectance = 0.5\neta = 1.5"]
+    {
+        let text = format!("[materials.soot.{material}\nroughness = {{ texture = \"rough.png\" }}");
+        let problems = load(&BASE.replace("[materials.soot.black]", &text), &[]).expect_err(material);
+        assert!(problems[0].to_string().contains("a roughness by texture is not supported yet"), "{problems:?}");
+    }
+}
