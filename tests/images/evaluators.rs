@@ -1,10 +1,12 @@
 //! The evaluators: the same paths, so the same values up to rounding, with one seed; and of the same mean with others.
 
-use glam::{DVec2, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 use spectile::device::prepared::Prepared;
 use spectile::render::wave::{Budget, DeviceLimits, WavePlan};
-use spectile::scene::{Evaluator, Field, Filter, Projection, Sampler, Scene, Sides};
-use spectile::spectral::Channels;
+use spectile::scene::{
+    Attributes, Cone, Evaluator, Field, Filter, Profile, Projection, Sampler, Scene, Sides, TextureKind, Weight,
+};
+use spectile::spectral::{Channels, upsample};
 
 use crate::device::{self, Settings, render};
 use crate::scene_builder::*;
@@ -124,6 +126,40 @@ fn the_same_paths_give_the_same_means() {
     }
     println!("largest difference over its bound: {far:.1e}");
     assert!(far > 0.0, "all bits are the same: was another evaluator run at all?");
+}
+
+/// Leaves, masks, screens and spots: what next-event estimation finds on both sides, past what lets rays pass, and pictures as lamps.
+#[test]
+fn leaves_masks_screens_and_spots() {
+    let ball = |x: f64, z: f64| sphere(DVec3::new(x, -0.6, z), 0.3);
+    let cone = Cone { half_angle: 0.6, falloff: 0.2, profile: Profile::Smooth };
+    let mut b = floor(5)
+        .translucent(ball(-0.9, 0.2), table(&[400.0, 700.0], &[0.1, 0.4]), table(&[400.0, 700.0], &[0.05, 0.5]))
+        .conductor(ball(0.0, 0.4), 0.2, 3.4, [0.3; 2])
+        .opacity(Weight::Constant(0.6))
+        .spot(DVec3::new(0.5, 1.5, 1.0), DVec3::new(-0.3, -1.0, -0.2), 2.0, cone)
+        .lamp(sphere(DVec3::new(0.7, 0.2, -0.3), 0.3), upsample::daylight(), Sides::Both)
+        .attributes(Attributes { axes: Some(DMat3::IDENTITY), ..Attributes::default() });
+    let daylight = b.0.spectra.len() - 1;
+    let rgb = [3.0, 0.2, 0.1, 0.1, 0.4, 2.0, 0.7, 0.7, 0.2, 1.0, 1.0, 1.0];
+    let picture = b.texture([2, 2], &rgb, TextureKind::Light(daylight));
+    b.0.objects.last_mut().and_then(|object| object.emission.as_mut()).expect("a lamp").texture = Some(picture);
+    let scene = b.build();
+    let (samples, settings) = (16, Settings { seed: 3, ..Settings::default() });
+    let expected = render(&with(&scene, Evaluator::DpeptPixel), 1, samples, settings);
+    expected.assert_clean();
+    let bound = device::rounding(Prepared::new(&scene, 0).expect("a scene").max_records(), samples);
+    for evaluator in others(true) {
+        let found = render(&with(&scene, evaluator), 1, samples, settings);
+        found.assert_clean();
+        assert_eq!(found.rays, expected.rays, "{}", evaluator.name());
+        for (a, b) in expected.means[0].iter().zip(&found.means[0]) {
+            let (a, b) = (f64::from(*a), f64::from(*b));
+            assert!((a - b).abs() <= bound * a.abs(), "{}: {a} and {b}, bound {bound:e}", evaluator.name());
+        }
+    }
+    let lit = expected.means[0].iter().filter(|value| **value > 0.0).count();
+    assert!(3 * lit > expected.means[0].len(), "{lit} values are not dark");
 }
 
 /// Where evaluation per pixel holds spectra with kinks, the others read strata: as far apart as tables may be from spectra.
