@@ -32,9 +32,9 @@ fn screens_show_the_spectra_of_their_colours() {
     let rgb: [[f32; 3]; 4] = [[8.0, 1.0, 0.5], [0.02, 0.3, 0.9], [2.5; 3], [0.0; 3]];
     let tints = skylight::tints(rgb.as_flattened());
     let nm = [361.0, 420.0, 530.0, 620.0, 700.0];
-    // 10 pm: the slope within a channel is nothing.
-    let channels = || Channels::from_bounds(nm.iter().map(|nm| [*nm, nm + 0.01]).collect(), None);
-    let spectrum = |texel: usize, nm: f64| upsample::emission(rgb[texel].map(f64::from)).eval(nm + 0.005);
+    // So narrow that the steepest slope, some 0.01 a nanometre, is nothing within a channel.
+    let channels = || Channels::from_bounds(nm.iter().map(|nm| [*nm, nm + 1e-4]).collect(), None);
+    let spectrum = |texel: usize, nm: f64| upsample::emission(rgb[texel].map(f64::from)).eval(nm + 5e-5);
     for (u, parts, side) in [
         (0.125, vec![(0, 1.0)], 1.0),
         (0.25, vec![(0, 0.5), (1, 0.5)], 1.0),
