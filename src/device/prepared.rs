@@ -360,8 +360,8 @@ fn lamps(scene: &Scene, accel: &Accel, picks: &LightPicks, source: impl Fn(usize
                 emitter.area = 1.0;
             }
             Light::Sun { direction, angular_radius, .. } => {
-                let (sine, half) = (angular_radius.sin(), (0.5 * angular_radius).sin());
-                let (sine2, versine) = ((sine * sine) as f32, (2.0 * half * half) as f32);
+                let sine = angular_radius.sin();
+                let (sine2, versine) = ((sine * sine) as f32, lights::versine(angular_radius) as f32);
                 lamps.push(Lamp { place: place(-direction), kind: LAMP_SUN, sine2, versine, ..Lamp::default() });
                 // The irradiance facing a disk of unit radiance is π sin².
                 emitter.area = (1.0 / (PI * sine * sine)) as f32;

@@ -315,7 +315,7 @@ fn colours(file: &Item, image: &Image, name: &str, spectra: &Spectra) -> Option<
         let samples = shares(file, image, name, plane, "a reflectance must lie in [0, 1]", &mut warnings)?;
         planes.push(samples.iter().map(|v| image.colours.transfer.decode(*v)).collect::<Vec<f32>>());
     }
-    let mut texels: Vec<f32> = (0..planes[0].len()).flat_map(|i| [0, 1, 2].map(|c| planes[c][i])).collect();
+    let mut texels = interleaved(&planes);
     if let (Some(from), Rgb::Colour(_)) = (image.colours.primaries, rgb) {
         let Some(matrix) = from.to_srgb(White::Adapted) else {
             file.error(format!("{name} has primaries {:?} that span no colours", from.0));
@@ -382,15 +382,9 @@ fn abundances(
     image: &Image,
     name: &str,
 ) -> Option<(Vec<f32>, Vec<String>)> {
-    if image.planes.len() != count {
-        let message = format!("names {count} spectra, but {name} has {}", channels(&image.planes));
-        endmembers.error_help(message, "name one for each channel, in this order");
-        return None;
-    }
     let mut warnings = Vec::new();
-    let order = pair(endmembers, image, name, &mut warnings)?;
     let mut planes = Vec::with_capacity(count);
-    for plane in order.iter().map(|&i| &image.planes[i]) {
+    for plane in pair(endmembers, image, name, &mut warnings)? {
         planes.push(shares(file, image, name, plane, "an abundance must lie in [0, 1]", &mut warnings)?);
     }
     let allowed = MOST_ABUNDANT + image.planes.iter().map(|plane| f64::from(plane.rounding)).sum::<f64>();
@@ -416,6 +410,15 @@ fn abundances(
     Some((texels, warnings))
 }
 
+/// The numbers of a channel without the noise below 0, which is told of; what else is negative stays, to be refused.
+fn not_negative(plane: &Plane, name: &str, warnings: &mut Vec<String>) -> Vec<f32> {
+    let mut samples = plane.samples.clone();
+    if let Ok(Some(clipped)) = noise::clip(&mut samples, Range::NotNegative, |v| v as f32) {
+        warnings.push(format!("texture {name} holds {}", clipped.words(Range::NotNegative)));
+    }
+    samples
+}
+
 /// Numbers of at least 0, as they are stored times `strength`, \[y\]\[x\]; noise below 0 is 0, with a warning.
 fn amounts_of(
     file: &Item,
@@ -426,10 +429,7 @@ fn amounts_of(
     strength: f64,
     warnings: &mut Vec<String>,
 ) -> Option<Vec<f32>> {
-    let mut samples = plane.samples.clone();
-    if let Ok(Some(clipped)) = noise::clip(&mut samples, Range::NotNegative, |v| v as f32) {
-        warnings.push(format!("texture {name} holds {}", clipped.words(Range::NotNegative)));
-    }
+    let samples = not_negative(plane, name, warnings);
     let brightest = BRIGHTEST as f32;
     let scaled: Vec<f32> = samples.iter().map(|v| (f64::from(decode(*v)) * strength) as f32).collect();
     if let Some(i) = scaled.iter().position(|v| !(0.0..=brightest).contains(v)) {
@@ -459,7 +459,7 @@ fn light(file: &Item, image: &Image, name: &str, strength: f64) -> Option<(Vec<f
         planes.push(amounts_of(file, image, name, plane, decode, strength, &mut warnings)?);
     }
     warnings.dedup();
-    Some(((0..planes[0].len()).flat_map(|i| [0, 1, 2].map(|c| planes[c][i])).collect(), warnings))
+    Some((interleaved(&planes), warnings))
 }
 
 /// How much there is of each of some lamps, \[y\]\[x\]\[lamp\].
@@ -470,25 +470,28 @@ fn amounts(
     name: &str,
     strength: f64,
 ) -> Option<(Vec<f32>, Vec<String>)> {
-    let count = endmembers.array()?.len();
-    if image.planes.len() != count {
-        let message = format!("names {count} spectra, but {name} has {}", channels(&image.planes));
-        endmembers.error_help(message, "name one for each channel, in this order");
-        return None;
-    }
     let mut warnings = Vec::new();
-    let order = pair(endmembers, image, name, &mut warnings)?;
-    let mut planes = Vec::with_capacity(count);
-    for plane in order.iter().map(|&i| &image.planes[i]) {
+    let mut planes = Vec::new();
+    for plane in pair(endmembers, image, name, &mut warnings)? {
         planes.push(amounts_of(file, image, name, plane, |v| v, strength, &mut warnings)?);
     }
-    Some(((0..planes[0].len()).flat_map(|i| planes.iter().map(move |plane| plane[i])).collect(), warnings))
+    Some((interleaved(&planes), warnings))
+}
+
+/// \[y\]\[x\]\[channel\].
+fn interleaved(planes: &[Vec<f32>]) -> Vec<f32> {
+    (0..planes[0].len()).flat_map(|i| planes.iter().map(move |plane| plane[i])).collect()
 }
 
 /// The channel of each endmember: by name where all names match, whatever their case and the layers before them; in the order of
 /// the header where none does, which is said of an EXR, whose header sorts by name.
-fn pair(endmembers: &Item, image: &Image, name: &str, warnings: &mut Vec<String>) -> Option<Vec<usize>> {
+fn pair<'i>(endmembers: &Item, image: &'i Image, name: &str, warnings: &mut Vec<String>) -> Option<Vec<&'i Plane>> {
     let items = endmembers.array()?;
+    if image.planes.len() != items.len() {
+        let message = format!("names {} spectra, but {name} has {}", items.len(), channels(&image.planes));
+        endmembers.error_help(message, "name one for each channel, in this order");
+        return None;
+    }
     let names: Vec<Option<&str>> = items
         .iter()
         .map(|item| match &item.node.value {
@@ -506,7 +509,7 @@ fn pair(endmembers: &Item, image: &Image, name: &str, warnings: &mut Vec<String>
     let found: Vec<Vec<usize>> = names.iter().map(|name| name.map_or_else(Vec::new, channels_of)).collect();
     let distinct: std::collections::BTreeSet<usize> = found.iter().flatten().copied().collect();
     if found.iter().all(|channels| channels.len() == 1) && distinct.len() == found.len() {
-        return Some(found.concat());
+        return Some(found.concat().into_iter().map(|i| &image.planes[i]).collect());
     }
     let written = || list(items.iter().map(written));
     if found.iter().any(|channels| !channels.is_empty()) {
@@ -526,7 +529,7 @@ fn pair(endmembers: &Item, image: &Image, name: &str, warnings: &mut Vec<String>
             written()
         ));
     }
-    Some((0..image.planes.len()).collect())
+    Some(image.planes.iter().collect())
 }
 
 /// An endmember as the scene has it: its name, or its number.
@@ -560,10 +563,7 @@ fn numbers(file: &Item, number: Number, image: &Image, name: &str) -> Option<(Ve
     let samples = match number {
         Number::Weight => shares(file, image, name, plane, "a weight must lie in [0, 1]", &mut warnings)?,
         Number::Temperature => {
-            let mut samples = plane.samples.clone();
-            if let Ok(Some(clipped)) = noise::clip(&mut samples, Range::NotNegative, |v| v as f32) {
-                warnings.push(format!("texture {name} holds {}", clipped.words(Range::NotNegative)));
-            }
+            let samples = not_negative(plane, name, &mut warnings);
             if let Some(i) = samples.iter().position(|v| !(0.0..=1e9).contains(v)) {
                 let (channel, value) = (&plane.name, samples[i]);
                 let range = "a temperature must lie in [0, 1e9] K";

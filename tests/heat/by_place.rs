@@ -14,12 +14,6 @@ use crate::size;
 use crate::statistics::*;
 use crate::truth;
 
-/// Corners of the two triangles of a quad.
-fn quad_uv() -> Attributes {
-    let [a, b, c, d] = [DVec2::ZERO, DVec2::X, DVec2::ONE, DVec2::Y];
-    Attributes { uv: Some(vec![[a, b, c], [c, d, a]]), ..Attributes::default() }
-}
-
 fn upright() -> Attributes {
     Attributes { axes: Some(DMat3::IDENTITY), ..Attributes::default() }
 }

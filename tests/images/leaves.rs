@@ -2,8 +2,8 @@
 
 use std::f64::consts::PI;
 
-use glam::{DVec2, DVec3};
-use spectile::scene::{Attributes, Bsdf, Filter, Projection, Reflectance, Scene, Sides};
+use glam::DVec3;
+use spectile::scene::{Attributes, Bsdf, Reflectance, Scene, Sides};
 use spectile::spectral::{Channels, Curve, Outside};
 
 use crate::device::{self, Settings};
@@ -11,12 +11,6 @@ use crate::scene_builder::heat::{infrared, means, planck};
 use crate::scene_builder::*;
 use crate::statistics::*;
 use crate::truth;
-
-/// Corners of the two triangles of a quad.
-fn quad_uv() -> Attributes {
-    let [a, b, c, d] = [DVec2::ZERO, DVec2::X, DVec2::ONE, DVec2::Y];
-    Attributes { uv: Some(vec![[a, b, c], [c, d, a]]), ..Attributes::default() }
-}
 
 fn plate() -> spectile::scene::Shape {
     quad(DVec3::new(-1.0, -1.0, 0.0), 2.0 * DVec3::X, 2.0 * DVec3::Y)
@@ -118,13 +112,7 @@ fn isothermal_cavities() {
 fn leaves_are_those_of_the_reference() {
     let slope = |a: f64, b: f64| Curve::Linear { nm: vec![400.0, 700.0], value: vec![a, b], outside: Outside::Hold };
     let mut b = Builder::new()
-        .camera(look(
-            DVec3::new(0.1, 0.2, 2.9),
-            DVec3::new(0.0, -0.2, 0.0),
-            DVec3::Y,
-            Projection::Perspective { tan_half: DVec2::splat(0.5) },
-        ))
-        .film(3, 3, Filter::Box)
+        .into_room()
         .channels(Channels::equal(400.0, 700.0, 3))
         .diffuse(room(DVec3::new(-1.0, -1.0, -1.0), DVec3::new(1.0, 1.0, 3.0)), slope(0.3, 0.7))
         .lamp(quad(DVec3::new(-0.5, 0.99, -0.9), DVec3::X, 0.5 * DVec3::Z), slope(4.0, 2.0), Sides::Front)

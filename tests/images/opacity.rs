@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DMat3, DVec3};
 use spectile::render::wave::Budget;
-use spectile::scene::{Attributes, Field, Filter, Projection, Scene, Shape, Sides, TextureKind, Weight};
+use spectile::scene::{Attributes, Field, Scene, Shape, Sides, TextureKind, Weight};
 use spectile::spectral::Channels;
 
 use crate::device::{self, Settings};
@@ -12,12 +12,6 @@ use crate::scene_builder::heat::{cuboid, infrared, means, planck};
 use crate::scene_builder::*;
 use crate::statistics::*;
 use crate::truth;
-
-/// Corners of the two triangles of a quad.
-fn quad_uv() -> Attributes {
-    let [a, b, c, d] = [DVec2::ZERO, DVec2::X, DVec2::ONE, DVec2::Y];
-    Attributes { uv: Some(vec![[a, b, c], [c, d, a]]), ..Attributes::default() }
-}
 
 fn at_height(z: f64) -> Shape {
     quad(DVec3::new(-1.0, -1.0, z), 2.0 * DVec3::X, 2.0 * DVec3::Y)
@@ -117,13 +111,7 @@ fn isothermal_cavities() {
 /// A masked plate and a masked lamp in a room, with and without gas in it, against the reference.
 fn masked_room(gas: bool) -> Scene {
     let mut b = Builder::new()
-        .camera(look(
-            DVec3::new(0.1, 0.2, 2.9),
-            DVec3::new(0.0, -0.2, 0.0),
-            DVec3::Y,
-            Projection::Perspective { tan_half: DVec2::splat(0.5) },
-        ))
-        .film(3, 3, Filter::Box)
+        .into_room()
         .channels(Channels::equal(400.0, 700.0, 2))
         .bounces(3)
         .diffuse(room(DVec3::new(-1.0, -1.0, -1.0), DVec3::new(1.0, 1.0, 3.0)), table(&[400.0, 700.0], &[0.3, 0.7]));

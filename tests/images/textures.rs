@@ -50,12 +50,6 @@ fn constant(values: [f64; 2]) -> Curve {
     Curve::Linear { nm: vec![400.0, 500.0, 500.0, 600.0], value: vec![a, a, b, b], outside: Outside::Hold }
 }
 
-/// Corners of the two triangles of a quad.
-fn quad_uv() -> Attributes {
-    let [a, b, c, d] = [DVec2::ZERO, DVec2::X, DVec2::ONE, DVec2::Y];
-    Attributes { uv: Some(vec![[a, b, c], [c, d, a]]), ..Attributes::default() }
-}
-
 fn axes(axes: DMat3) -> Attributes {
     Attributes { axes: Some(axes), ..Attributes::default() }
 }

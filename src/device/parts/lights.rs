@@ -104,9 +104,13 @@ pub const SURFACES: Part = Part {
     ..Part::NOTHING
 };
 
+/// 1 - cos of an angle, without cancellation.
+pub fn versine(angle: f64) -> f64 {
+    2.0 * (0.5 * angle).sin().powi(2)
+}
+
 /// The cone of a spot, as it stands after it among the lamps.
 pub fn cone(direction: DVec3, cone: &Cone) -> Lamp {
-    let versine = |angle: f64| 2.0 * (0.5 * angle).sin().powi(2);
     let (kind, [falls, ends]) = match cone.profile {
         Profile::Smooth => (CONE_SMOOTH, [cone.falloff, cone.half_angle].map(versine)),
         Profile::Linear => (CONE_LINEAR, [cone.falloff, cone.half_angle].map(|angle| angle * FRAC_1_PI)),

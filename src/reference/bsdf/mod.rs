@@ -177,12 +177,13 @@ impl Bsdf {
             Description::Black => (true, Vec::new()),
             Description::Diffuse { reflectance } => {
                 self.add_reflectance(reflectance);
-                (true, vec![Box::new(Lambert { reflectance })])
+                (true, vec![Box::new(Lambert { share: reflectance, side: 1.0 })])
             }
             Description::Translucent { reflectance, transmittance } => {
                 self.add_reflectance(reflectance);
                 self.add_reflectance(transmittance);
-                (false, vec![Box::new(Lambert { reflectance }), Box::new(LambertBeyond { transmittance })])
+                let sides = [(reflectance, 1.0), (transmittance, -1.0)];
+                (false, sides.map(|(share, side)| Box::new(Lambert { share, side }) as Box<dyn Lobe>).into())
             }
             Description::Conductor { eta, k, roughness, energy_compensation } => {
                 self.spectra.extend([eta, k]);
@@ -322,55 +323,31 @@ impl Scattering<'_> {
     }
 }
 
-/// Lambert's law.
+/// Lambert's law, on the side where light comes from or on the other.
 struct Lambert {
-    reflectance: Reflectance,
+    share: Reflectance,
+    /// 1 on this side, -1 on the other.
+    side: f64,
 }
 
 impl Lobe for Lambert {
     fn albedo(&self, at: &Vertex, k: usize) -> f64 {
-        at.spectra.reflectance(self.reflectance, k)
+        at.spectra.reflectance(self.share, k)
     }
 
     fn sample(&self, _at: &Vertex, u: [f64; 3]) -> Option<Choice> {
-        Some(Choice::Spread(cosine_direction([u[1], u[2]])))
+        Some(Choice::Spread(self.side * cosine_direction([u[1], u[2]])))
     }
 
     fn evaluate(&self, at: &Vertex, i: DVec3, scale: f64, out: &mut [f64]) {
-        let density = scale * cosine_density(i);
+        let density = scale * cosine_density(self.side * i);
         for k in at.alive.clone() {
-            out[k] += density * at.spectra.reflectance(self.reflectance, k);
+            out[k] += density * at.spectra.reflectance(self.share, k);
         }
     }
 
     fn density(&self, _at: &Vertex, i: DVec3) -> f64 {
-        cosine_density(i)
-    }
-}
-
-/// Lambert's law on the other side.
-struct LambertBeyond {
-    transmittance: Reflectance,
-}
-
-impl Lobe for LambertBeyond {
-    fn albedo(&self, at: &Vertex, k: usize) -> f64 {
-        at.spectra.reflectance(self.transmittance, k)
-    }
-
-    fn sample(&self, _at: &Vertex, u: [f64; 3]) -> Option<Choice> {
-        Some(Choice::Spread(-cosine_direction([u[1], u[2]])))
-    }
-
-    fn evaluate(&self, at: &Vertex, i: DVec3, scale: f64, out: &mut [f64]) {
-        let density = scale * cosine_density(-i);
-        for k in at.alive.clone() {
-            out[k] += density * at.spectra.reflectance(self.transmittance, k);
-        }
-    }
-
-    fn density(&self, _at: &Vertex, i: DVec3) -> f64 {
-        cosine_density(-i)
+        cosine_density(self.side * i)
     }
 }
 

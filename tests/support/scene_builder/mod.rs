@@ -52,6 +52,13 @@ impl Builder {
     }
 
     /// A film without crop.
+    /// 3 x 3 pixels of a room between (-1, -1, -1) and (1, 1, 3), seen from its open end.
+    pub fn into_room(self) -> Self {
+        let projection = Projection::Perspective { tan_half: DVec2::splat(0.5) };
+        let camera = look(DVec3::new(0.1, 0.2, 2.9), DVec3::new(0.0, -0.2, 0.0), DVec3::Y, projection);
+        self.camera(camera).film(3, 3, Filter::Box)
+    }
+
     pub fn film(mut self, width: u32, height: u32, filter: Filter) -> Self {
         self.0.film = Film { width, height, filter, crop: [0, 0, width, height] };
         self
@@ -292,6 +299,12 @@ pub fn look(position: DVec3, target: DVec3, up: DVec3, projection: Projection) -
 }
 
 /// A parallelogram with normal edge_u x edge_v, its tangent along edge_u.
+/// (u, v) at the corners of the two triangles of a quad, as `quad` of a scene file has them.
+pub fn quad_uv() -> Attributes {
+    let [a, b, c, d] = [DVec2::ZERO, DVec2::X, DVec2::ONE, DVec2::Y];
+    Attributes { uv: Some(vec![[a, b, c], [c, d, a]]), ..Attributes::default() }
+}
+
 pub fn quad(corner: DVec3, edge_u: DVec3, edge_v: DVec3) -> Shape {
     let positions = vec![corner, corner + edge_u, corner + edge_u + edge_v, corner + edge_v];
     Shape::Mesh(Mesh { positions, triangles: vec![[0, 1, 2], [2, 3, 0]] })
