@@ -10,6 +10,7 @@ pub mod maps;
 pub mod modtran;
 pub mod noise;
 pub mod obj;
+pub mod phase;
 pub mod plot;
 pub mod png;
 pub mod polygon;

@@ -42,6 +42,9 @@ struct Way {
     volume: array<u32, MOST_STRETCHES>,
     start: array<f32, MOST_STRETCHES>,
     to: array<f32, MOST_STRETCHES>,
+#if SCATTERS
+    around: array<vec2<u32>, MOST_STRETCHES>,
+#endif
 }
 
 // Notes the stretch up to `to` in the innermost volume. False where there are too many.
@@ -64,6 +67,9 @@ fn add_stretch(way: ptr<function, Way>, around: vec2<u32>, start: f32, to: f32) 
     (*way).volume[(*way).count] = number - 1u;
     (*way).start[(*way).count] = start;
     (*way).to[(*way).count] = to;
+#if SCATTERS
+    (*way).around[(*way).count] = around;
+#endif
     (*way).count += 1u;
     return true;
 }
@@ -126,13 +132,17 @@ fn append_way(list: ptr<function, RecordList>, way: ptr<function, Way>, ray: Ray
         let metres = (to - start) * speed;
 #if GRIDS
         if ((volumes[first] & VOLUME_GRID) != 0u) {
-            let glows = mode == 0u && (volumes[first] & VOLUME_EMITS) != 0u;
-            append(list, OP_MARCH | mode, volume, select(0.0, scale, glows), metres);
-            append_raw(list, vec4<f32>(to_voxels(first, ray.origin + start * ray.direction), 0.0));
-            append_raw(list, vec4<f32>(to_voxels(first, ray.origin + to * ray.direction), 0.0));
-            if (glows) {
-                (*list).used = (*list).count;
+            let from_voxels = to_voxels(first, ray.origin + start * ray.direction);
+            let end_voxels = to_voxels(first, ray.origin + to * ray.direction);
+            if (mode != 0u || (volumes[first] & VOLUME_EMITS) == 0u) {
+                var amounts = amounts_along(first, from_voxels, end_voxels, metres);
+                append_amounts(list, first, &amounts, mode);
+                continue;
             }
+            append(list, OP_MARCH, volume, scale, metres);
+            append_raw(list, vec4<f32>(from_voxels, 0.0));
+            append_raw(list, vec4<f32>(end_voxels, 0.0));
+            (*list).used = (*list).count;
             continue;
         }
 #endif
