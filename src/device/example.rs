@@ -9,9 +9,9 @@ use glam::{DAffine3, DMat3, DVec2, DVec3};
 use crate::device::accel;
 use crate::device::part::{PARTS, Part};
 use crate::scene::{
-    Absorber, Attributes, Bsdf, Cone, Emission, Environment, EnvironmentMap, Field, Grid, Interior, Light, Material,
-    Component, Medium, Mesh, Object, Phase, PhaseTable, Placement, Profile, Reflectance, Scattering, Scene, Shape, Sides, Spectrum, Temperature, Texels, Texture,
-    TextureKind, Weight,
+    Absorber, Attributes, Bsdf, Component, Cone, Emission, Environment, EnvironmentMap, Field, Grid, Interior, Light,
+    Material, Medium, Mesh, Object, Phase, PhaseTable, Placement, Profile, Reflectance, Scattering, Scene, Shape,
+    Sides, Spectrum, Temperature, Texels, Texture, TextureKind, Weight,
 };
 use crate::spectral::{Curve, Outside};
 
@@ -239,7 +239,8 @@ impl Exhibit {
     fn add_matter(&mut self, phases: impl IntoIterator<Item = Phase>, coefficient: usize) {
         self.add_gas();
         let medium = self.scene.media.last_mut().expect("just pushed");
-        let absorbers = std::mem::take(&mut medium.components).into_iter().next().map_or_else(Vec::new, |gas| gas.absorbers);
+        let absorbers =
+            std::mem::take(&mut medium.components).into_iter().next().map_or_else(Vec::new, |gas| gas.absorbers);
         let kind = |phase| Component {
             absorbers: absorbers.clone(),
             scattering: Some(Scattering { coefficient, phase }),

@@ -132,7 +132,8 @@ impl Prepared {
         if scene.materials.len() > MAX_MATERIALS {
             return Err(Error::input(&scene.file, format!("more than {MAX_MATERIALS} materials")));
         }
-        let General { mut surfaces, mut media, scattering, mut radiators, mut sky } = General::of(scene, &heat, &accel)?;
+        let General { mut surfaces, mut media, scattering, mut radiators, mut sky } =
+            General::of(scene, &heat, &accel)?;
         let is_general = surfaces.is_some();
 
         // General scenes meet a uniform environment by sampling the BSDF, and do not aim at it.

@@ -51,7 +51,8 @@ pub fn parse(bytes: &[u8], path: &Path) -> Read<Normalised> {
     for row in &table.rows {
         table.check_row(row)?;
         let cell = |column: usize| {
-            let missing = || table.problem(Some(row.line), "has no value in one of its columns".to_owned(), "fill the gap");
+            let missing =
+                || table.problem(Some(row.line), "has no value in one of its columns".to_owned(), "fill the gap");
             table.number(row, column)?.ok_or_else(missing)
         };
         let angle = cell(0)? * factor;

@@ -119,7 +119,13 @@ impl Piece<'_> {
 
     /// Goes on through the piece until the depth of scattering that is `left` in channel `k` is used up, and takes from
     /// `throughput` what is absorbed on the way: where that is, and what is there.
-    pub fn fly(&self, spectra: &SpectralValues, k: usize, left: &mut f64, throughput: &mut f64) -> Option<(DVec3, Cell)> {
+    pub fn fly(
+        &self,
+        spectra: &SpectralValues,
+        k: usize,
+        left: &mut f64,
+        throughput: &mut f64,
+    ) -> Option<(DVec3, Cell)> {
         let direction = (self.to - self.from).normalize_or_zero();
         let mut passed = 0.0;
         for cell in self.cells() {

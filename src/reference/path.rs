@@ -62,7 +62,10 @@ enum Flight {
     /// It comes to the next.
     Passed,
     /// Matter scatters it, into this ray with this density by solid angle.
-    Scattered { next: Ray, density: f64 },
+    Scattered {
+        next: Ray,
+        density: f64,
+    },
     Ended,
 }
 
@@ -451,13 +454,7 @@ impl<'a> Tracer<'a> {
         self.way_to(origin, interiors, aim, rng)
     }
 
-    fn way_to(
-        &self,
-        origin: DVec3,
-        mut interiors: Vec<Interior>,
-        aim: &Aim,
-        rng: &mut Rng,
-    ) -> Option<Vec<Piece<'_>>> {
+    fn way_to(&self, origin: DVec3, mut interiors: Vec<Interior>, aim: &Aim, rng: &mut Rng) -> Option<Vec<Piece<'_>>> {
         if self.scene.media.is_empty() && !self.masked {
             let clear = match aim.target {
                 Some(target) => !self.world.occluded(origin, target),

@@ -7,10 +7,10 @@ use glam::DVec3;
 use sha2::{Digest, Sha256};
 
 use super::{
-    Absorber, Attributes, Bsdf, Camera, Component, Cone, Emission, Environment, EnvironmentMap, Evaluation, Field, Film, Filter,
-    Grid, Integrator, Interior, Light, Material, Medium, Mesh, Object, Phase, PhaseTable, Placement, Profile, Projection, Reflectance,
-    Sampler, Scattering, Scene, Shape, Sides, Spectrum, Temperature, Texels, Texture, TextureFilter, TextureKind, Wavelengths,
-    Weight,
+    Absorber, Attributes, Bsdf, Camera, Component, Cone, Emission, Environment, EnvironmentMap, Evaluation, Field,
+    Film, Filter, Grid, Integrator, Interior, Light, Material, Medium, Mesh, Object, Phase, PhaseTable, Placement,
+    Profile, Projection, Reflectance, Sampler, Scattering, Scene, Shape, Sides, Spectrum, Temperature, Texels, Texture,
+    TextureFilter, TextureKind, Wavelengths, Weight,
 };
 use crate::spectral::{Channels, Curve, Outside};
 

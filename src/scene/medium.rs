@@ -215,16 +215,18 @@ fn one_shape(fields: &Fields, mut all: Vec<&mut Field>) -> Option<()> {
     if sizes.iter().all(|size| *size == first) {
         return Some(());
     }
-    let common: [u64; 3] = std::array::from_fn(|axis| {
-        sizes.iter().fold(1, |all, size| least_common_multiple(all, u64::from(size[axis])))
-    });
+    let common: [u64; 3] =
+        std::array::from_fn(|axis| sizes.iter().fold(1, |all, size| least_common_multiple(all, u64::from(size[axis]))));
     let voxels = common.iter().try_fold(1u64, |all, side| all.checked_mul(*side)).filter(|all| *all <= MOST_VOXELS);
     if voxels.is_none() {
         let shape = |[x, y, z]: [u32; 3]| format!("[{z}, {y}, {x}]");
         let mut shapes: Vec<String> = sizes.into_iter().map(shape).collect();
         shapes.dedup();
         fields.error_help(
-            format!("has grids of shapes {}, which have no common division of {MOST_VOXELS} voxels or fewer", list(shapes.iter().map(String::as_str))),
+            format!(
+                "has grids of shapes {}, which have no common division of {MOST_VOXELS} voxels or fewer",
+                list(shapes.iter().map(String::as_str))
+            ),
             "resample them to one shape, or to multiples of one another",
         );
         return None;

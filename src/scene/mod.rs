@@ -154,6 +154,7 @@ pub struct Integrator {
     pub wavelengths_per_channel: u32,
     /// How many techniques decide where light goes that matter scatters (docs/METHOD.md, Techniques), 1 to 16; `None`: as many as
     /// its channels differ.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub techniques: Option<u32>,
     /// Which of a scene's paths are evaluated.
     pub evaluation: Evaluation,

@@ -31,7 +31,9 @@ impl Pattern {
 
 /// The phase function that `item` describes; without one, the same in all directions.
 pub fn pattern<'a>(item: Option<&Item<'a>>, spectra: &mut Spectra<'a>) -> Option<Pattern> {
-    let Some(item) = item else { return Some(Pattern::HenyeyGreenstein(spectra.add("isotropic", Curve::Constant(0.0)))) };
+    let Some(item) = item else {
+        return Some(Pattern::HenyeyGreenstein(spectra.add("isotropic", Curve::Constant(0.0))));
+    };
     let chosen = item.table(&keys::PHASE)?.exactly_one("phase function")?;
     match chosen.path.rsplit('.').next() {
         Some("hg") => spectra.resolve(&chosen, Quantity::Asymmetry).map(Pattern::HenyeyGreenstein),

@@ -255,11 +255,9 @@ fn programs(names: Names, channels: &Channels) -> Vec<Program> {
         ),
         program("OP_RESTORE", &[record(OP_RESTORE, 0, 0.0, 0.0), one(alone)], |_, _| 0.0),
         // 0.375 is 1 - the cosine.
-        program(
-            "OP_HENYEY_GREENSTEIN",
-            &[record(OP_HENYEY_GREENSTEIN | alone, a | b << 16, W, 0.375)],
-            move |_, _| w * A * (1.0 - B * B) / (1.0 + B * B - 2.0 * B * 0.625).powf(1.5) * B,
-        ),
+        program("OP_HENYEY_GREENSTEIN", &[record(OP_HENYEY_GREENSTEIN | alone, a | b << 16, W, 0.375)], move |_, _| {
+            w * A * (1.0 - B * B) / (1.0 + B * B - 2.0 * B * 0.625).powf(1.5) * B
+        }),
         // The scene's table is the same in all directions; a place between its columns is one.
         program("OP_PHASE_TABLE", &[record(OP_PHASE_TABLE | alone, a, W, 40.25)], move |_, _| w * B),
         program("OP_PLANCK", &[record(OP_PLANCK | alone, 0, W, 5000.0)], move |_, nm| {

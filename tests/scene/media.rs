@@ -88,7 +88,8 @@ fn cross_sections_of_a_species_are_absorptions_at_its_temperatures() {
         "wavenumber (cm-1),273.15 K (cm2/molecule),546.3 K [cm2/molecule]\n14000,1e-21,2e-21\n26000,3e-21,4e-21\n";
     let media = "[media.gas]\nspecies = [{ table = \"gas.csv\", fraction = 1.0 }]\ntemperature = 300";
     let scene = good(&filled(BALL, media), &[("gas.csv", table)], &[]);
-    for ((kelvin, spectrum), expected) in scene.media[0].components[0].absorbers[0].columns.iter().zip([2.686_780_111, 2.686_780_111])
+    for ((kelvin, spectrum), expected) in
+        scene.media[0].components[0].absorbers[0].columns.iter().zip([2.686_780_111, 2.686_780_111])
     {
         let found = scene.spectra[*spectrum].curve.eval(1e7 / 14_000.0);
         assert!((found / expected - 1.0).abs() < 1e-9, "{kelvin} K: {found}");
@@ -206,8 +207,12 @@ fn wrong_media() {
         ("a lamp", box_of("sphere = { center = [0, 0, 0], radius = 1 }\ninterior = \"gas\"\nemission = \"lamp\" #!"), "objects.1.emission", &["goes with a `material` only"]),
         ("outer", BASE.replace("fov = 60.0", "fov = 60.0\nmedium = \"air\" #!"), "camera.perspective.medium", &["no medium is named \"air\"", "[media.air]"]),
     ];
-    let files =
-        [("gas.csv", GAS), ("cut.csv", "degrees,500\n0,1\n90,1\n"), ("named.csv", "nm,hot\n400,1\n500,1\n"), ("twice.csv", "nm,300,300K\n400,1,1\n500,1,1\n")];
+    let files = [
+        ("gas.csv", GAS),
+        ("cut.csv", "degrees,500\n0,1\n90,1\n"),
+        ("named.csv", "nm,hot\n400,1\n500,1\n"),
+        ("twice.csv", "nm,300,300K\n400,1,1\n500,1,1\n"),
+    ];
     for (name, text, key, words) in cases {
         check_wrong(text, &files, name, key, words);
     }

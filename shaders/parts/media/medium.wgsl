@@ -85,13 +85,17 @@ struct Walked {
 // Follows `ray` up to the first surface with a material, nearer than `limit`; `around` and `way` note what it goes through.
 fn walk(ray: Ray, limit: f32, around: ptr<function, vec2<u32>>, way: ptr<function, Way>, overflow: ptr<function, bool>) -> Walked {
     var walked = Walked(Hit(limit, NONE, 0.0, 0.0), ray, 0.0);
+    // Where the stretch begins: at the boundary itself, not where the rest of the ray starts.
+    var begins = 0.0;
     for (var n = 0u; n < MOST_CROSSINGS; n += 1u) {
         let left = select(limit - walked.passed, INFINITE, limit == INFINITE);
         walked.hit = traverse(walked.ray, left, false, overflow);
         let met = walked.hit.primitive != NONE;
-        if (!add_stretch(way, *around, walked.passed, select(limit, walked.passed + walked.hit.distance, met))) {
+        let ends = select(limit, walked.passed + walked.hit.distance, met);
+        if (!add_stretch(way, *around, begins, ends)) {
             *overflow = true;
         }
+        begins = ends;
 #if OPACITY
         if (!met || *overflow || ((boundaries[walked.hit.primitive] & NULL_BOUNDARY) == 0u && !lets_pass(walked.ray, walked.hit))) {
             return walked;
@@ -107,9 +111,13 @@ fn walk(ray: Ray, limit: f32, around: ptr<function, vec2<u32>>, way: ptr<functio
         if (number != 0u && !cross_boundary(around, number, entering)) {
             *overflow = true;
         }
-        walked.ray.origin = offset_origin(surface.position, select(surface.normal, -surface.normal, entering));
-        // To where the rest starts, a little beyond the boundary: what is left must not lead past its end.
-        walked.passed = dot(walked.ray.origin - ray.origin, ray.direction) / dot(ray.direction, ray.direction);
+        // On the same line, where that is as far beyond the boundary as paths start off surfaces: a parallel one would be of another
+        // length. Along a boundary not for ever.
+        let beyond = select(surface.normal, -surface.normal, entering);
+        let depth = dot(offset_origin(surface.position, beyond) - walked.ray.origin, beyond);
+        let speed = max(dot(ray.direction, beyond), 1.0e-3 * length(ray.direction));
+        walked.passed += max(depth / speed, walked.hit.distance);
+        walked.ray.origin = ray.origin + walked.passed * ray.direction;
     }
     *overflow = true;
     return walked;

@@ -84,7 +84,9 @@ pub const CAMERA_CUT: Part = Part {
 pub const VOXELS: Part = Part {
     name: "media of voxels",
     used: |scene| scene.media.as_ref().is_some_and(Media::has_grids),
-    effect: |_| "what lies on a way is summed up once; a march through its cells for each channel where it emits".into(),
+    effect: |_| {
+        "what lies on a way is summed up once; a march through its cells for each channel where it emits".into()
+    },
     is_planned: true,
     modules: &[
         (Place::Generate, CELLS),
@@ -175,7 +177,12 @@ impl Media {
             let known = volumes.iter().position(|v| v.interior.is_some_and(|i| i.body == interior.body));
             let index = known.unwrap_or_else(|| {
                 let index = object.material.and_then(|material| index(scene, material));
-                volumes.push(Volume { id: interior.medium, medium: &scene.media[interior.medium], interior: Some(interior), index });
+                volumes.push(Volume {
+                    id: interior.medium,
+                    medium: &scene.media[interior.medium],
+                    interior: Some(interior),
+                    index,
+                });
                 volumes.len() - 1
             });
             *number = index as u32 + 1;

@@ -6,8 +6,7 @@ use crate::device::parts::media::{self, Filled, Media};
 use crate::device::parts::surfaces::Needed;
 use crate::device::text::module;
 use crate::device::words::{
-    NONE, PHASE_HENYEY_GREENSTEIN, PHASE_RAYLEIGH, PHASE_TABLE, VOLUME_BY_EXTINCTION, VOLUME_WORDS,
-    VOLUMES_HEAD,
+    NONE, PHASE_HENYEY_GREENSTEIN, PHASE_RAYLEIGH, PHASE_TABLE, VOLUME_BY_EXTINCTION, VOLUME_WORDS, VOLUMES_HEAD,
 };
 use crate::scene::{Component, Field, Medium, Phase, PhaseTable, Scene, SpectrumId};
 use crate::spectral::{Curve, Outside};
@@ -95,7 +94,8 @@ impl Scattering {
         if !media.places.iter().any(|place| scene.media[place.medium].scatters()) {
             return None;
         }
-        let coefficients: Vec<Coefficients> = scene.media.iter().map(|medium| Coefficients::of(scene, medium)).collect();
+        let coefficients: Vec<Coefficients> =
+            scene.media.iter().map(|medium| Coefficients::of(scene, medium)).collect();
         let deciding = Deciding::of(scene, &media.places, &coefficients);
         let mut scattering = Scattering {
             techniques: deciding.count() as u32,
@@ -114,7 +114,15 @@ impl Scattering {
             scattering.most_scatterers = scattering.most_scatterers.max(scatterers);
             for (c, component) in medium.components.iter().enumerate() {
                 voxels.extend(component.scattering.as_ref().map(|_| words.len()));
-                of.scatterer(scene, media, &deciding, &mut tables, (c, component, place.densities[c]), &mut words, &mut spectra);
+                of.scatterer(
+                    scene,
+                    media,
+                    &deciding,
+                    &mut tables,
+                    (c, component, place.densities[c]),
+                    &mut words,
+                    &mut spectra,
+                );
             }
             media.volumes[first + 22] = media.append(&words, &spectra, &voxels);
             if of.by_extinction {
@@ -184,9 +192,10 @@ impl Coefficients {
         let kelvin = medium.temperature.as_ref().map(mean);
         let count = scene.channels.len();
         let component = |component: &Component| {
-            let columns = component.absorbers.iter().flat_map(|absorber| {
-                absorber.columns.iter().map(|column| (absorber.strength, means(scene, column.1)))
-            });
+            let columns = component
+                .absorbers
+                .iter()
+                .flat_map(|absorber| absorber.columns.iter().map(|column| (absorber.strength, means(scene, column.1))));
             let alone = Medium { name: String::new(), components: vec![component.clone()], temperature: None };
             let (spectra, factors) = media::absorption(&alone, kelvin, |_| 1.0);
             let mut absorption = vec![0.0; count];
@@ -241,7 +250,8 @@ impl Coefficients {
         if medium.grid_size().is_none() {
             terms = vec![self.along_metres(deciding)];
         }
-        let numbers = terms.into_iter().flat_map(|(flights, losses, least)| flights.into_iter().chain(losses).chain([least]));
+        let numbers =
+            terms.into_iter().flat_map(|(flights, losses, least)| flights.into_iter().chain(losses).chain([least]));
         numbers.map(|value| (value as f32).to_bits()).collect()
     }
 
@@ -308,7 +318,8 @@ impl Coefficients {
             _ => words.push(NONE),
         }
         let own = &self.components[number];
-        let asymmetry = if own.asymmetry.is_empty() { vec![0.0; deciding.count()] } else { deciding.values(&own.asymmetry) };
+        let asymmetry =
+            if own.asymmetry.is_empty() { vec![0.0; deciding.count()] } else { deciding.values(&own.asymmetry) };
         let values = deciding.covering(&own.scattering).into_iter().chain(asymmetry);
         words.extend(values.map(|value| (value as f32).to_bits()));
     }
@@ -456,8 +467,15 @@ impl Tables {
             for &nm in &centres {
                 mean.iter_mut().zip(column(nm)).for_each(|(mean, value)| *mean += value / centres.len() as f64);
             }
-            let own = |k: &usize| column(centres[*k]).iter().zip(&mean).map(|(own, mean)| OWN_SHARE * own + (1.0 - OWN_SHARE) * mean).collect();
-            let techniques = if deciding.0.is_empty() { vec![mean.clone()] } else { deciding.0.iter().map(own).collect() };
+            let own = |k: &usize| {
+                column(centres[*k])
+                    .iter()
+                    .zip(&mean)
+                    .map(|(own, mean)| OWN_SHARE * own + (1.0 - OWN_SHARE) * mean)
+                    .collect()
+            };
+            let techniques =
+                if deciding.0.is_empty() { vec![mean.clone()] } else { deciding.0.iter().map(own).collect() };
             for technique in techniques {
                 let shares = shares(&degrees, &technique);
                 numbers.extend(technique.into_iter().chain(shares));

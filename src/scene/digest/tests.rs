@@ -151,7 +151,7 @@ fn digests_are_those_of_earlier_versions() {
                     sampler: Sampler::Independent,
                     wavelengths: Wavelengths::Emission,
                     wavelengths_per_channel: 1,
-            techniques: None,
+                    techniques: None,
                     evaluation: Evaluation::Auto,
                     evaluator: Evaluator::Pt,
                     epoch: 128,

@@ -7,10 +7,12 @@ use crate::scene::Quantity;
 const NOTHING_ELSE: &str = "`absorption`, `species`, `scattering` or `components`";
 const NO_OTHER: &str = "`absorption`, `species` or `scattering`";
 
-const ABSORPTION: Key = Key::required("absorption", Spectrum(Quantity::Absorption), "Absorption coefficient at density 1.");
+const ABSORPTION: Key =
+    Key::required("absorption", Spectrum(Quantity::Absorption), "Absorption coefficient at density 1.");
 const GASES: Key =
     Key::required("species", ListOfTables, "Gases by tables over wavelength and temperature. Not beside `absorption`.");
-const SCATTERING: Key = Key::required("scattering", Spectrum(Quantity::Scattering), "Scattering coefficient at density 1.");
+const SCATTERING: Key =
+    Key::required("scattering", Spectrum(Quantity::Scattering), "Scattering coefficient at density 1.");
 const PHASE_KEY: Key =
     Key::optional("phase", Table, "the same in all directions", "Where scattered light goes. With `scattering` only.");
 const PRESSURE: Key =

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DVec2, DVec3};
 use spectile::scene::{
-    Absorber, Camera, Component, Field, Filter, Grid, Interior, Medium, Mesh, Object, Phase, Projection, Scattering, Scene, Shape, Sides, Temperature,
+    Absorber, Camera, Component, Field, Filter, Grid, Interior, Medium, Mesh, Object, Phase, Projection, Scattering,
+    Scene, Shape, Sides, Temperature,
 };
 use spectile::spectral::{Channels, Curve, Outside, planck as law};
 
