@@ -10,7 +10,7 @@ use proptest::sample::Index;
 use proptest::test_runner::TestRunner;
 use spectile::error::Problem;
 use spectile::format::text::{self, Column, SpectrumTable};
-use spectile::format::{image, maps, obj, refractive, response, volume};
+use spectile::format::{image, maps, obj, phase, refractive, response, volume};
 use tempfile::{TempDir, tempdir};
 
 use crate::binary::repository;
