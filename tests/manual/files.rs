@@ -32,6 +32,7 @@ pub fn make(folder: &Path) {
         "floor.obj",
         b"g tiles\nusemtl floor\nv -1 0 -1\nv -1 0 1\nv 1 0 1\nv 1 0 -1\nf 1 2 3 4\ng rest\nv 1 0 3\nf 2 5 3\n",
     );
+    write("cage.gltf", CAGE.as_bytes());
     write("albedo.png", &png(png::ColorType::Rgb, &[200, 120, 40, 60, 70, 80]));
     write("abundance.png", &png(png::ColorType::Rgb, &[100, 100, 55, 0, 200, 0]));
     write("mask.png", &png(png::ColorType::Grayscale, &[0, 128]));
@@ -45,6 +46,15 @@ pub fn make(folder: &Path) {
         array.store_array_subset(&array.subset_all(), &[value; 6]).expect("written");
     }
 }
+
+/// Two nodes with one triangle, above the floor.
+const CAGE: &str = r#"{"asset": {"version": "2.0"}, "scenes": [{"nodes": [0, 1]}],
+    "nodes": [{"name": "bars", "mesh": 0, "translation": [0, 1, 0]}, {"name": "lock", "mesh": 0}],
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}}]}],
+    "accessors": [{"bufferView": 0, "componentType": 5121, "type": "VEC3", "count": 3},
+        {"bufferView": 0, "componentType": 5121, "type": "VEC2", "count": 3}],
+    "bufferViews": [{"buffer": 0, "byteLength": 9}],
+    "buffers": [{"byteLength": 9, "uri": "data:application/octet-stream;base64,AAAAAQAAAAEA"}]}"#;
 
 /// Two pixels beside each other.
 fn png(colour: png::ColorType, data: &[u8]) -> Vec<u8> {
