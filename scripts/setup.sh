@@ -106,6 +106,16 @@ need_python() {
   export SPECTILE_PYTHON=$venv/bin/python
 }
 
+# The Python package, put together in the folder of what is built; sets SPECTILE_PACKAGE for the tests. Needs `build` and `need_python`.
+need_package() {
+  [ -n "${SPECTILE_PYTHON:-}" ] || return 0
+  local built=${spectile%/spectile}
+  export PYO3_PYTHON=$SPECTILE_PYTHON PYO3_BUILD_EXTENSION_MODULE=1
+  (cd "$root" && cargo build --release --locked --quiet -p spectile-python)
+  "$SPECTILE_PYTHON" "$root/python/develop.py" "$built" "$built/package"
+  export SPECTILE_PACKAGE=$built/package
+}
+
 # A browser and what drives it, for the tests of the page; sets SPECTILE_CHROMIUM for them.
 need_browser() {
   local folder=$root/tests/page

@@ -13,7 +13,7 @@ use crate::error::Problem;
 #[derive(Debug, Clone, PartialEq)]
 pub struct FaceRun {
     pub labels: Labels,
-    /// The line of the first face, 1-based.
+    /// The line of the first face, 1-based; 0 where there is no file.
     pub line: usize,
     pub positions: Vec<[f64; 3]>,
     /// Indices into `positions`; counter-clockwise seen from the front.

@@ -196,11 +196,15 @@ impl<'s, 'a> Objects<'s, 'a> {
 
     /// The mesh file that `item` names.
     fn read(&mut self, item: &Item<'a>) -> Option<Rc<Obj>> {
-        let path = item.cx.path(item.text()?);
+        let (_, path) = item.source()?;
         if let Some(known) = self.meshes.get(&path) {
             return known.clone();
         }
-        let mesh = match obj::read(&path) {
+        let read = match item.data() {
+            Some(data) => data.mesh(),
+            None => obj::read(&path),
+        };
+        let mesh = match read {
             Ok(mesh) => {
                 warn_about(item, &mesh);
                 Some(Rc::new(mesh))
@@ -267,10 +271,13 @@ impl<'s, 'a> Objects<'s, 'a> {
                 (_, true) => format!("material \"{}\" has two roughnesses", self.materials.name(material)),
                 _ => "the emission is textured".to_owned(),
             };
-            let message = format!("{what}, but the faces from here on have no texture coordinates (vt)");
+            let message = match shape.data() {
+                Some(_) => format!("{what}, but the mesh has no texture coordinates (`uv`)"),
+                None => format!("{what}, but the faces from here on have no texture coordinates (vt)"),
+            };
             shape.cx.push(Problem {
-                file: shape.cx.path(shape.text().unwrap_or_default()),
-                line: Some(part.line),
+                file: shape.source().unwrap_or_default().1,
+                line: (part.line > 0).then_some(part.line),
                 key: Some(shape.path.clone()),
                 message,
                 help: Some("export the mesh with its UV map, or give it another material".to_owned()),
@@ -417,6 +424,7 @@ fn warn_about(item: &Item, mesh: &Obj) {
 fn file_name(item: &Item) -> String {
     match &item.node.value {
         Value::String(path) => path.rsplit(['/', '\\']).next().unwrap_or(path).to_owned(),
+        Value::Data(data) => data.name().to_owned(),
         _ => String::new(),
     }
 }
