@@ -116,6 +116,22 @@ need_package() {
   export SPECTILE_PACKAGE=$built/package
 }
 
+# Makes a wheel of the Python package, of the release build; prints its path.
+make_wheel() {
+  local built=${spectile%/spectile} tools out
+  tools=$built/wheel-tools out=$built/wheels
+  command -v python3 >/dev/null || install "Python" python3 python3-venv
+  if [ ! -x "$tools/bin/maturin" ]; then
+    python3 -c 'import ensurepip' 2>/dev/null || install "Python's venv" python3-venv
+    say "installing maturin, which makes wheels"
+    python3 -m venv --clear "$tools"
+    "$tools/bin/pip" install --quiet --disable-pip-version-check 'maturin>=1.9,<2'
+  fi
+  rm -f "$out"/spectile-*.whl
+  "$tools/bin/maturin" build --quiet --release --locked --manifest-path "$root/python/Cargo.toml" --out "$out" >&2
+  ls "$out"/spectile-*.whl
+}
+
 # A browser and what drives it, for the tests of the page; sets SPECTILE_CHROMIUM for them.
 need_browser() {
   local folder=$root/tests/page
