@@ -12,7 +12,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ._errors import (
     CheckFailed,
@@ -33,8 +33,11 @@ from ._scene import Scene, load
 from ._spectile import __version__
 from ._tools import compare, devices, illuminant, plan, sensor, to_colour
 
+if TYPE_CHECKING:
+    from ._cube import Cube, open_cube, rgb, tone
+
 # These need numpy and xarray, which take longer to import than everything else.
-_LATE = ("Cube", "open", "rgb", "tone")
+_LATE = ("Cube", "open_cube", "rgb", "tone")
 
 __all__ = [
     "CheckFailed",
@@ -58,7 +61,7 @@ __all__ = [
     "epochs",
     "illuminant",
     "load",
-    "open",
+    "open_cube",
     "plan",
     "render",
     "rgb",

@@ -42,7 +42,7 @@ class Cube(xarray.Dataset):
         return f'<div style="display:flex;gap:1em;flex-wrap:wrap">{row}</div>{super()._repr_html_()}'
 
 
-def open(path: str | os.PathLike[str]) -> Cube:  # noqa: A001
+def open_cube(path: str | os.PathLike[str]) -> Cube:
     """Opens a cube, or what `sensor` made of one. Values are read when they are needed.
 
     Raises `StorageError` where there is none.
@@ -78,7 +78,7 @@ def path_of(cube: Any, what: str) -> str:
         raise TypeError(f"{what}: a cube is the name of one or a Dataset, not {type(cube).__name__}")
     source = cube.encoding.get("source")
     if source is None or "radiance" not in cube:
-        raise UsageError(f"{what}: this Dataset does not come from a cube on disk; give one as `render` or `open` made it")
+        raise UsageError(f"{what}: this Dataset does not come from a cube on disk; give one as `render` or `open_cube` made it")
     there = opened(source)
     whole = cube["radiance"].encoding.get("source") == source and all(
         name in cube.coords and cube.coords[name].equals(there.coords[name]) for name in ("wavelength", "y", "x")
@@ -106,6 +106,8 @@ def rgb(cube: Any, exposure: float | None = None) -> xarray.DataArray:
     `cube` is a Dataset with `preview`, also a part of one, or the name of a cube.
     """
     dataset = cube if isinstance(cube, xarray.Dataset) else opened(cube)
+    if "preview" not in dataset:
+        raise UsageError("rgb: there is no `preview` in this Dataset, as in counts by a sensor model")
     preview = dataset["preview"].transpose("y", "x", "rgb")
     picture, ev = tone(preview.values, exposure)
     attributes = {"long_name": f"sRGB, 8 bits: {preview.attrs.get('long_name', 'preview')}", "exposure_ev": ev}

@@ -66,7 +66,7 @@ def compare(a: Any, b: Any, *, tolerance: float | None = None) -> xarray.Dataset
     cube has standard errors `z` and `z_rms`, all over `wavelength` in nm. Attributes: `pixels` compared, `pixels_in_all`, `rel_mse_mean`,
     `rel_mse_largest`, and with a tolerance of the largest relMSE `passed`.
 
-    Both are cubes by name, or as `render` and `open` give them.
+    Both are cubes by name, or as `render` and `open_cube` give them.
     """
     import numpy
     import xarray
@@ -194,7 +194,7 @@ def _write_responses(file: str, responses: Any) -> None:
         rows = csv.writer(text)
         rows.writerow(["band", "wavelength_nm", "response"])
         for name, spectrum in bands.items():
-            samples = reader.samples(spectrum, str(name))
+            samples = reader.samples(spectrum, (str(name),))
             if samples is None:
                 raise UsageError(f"sensor: the response of band {name!r} is no spectrum; give an array [n, 2] of nm and response")
             rows.writerows([str(name), repr(nm), repr(value)] for nm, value in samples)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
 import warnings
@@ -34,11 +35,20 @@ def run(
 
     try:
         (task or _spectile.Task()).run(arguments, draft, hear)
+    except BaseException:
+        # Where warnings are errors, what went wrong is still the one to raise.
+        with contextlib.suppress(SpectileWarning):
+            _warn(said, stacklevel + 1)
+        raise
     finally:
         _give_back()
-        for message in dict.fromkeys(said):
-            warnings.warn(message, SpectileWarning, stacklevel=stacklevel)
+    _warn(said, stacklevel + 1)
     return last
+
+
+def _warn(said: list[str], stacklevel: int) -> None:
+    for message in dict.fromkeys(said):
+        warnings.warn(message, SpectileWarning, stacklevel=stacklevel)
 
 
 def _give_back() -> None:

@@ -6,6 +6,7 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyAny, PyBool, PyDict, PyFloat, PyInt, PyList, PyMapping, PyString, PyTuple};
 use serde_json::Value as Json;
+use spectile::scene::dotted_key;
 use spectile::scene::tree::{Entry, Node, Origin, Value};
 
 use crate::arrays::Data;
@@ -34,7 +35,7 @@ impl Reader<'_> {
                 return Err(mistake(mapping.py(), self.file, path, message, "keys of a scene are strings"));
             };
             let name = name.to_str()?.to_owned();
-            let below = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
+            let below = dotted_key(path, &name);
             let node = self.node(&value, &below, depth + 1)?;
             entries.push(Entry { key: name, key_origin: Origin::Whole, node });
         }

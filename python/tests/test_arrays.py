@@ -128,6 +128,19 @@ def test_textures_and_grids_are_those_of_files(tmp_path):
     assert scene(picture * numpy.float32(0.5), weight, grid).digest != files.digest
 
 
+def test_axes_by_name_are_put_in_order():
+    picture = numpy.linspace(0, 1, 2 * 4 * 3, dtype=numpy.float32).reshape(2, 4, 3)
+    named = xarray.DataArray(picture, dims=("y", "x", "channel"))
+
+    def digest(texture):
+        return ball(materials={**ball()["materials"], "floor": {"diffuse": {"reflectance": {"texture": texture}}}}).digest
+
+    assert digest(named.transpose("channel", "x", "y")) == digest(named) == digest(picture) == digest(picture.astype(">f8"))
+    packed = numpy.zeros((2, 4, 3), numpy.dtype([("pad", "u1"), ("value", "f4")]))
+    packed["value"] = picture
+    assert digest(packed["value"]) == digest(picture)
+
+
 def test_mixtures_take_channels_in_order(tmp_path):
     shares = numpy.full((2, 2, 2), 0.5, numpy.float32)
     scene = ball()
@@ -234,10 +247,28 @@ def test_wrong_arrays_are_refused_by_key(change, key, words):
     assert caught.value.key == key and words in str(caught.value), str(caught.value)
 
 
+def test_what_is_masked_infinite_or_has_a_unit_is_refused():
+    masked = numpy.ma.masked_less(PAINT, 390)
+
+    class Quantity:
+        magnitude, units, ndim = PAINT, "um", 2
+
+    for paint, words in ((masked, "masked"), (Quantity(), "unit of its own")):
+        scene = ball()
+        scene["spectra"]["paint"] = paint
+        with pytest.raises(sp.SceneError, match=words):
+            scene.check()
+    scene = ball()
+    scene["materials"]["floor"]["diffuse"]["reflectance"] = {"texture": numpy.full((2, 2), 1e300)}
+    with pytest.raises(sp.SceneError, match="inf"):
+        scene.check()
+
+
 def test_grids_of_wrong_shape_and_sign():
     for grid, words in (
         (numpy.zeros((2, 2)), "dimensions"),
         (numpy.full((1, 1, 1), -5.0), "not negative"),
+        (numpy.full((1, 1, 1), numpy.inf), "inf"),
         (numpy.zeros((0, 1, 1)), "voxels"),
     ):
         scene = ball(media={"gas": {"absorption": 0.1, "density": {"grid": grid}}})

@@ -21,13 +21,13 @@ def cube(tmp_path_factory):
 def test_engine_and_guess_open_what_zarr_holds(cube):
     path = cube.encoding["source"]
     plain = xarray.open_zarr(path)
-    for found in (sp.open(path), xarray.open_dataset(path, engine="spectile"), xarray.open_dataset(path)):
+    for found in (sp.open_cube(path), xarray.open_dataset(path, engine="spectile"), xarray.open_dataset(path)):
         assert found.radiance.equals(plain.radiance) and found.standard_error.equals(plain.standard_error)
         assert found.radiance.attrs["units"] == "W m-2 sr-1 nm-1"
         assert found.wavelength.attrs["units"] == "nm" and "wavelength_bounds" in found.coords
         assert found.wavelength_bounds.values.tolist() == [[400.0 + 50 * k, 450.0 + 50 * k] for k in range(6)]
         assert (found.standard_error > 0).any()
-    assert isinstance(cube, xarray.Dataset) and isinstance(sp.open(path), sp.Cube)
+    assert isinstance(cube, xarray.Dataset) and isinstance(sp.open_cube(path), sp.Cube)
     part = xarray.open_dataset(path, engine="spectile", drop_variables=["overview"])
     assert "overview" not in part
 
@@ -41,9 +41,9 @@ def test_a_cube_of_a_gibibyte_is_opened_without_reading_it(tmp_path):
         with open("/proc/self/io") as io:
             return int(io.readline().split()[1])
 
-    sp.open(tmp_path / "large.zarr")
+    sp.open_cube(tmp_path / "large.zarr")
     before = read()
-    large = sp.open(tmp_path / "large.zarr")
+    large = sp.open_cube(tmp_path / "large.zarr")
     assert large.radiance.nbytes == 1 << 30
     assert read() - before < 1 << 20
     before = read()
@@ -55,10 +55,10 @@ def test_a_cube_of_a_gibibyte_is_opened_without_reading_it(tmp_path):
 def test_what_is_no_cube_is_refused(tmp_path, cube):
     for path, words in [(tmp_path / "none.zarr", "no Zarr group"), (tmp_path, "no Zarr group")]:
         with pytest.raises(sp.StorageError, match=words):
-            sp.open(path)
+            sp.open_cube(path)
     xarray.Dataset({"a": ("x", [1.0])}).to_zarr(tmp_path / "other.zarr", zarr_format=3, consolidated=False)
     with pytest.raises(sp.StorageError, match="no cube of Spectile"):
-        sp.open(tmp_path / "other.zarr")
+        sp.open_cube(tmp_path / "other.zarr")
     assert "a" in xarray.open_dataset(tmp_path / "other.zarr", engine="zarr", consolidated=False)
 
 

@@ -22,10 +22,18 @@ def test_the_same_bytes_as_the_program(tmp_path, toml):
     assert content(tmp_path / "a.zarr") == content(tmp_path / "b.zarr")
     assert cube.attrs["seed"] == 3 and cube.sizes["wavelength"] == 6
     assert cube.attrs["scene_digest"] == ball().digest
+    # Whatever the scene names is not replaced by a picture of it.
+    scene = ball()
+    scene["materials"]["floor"]["diffuse"]["reflectance"] = {"texture": str(tmp_path / "c.png")}
     # A scene file by its name, and options that change no value.
     sp.render(toml, tmp_path / "c.zarr", spp=4, seed=3, memory="64MiB", devices=1, preview=tmp_path / "c.png", exposure=1)
     assert content(tmp_path / "a.zarr") == content(tmp_path / "c.zarr")
-    assert (tmp_path / "c.png").read_bytes().startswith(b"\x89PNG")
+    picture = (tmp_path / "c.png").read_bytes()
+    assert picture.startswith(b"\x89PNG")
+    with pytest.raises(sp.UsageError, match="read from this file"):
+        sp.render(scene, spp=1, preview=tmp_path / "c.png")
+    assert (tmp_path / "c.png").read_bytes() == picture
+    assert int(sp.render(ball(), spp=1, devices=[0]).samples.max()) == 1
 
 
 def test_the_program_of_the_package_ends_as_the_program_does(tmp_path):
@@ -61,11 +69,11 @@ def test_what_a_callback_raises_stops_in_order_and_the_cube_is_gone_on_with(tmp_
     with pytest.raises(RuntimeError, match="enough") as caught:
         sp.render(ball(), tmp_path / "cube.zarr", time="10m", callback=callback)
     assert "keeps every unit merged so far" in caught.value.__notes__[0]
-    assert sp.open(tmp_path / "cube.zarr").samples.values.min() >= 2
+    assert sp.open_cube(tmp_path / "cube.zarr").samples.values.min() >= 2
     with pytest.raises(sp.UsageError, match="--resume"):
         sp.render(ball(), tmp_path / "cube.zarr", spp=64)
     left = tmp_path / "cube.zarr"
-    if sp.open(left).samples.values.max() <= 64:
+    if sp.open_cube(left).samples.values.max() <= 64:
         sp.render(ball(), left, spp=64, resume=True)
         assert content(left) == content(tmp_path / "whole.zarr")
     with pytest.raises(sp.SpectileError, match='film.filter: "box" in the cube'):
@@ -75,7 +83,7 @@ def test_what_a_callback_raises_stops_in_order_and_the_cube_is_gone_on_with(tmp_
 def test_stop_is_an_error_of_its_own(tmp_path):
     with pytest.raises(sp.Stopped):
         sp.render(ball(), tmp_path / "cube.zarr", time="10m", callback=lambda epoch: epoch.stop())
-    assert sp.open(tmp_path / "cube.zarr").samples.values.min() >= 1
+    assert sp.open_cube(tmp_path / "cube.zarr").samples.values.min() >= 1
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends a signal")
@@ -92,7 +100,7 @@ def test_ctrl_c_leaves_a_cube_that_is_gone_on_with(tmp_path, toml):
     process.send_signal(signal.SIGINT)
     said, _ = process.communicate(timeout=120)
     assert process.returncode == 0 and "stopped: interrupted: cube.zarr keeps every unit merged so far" in said
-    samples = int(sp.open(tmp_path / "cube.zarr").samples.values.max())
+    samples = int(sp.open_cube(tmp_path / "cube.zarr").samples.values.max())
     more = 64 * (samples // 64 + 1)
     sp.render(toml, tmp_path / "cube.zarr", spp=more, resume=True)
     sp.render(toml, tmp_path / "whole.zarr", spp=more)
@@ -157,7 +165,7 @@ def test_epochs_iterate_beside_an_event_loop(tmp_path):
 
     with pytest.raises(sp.Stopped):
         asyncio.run(stop())
-    assert sp.open(tmp_path / "stopped.zarr").samples.values.min() >= 1
+    assert sp.open_cube(tmp_path / "stopped.zarr").samples.values.min() >= 1
 
     async def wrong():
         async for _ in sp.epochs(ball(film={})):

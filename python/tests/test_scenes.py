@@ -87,6 +87,24 @@ def test_a_mapping_that_contains_itself_has_no_end():
     scene = ball()
     scene["objects"].append(scene["objects"])
     assert "nested too deeply" in str(problem(scene))
+    with pytest.raises(sp.SceneError, match="nested too deeply"):
+        scene.copy()
+
+
+def test_names_of_the_users_own_mean_nothing():
+    import numpy
+
+    paint = numpy.array([[380, 0.05], [500, 0.1], [600, 0.7], [780, 0.8]])
+    digests = set()
+    for name in ("paint", "grid", "samples", "mesh", "texture", "file", "a.grid"):
+        scene = ball(spectra={name: paint})
+        del scene["materials"]["ball"]
+        scene["materials"][name] = {"diffuse": {"reflectance": name}}
+        scene["objects"][1]["material"] = name
+        digests.add(scene.digest)
+    assert len(digests) == 1
+    scene["spectra"]["a.grid"] = -paint
+    assert problem(scene).key.startswith('spectra."a.grid"')
 
 
 def test_copies_are_independent(toml):

@@ -72,6 +72,9 @@ impl SceneArgs {
         if let Ok(scene) = scene.parse::<toml::Table>() {
             scene.values().for_each(|value| each_text(value, &mut note));
         }
+        if let Some(draft) = &self.given {
+            draft.texts().into_iter().for_each(&mut note);
+        }
         self.overrides.iter().for_each(|(_, value)| note(value.trim_matches(['"', '\''])));
         match named.iter().any(|file| fs::canonicalize(file).is_ok_and(|file| file == output_there)) {
             true => Err(Error::Usage(format!(

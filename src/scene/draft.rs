@@ -26,6 +26,21 @@ impl Draft {
         &self.file
     }
 
+    /// Every text in the tree: names, and files.
+    pub fn texts(&self) -> Vec<&str> {
+        fn gather<'a>(value: &'a Value, texts: &mut Vec<&'a str>) {
+            match value {
+                Value::String(text) => texts.push(text),
+                Value::Array(items) => items.iter().for_each(|item| gather(&item.value, texts)),
+                Value::Table(entries) => entries.iter().for_each(|entry| gather(&entry.node.value, texts)),
+                _ => {}
+            }
+        }
+        let mut texts = Vec::new();
+        self.root.iter().for_each(|entry| gather(&entry.node.value, &mut texts));
+        texts
+    }
+
     /// The scene, with `overrides` as in [`super::load`].
     ///
     /// # Errors

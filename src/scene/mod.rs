@@ -35,6 +35,7 @@ use std::sync::Arc;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
+pub use decode::join as dotted_key;
 pub use draft::Draft;
 pub use file::{load, parse, read};
 pub use light::{Cone, Light, Profile};
