@@ -7,7 +7,7 @@ import zlib
 import numpy
 import pytest
 import xarray
-from conftest import ball, program
+from conftest import ball, content, program
 
 import spectile as sp
 
@@ -137,7 +137,7 @@ def test_changed_datasets_are_not_taken_for_what_is_on_disk(cube):
         sp.compare(3, cube)
 
 
-def test_sensors_by_file_mapping_and_model(cube, tmp_path):
+def test_sensors_by_file_and_mapping(cube, tmp_path):
     nm = numpy.arange(400.0, 701.0, 5.0)
     bands = {"blue": numpy.exp(-(((nm - 470) / 20) ** 2)), "red": numpy.exp(-(((nm - 620) / 25) ** 2))}
     with pytest.warns(sp.SpectileWarning, match="channels"):
@@ -158,6 +158,52 @@ def test_sensors_by_file_mapping_and_model(cube, tmp_path):
         sp.sensor(cube)
     with pytest.raises(sp.UsageError, match="exists already"):
         sp.sensor(cube, tmp_path / "s.zarr", responses=tmp_path / "s.csv")
+
+
+MODEL = """\
+[optics]
+f_number = 2.5
+[detector]
+pitch = 15e-6
+integration_time = 1e-6
+quantum_efficiency = 0.8
+read_noise = 20
+gain = 100
+bits = 14
+[[bands]]
+name = "red"
+from = 600
+to = 700
+"""
+
+
+def test_sensor_models_make_the_counts_of_the_program(cube, tmp_path):
+    (tmp_path / "sensor.toml").write_text(MODEL)
+    counts = sp.sensor(cube, model=tmp_path / "sensor.toml", seed=3, electrons=True)
+    words = ["--model", tmp_path / "sensor.toml", "--seed", "3", "--electrons", "-o", tmp_path / "counts.zarr", "--json"]
+    done = program("sensor", cube.encoding["source"], *words)
+    assert done.returncode == 0, done.stderr
+    assert content(counts.encoding["source"]) == content(tmp_path / "counts.zarr")
+    found = xarray.open_dataset(tmp_path / "counts.zarr", engine="spectile", mask_and_scale=False)
+    assert found.counts.dtype == numpy.uint16 and counts.counts.sizes["band"] == 1 and "electrons" in counts
+    assert numpy.array_equal(found.counts.values, counts.counts.values) and counts.counts.max() > 0
+    with pytest.raises(sp.SceneError, match="gain") as caught:
+        (tmp_path / "wrong.toml").write_text(MODEL.replace("gain = 100", "gain = -1"))
+        sp.sensor(cube, model=tmp_path / "wrong.toml")
+    assert (caught.value.line, caught.value.key) == (8, "detector.gain")
+    with pytest.raises(sp.UsageError, match="no `preview`"):
+        sp.rgb(counts)
+    with pytest.raises(sp.UsageError, match="does not come from"):
+        sp.compare(counts, cube)
+
+
+def test_units_are_quantities_of_pint(cube):
+    pytest.importorskip("pint_xarray")
+    units = pytest.importorskip("cf_xarray.units").units
+    radiance = cube.pint.quantify(unit_registry=units).radiance
+    assert radiance.pint.to("mW / cm**2 / sr / um").pint.magnitude.max() == pytest.approx(
+        100 * float(cube.radiance.max()), rel=1e-6
+    )
 
 
 def test_colour_science_both_ways(cube):
