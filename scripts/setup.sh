@@ -111,6 +111,7 @@ need_package() {
   [ -n "${SPECTILE_PYTHON:-}" ] || return 0
   local built=${spectile%/spectile}
   export PYO3_PYTHON=$SPECTILE_PYTHON PYO3_BUILD_EXTENSION_MODULE=1
+  [ -d "$built/package" ] || say "building the Python package"
   (cd "$root" && cargo build --release --locked --quiet -p spectile-python)
   "$SPECTILE_PYTHON" "$root/python/develop.py" "$built" "$built/package"
   export SPECTILE_PACKAGE=$built/package

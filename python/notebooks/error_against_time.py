@@ -29,7 +29,7 @@ scene = sp.Scene(
 )
 
 # %%
-reference = sp.render(scene, spp=2048, seed=1)
+reference = sp.render(scene, spp=1024, seed=1)
 
 # %% [markdown]
 # A render tells how far it is after every epoch. The true error needs its radiance, so it is rendered again to some numbers of samples:
@@ -37,7 +37,7 @@ reference = sp.render(scene, spp=2048, seed=1)
 
 # %%
 estimates = []
-sp.render(scene, spp=256, callback=lambda epoch: estimates.append((epoch.time_s, epoch.samples, epoch.error_estimate)))
+sp.render(scene, spp=128, callback=lambda epoch: estimates.append((epoch.time_s, epoch.samples, epoch.error_estimate)))
 
 
 # %%
@@ -47,7 +47,7 @@ def error(cube):
     return float(np.sqrt(difference / (reference.radiance**2).sum(("x", "y"))).max())
 
 
-samples = [16, 32, 64, 128, 256]
+samples = [8, 16, 32, 64, 128]
 errors = [error(sp.render(scene, spp=n)) for n in samples]
 slope = np.polyfit(np.log(samples), np.log(errors), 1)[0]
 print(f"the error falls with the power {slope:.3f} of the samples")

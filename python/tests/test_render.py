@@ -3,6 +3,7 @@
 import asyncio
 import os
 import pathlib
+import pickle
 import signal
 import subprocess
 import sys
@@ -194,6 +195,27 @@ def test_errors_have_their_kinds(tmp_path, toml):
     done = subprocess.run([sys.executable, "-P", "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert done.returncode == 0 and done.stdout.startswith("[]\nnone: "), done
     assert not (tmp_path / "a.zarr").exists()
+
+
+def test_every_error_of_the_library_has_an_exception():
+    from spectile import _errors
+
+    for kind, built_in in {
+        "usage": ValueError,
+        "memory": MemoryError,
+        "no_device": RuntimeError,
+        "devices_lost": sp.DeviceLost,
+        "check": sp.CheckFailed,
+        "interrupted": sp.Stopped,
+        "internal": sp.InternalError,
+        "storage": OSError,
+        "input": sp.SceneError,
+    }.items():
+        problem = {"file": pathlib.Path("s.toml"), "line": 3, "column": 1, "key": "a.b", "message": "is wrong", "help": None}
+        error = _errors.make(kind, "what, where", {"path": pathlib.Path("cube.zarr"), "problems": [problem]})
+        assert isinstance(error, sp.SpectileError) and isinstance(error, built_in) and str(error) == "what, where"
+        again = pickle.loads(pickle.dumps(error))
+        assert type(again) is type(error) and str(again) == str(error) and vars(again) == vars(error)
 
 
 def test_progress_is_shown_where_it_is_wanted(tmp_path, capsys, monkeypatch):
