@@ -7,6 +7,7 @@ mod heat;
 mod images;
 mod kernels;
 mod manual;
+mod package;
 mod physics;
 #[cfg(feature = "web")]
 mod preview;

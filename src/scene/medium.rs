@@ -362,11 +362,15 @@ struct Grids(HashMap<(PathBuf, Describes), Option<Arc<Grid>>>);
 
 impl Grids {
     fn read(&mut self, item: &Item, describes: Describes) -> Option<Arc<Grid>> {
-        let key = (item.cx.path(item.text()?), describes);
+        let key = (item.source()?.1, describes);
         if let Some(known) = self.0.get(&key) {
             return known.clone();
         }
-        let grid = match volume::read(&key.0) {
+        let read = match item.data() {
+            Some(data) => data.volume(),
+            None => volume::read(&key.0),
+        };
+        let grid = match read {
             Ok(volume) => checked(item, volume, describes).map(Arc::new),
             Err(problem) => {
                 report_in_file(item, *problem);
@@ -381,7 +385,7 @@ impl Grids {
 /// A volume in Spectile's units, without noise; what is missing or impossible is an error.
 fn checked(item: &Item, volume: Volume, describes: Describes) -> Option<Grid> {
     let Volume { size, mut values, unit } = volume;
-    let name = item.text()?;
+    let (name, _) = item.source()?;
     let place = |i: usize| {
         let [nx, ny, _] = size.map(|n| n as usize);
         format!("[{}, {}, {}]", i / (nx * ny), i / nx % ny, i % nx)

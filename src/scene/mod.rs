@@ -1,6 +1,7 @@
 //! A resolved, validated scene: what `scene.toml`, its meshes and its spectra say, in metres and nanometres,
 //! f64, world space. Knows no GPU and no paths.
 
+pub mod arrays;
 mod blend;
 mod camera;
 mod channels;
@@ -9,6 +10,7 @@ mod context;
 mod coverage;
 mod decode;
 mod digest;
+mod draft;
 mod environment;
 mod file;
 pub mod keys;
@@ -25,7 +27,7 @@ mod sun;
 mod texture;
 mod transform;
 mod translucent;
-mod tree;
+pub mod tree;
 mod words;
 
 use std::path::PathBuf;
@@ -34,7 +36,9 @@ use std::sync::Arc;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
-pub use file::{load, parse};
+pub use decode::join as dotted_key;
+pub use draft::Draft;
+pub use file::{load, parse, read};
 pub use light::{Cone, Light, Profile};
 
 pub use crate::format::phase::PhaseTable;
