@@ -17,8 +17,9 @@ from . import _spectile
 from ._engine import Engine, Temporary
 from ._errors import UsageError
 
-# A picture in a notebook is reduced to this many pixels.
+# A picture in a notebook is reduced to this many pixels, and one that takes more bytes to read is not shown.
 SHOWN_PIXELS = 1 << 18
+MOST_BYTES = 1 << 28
 
 
 class Cube(xarray.Dataset):
@@ -121,6 +122,8 @@ def _reduced(size: int, other: int) -> int:
 
 
 def _picture(preview: xarray.DataArray) -> str:
+    if preview.nbytes > MOST_BYTES:
+        return f"<p>a picture of {preview.nbytes / (1 << 20):.0f} MiB: spectile.rgb shows it</p>"
     factor = _reduced(*preview.shape[:2])
     picture, ev = tone(preview[::factor, ::factor].values)
     data = base64.b64encode(png(picture)).decode()
