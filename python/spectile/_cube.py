@@ -94,6 +94,10 @@ def tone(linear: Any, exposure: float | None = None) -> tuple[numpy.ndarray, flo
 
     Without `exposure` the 99th percentile of lit pixels is white. What is brighter or outside the gamut is cut, NaN is black: the same
     bytes as in pictures of `spectile export`.
+
+    >>> picture, ev = tone(numpy.full((1, 2, 3), 0.5), exposure=1.0)
+    >>> picture.shape, picture.dtype.name, int(picture[0, 0, 0]), ev
+    ((1, 2, 3), 'uint8', 255, 1.0)
     """
     linear = numpy.ascontiguousarray(linear, dtype=numpy.float32)
     ev, data = _spectile.tone(linear, exposure)
