@@ -6,6 +6,7 @@ use std::rc::Rc;
 
 use glam::{DAffine3, DVec3};
 
+use super::arrays::Data;
 use super::closed;
 use super::decode::{Fields, Item, list};
 use super::keys;
@@ -200,11 +201,7 @@ impl<'s, 'a> Objects<'s, 'a> {
         if let Some(known) = self.meshes.get(&path) {
             return known.clone();
         }
-        let read = match item.data() {
-            Some(data) => data.mesh(),
-            None => obj::read(&path),
-        };
-        let mesh = match read {
+        let mesh = match item.data().map_or_else(|| obj::read(&path), Data::mesh) {
             Ok(mesh) => {
                 warn_about(item, &mesh);
                 Some(Rc::new(mesh))
