@@ -218,6 +218,12 @@ def test_units_are_quantities_of_pint(cube):
 
 def test_colour_science_both_ways(cube):
     colour = pytest.importorskip("colour")
+    nm = numpy.arange(400.0, 701.0, 10.0)
+    bands = numpy.stack([numpy.exp(-(((nm - centre) / 30) ** 2)) for centre in (480, 600)], axis=1)
+    with pytest.warns(sp.SpectileWarning, match="channels"):
+        by_colour = sp.sensor(cube, responses=colour.MultiSpectralDistributions(bands, nm, labels=["a", "b"]))
+        by_arrays = sp.sensor(cube, responses={"a": (nm, bands[:, 0]), "b": (nm, bands[:, 1])})
+    assert by_colour.attrs["channel_names"] == ["a", "b"] and by_colour.radiance.equals(by_arrays.radiance)
     pixel = sp.to_colour(cube.radiance.isel(x=8, y=8))
     assert isinstance(pixel, colour.SpectralDistribution)
     assert pixel.wavelengths.tolist() == cube.wavelength.values.tolist()
