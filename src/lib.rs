@@ -11,6 +11,7 @@ pub mod export;
 pub mod files;
 pub mod format;
 pub mod gpu;
+pub mod import;
 pub mod preview;
 pub mod reference;
 pub mod render;

@@ -5,6 +5,7 @@ mod files;
 mod geometry;
 mod heat;
 mod images;
+mod import;
 mod kernels;
 mod manual;
 mod package;

@@ -9,6 +9,7 @@ mod converge;
 mod devices;
 mod export;
 mod help;
+mod import;
 mod info;
 mod interrupt;
 mod output;
@@ -58,6 +59,7 @@ Examples:
   spectile converge scene.toml -o report                error against run time, as a report
   spectile bench -o report                              evaluators side by side, as a report
   spectile stress                                       stiff and extreme cases against their answers
+  spectile import scene.xml -o folder                   a scene of Mitsuba 3 as one of Spectile's
   spectile help scene                                   every section and key of a scene file
 
 Radiance is in W m-2 sr-1 nm-1, wavelengths are in nm (vacuum), pixels are counted from 0 at the top left.
@@ -78,6 +80,7 @@ enum Command {
     Submit(submit::Args),
     Plan(plan::Args),
     Devices(devices::Args),
+    Import(import::Args),
     Info(info::Args),
     Spectrum(spectrum::Args),
     Compare(compare::Args),
@@ -106,6 +109,7 @@ impl Cli {
             Command::Render(args) => args.json,
             Command::Plan(args) => args.json,
             Command::Devices(args) => args.json,
+            Command::Import(args) => args.json,
             Command::Info(args) => args.json,
             Command::Compare(args) => args.json,
             Command::Export(args) => args.json,
@@ -126,6 +130,7 @@ impl Cli {
             Command::Render(args) => render::run(args, output),
             Command::Plan(args) => plan::run(args, output),
             Command::Devices(args) => devices::run(args, output),
+            Command::Import(args) => import::run(args, output),
             Command::Info(args) => info::run(args, output),
             Command::Spectrum(args) => spectrum::run(args, output),
             Command::Compare(args) => compare::run(args, output),

@@ -146,6 +146,10 @@ impl<'a> Reporter<'a> {
     pub fn event(&mut self, event: Event) -> Result<()> {
         match event {
             Event::Warning(text) => self.warn(&text),
+            Event::Note(text) => {
+                self.line(&text);
+                self.emit("note", json!({ "message": text }))
+            }
             Event::Device(name) => {
                 self.line(&format!("device: {name}"));
                 self.emit("device", json!({ "name": name }))

@@ -6,63 +6,14 @@ use std::borrow::Cow;
 use std::io::{self, BufRead, Read};
 use std::path::Path;
 
-use super::polygon::{self, Outline};
+use super::mesh::{Flaws, Labels, Mesh, Part, Place};
 use crate::error::Problem;
 
-/// The triangles of one run of faces under the same `o`, `g` and `usemtl` whose corners are given alike.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FaceRun {
-    pub labels: Labels,
-    /// The line of the first face, 1-based; 0 where there is no file.
-    pub line: usize,
-    pub positions: Vec<[f64; 3]>,
-    /// Indices into `positions`; counter-clockwise seen from the front.
-    pub triangles: Vec<[u32; 3]>,
-    /// (u, v) at the corners of each triangle, where its faces have `vt` at every corner.
-    pub uv: Option<Vec<[[f64; 2]; 3]>>,
-    /// Normals at the corners of each triangle, as written, where its faces have `vn` at every corner.
-    pub normals: Option<Vec<[[f64; 3]; 3]>>,
-}
-
-/// What a face stands under.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Labels {
-    pub object: Option<String>,
-    /// The names of the `g` line, as written; one name or several separated by blanks.
-    pub group: Option<String>,
-    pub material: Option<String>,
-}
-
-impl Labels {
-    /// Whether `name` picks this part: its object, its whole group line, or one of the groups on it.
-    pub fn in_group(&self, name: &str) -> bool {
-        self.object.as_deref() == Some(name)
-            || self.group.as_deref().is_some_and(|g| g == name || g.split_whitespace().any(|word| word == name))
-    }
-}
-
-/// An OBJ file.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Obj {
-    pub parts: Vec<FaceRun>,
-    /// Point and line elements, which have no surface.
-    pub without_surface: usize,
-    /// Faces whose corners do not lie in one plane: how many, and the line of the first.
-    pub bent: Option<(usize, usize)>,
-    /// Faces whose outline crosses itself, likewise.
-    pub crossing: Option<(usize, usize)>,
-}
-
-/// Reads the file at `path`. Errors name the line; without one, the file as a whole could not be read.
-pub fn read(path: &Path) -> Result<Obj, Box<Problem>> {
-    let bytes = std::fs::read(path).map_err(|e| {
-        Box::new(Problem { file: path.to_owned(), message: format!("cannot be read: {e}"), ..Problem::default() })
-    })?;
-    parse(&bytes, path)
-}
-
-/// [`read`] on the content of the file; `path` stands in messages.
-pub fn parse(bytes: &[u8], path: &Path) -> Result<Obj, Box<Problem>> {
+/// Reads an OBJ file of this content; `path` stands in messages.
+///
+/// # Errors
+/// What is wrong with it, with the line.
+pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Box<Problem>> {
     let problem = |line: Option<usize>, message: &str| {
         Box::new(Problem { file: path.to_owned(), line, message: message.to_owned(), ..Problem::default() })
     };
@@ -115,13 +66,13 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Obj, Box<Problem>> {
         let triangles = cut.iter().map(|corners| corners.map(|i| mesh.indices[i as usize])).collect();
         let uv = given.uv.then(|| corners(&cut, &mesh.texcoord_indices, texcoords));
         let normals = given.normals.then(|| corners(&cut, &mesh.normal_indices, normals));
-        parts.push(FaceRun { labels, line, positions, triangles, uv, normals });
+        parts.push(Part { labels, place: Place::Line(line), positions, triangles, uv, normals });
     }
     if parts.is_empty() {
         return Err(problem(None, "has no faces"));
     }
-    let Polygons { bent, crossing, .. } = polygons;
-    Ok(Obj { parts, without_surface: feeder.without_surface, bent, crossing })
+    let flaws = polygons.flaws;
+    Ok(Mesh { parts, without_surface: feeder.without_surface, flaws, notes: Vec::new() })
 }
 
 /// The lines of a file whose lines end as those of old Macs do, as everybody's.
@@ -141,13 +92,12 @@ fn corners<T: Copy>(triangles: &[[u32; 3]], indices: &[u32], values: &[T]) -> Ve
 struct Polygons<'f> {
     /// The lines of those of more than three corners that are still to come.
     lines: std::slice::Iter<'f, usize>,
-    bent: Option<(usize, usize)>,
-    crossing: Option<(usize, usize)>,
+    flaws: Flaws,
 }
 
 impl<'f> Polygons<'f> {
     fn new(lines: &'f [usize]) -> Self {
-        Polygons { lines: lines.iter(), bent: None, crossing: None }
+        Polygons { lines: lines.iter(), flaws: Flaws::default() }
     }
 
     /// The triangles of the faces of `arities` corners (all three where there are none), as places in `indices`.
@@ -164,14 +114,8 @@ impl<'f> Polygons<'f> {
                 triangles.push([start, start + 1, start + 2]);
             } else if arity > 3 {
                 let line = self.lines.next().copied().unwrap_or(0);
-                let Outline { triangles: cut, bent, crossing } = polygon::cut(&corners);
+                let cut = self.flaws.cut(&corners, || Place::Line(line));
                 triangles.extend(cut.iter().map(|corners| corners.map(|i| start + i)));
-                for (found, kind) in [(bent, &mut self.bent), (crossing, &mut self.crossing)] {
-                    if found {
-                        let (count, first) = kind.unwrap_or((0, line));
-                        *kind = Some((count + 1, first));
-                    }
-                }
             }
             start += arity;
         }

@@ -10,6 +10,7 @@ use super::bsdf::{Bsdf, SpectralValues, Vertex};
 use super::camera;
 use super::gas::{self, Piece};
 use super::lights::{LightPoint, Lights, Target, disk_solid_angle, emits, sample_disk, spot_share};
+use super::phase;
 use super::primitive::{Ray, SurfacePoint};
 use super::rng::Rng;
 use super::shading::Shading;
@@ -35,6 +36,8 @@ pub struct Tracer<'a> {
     around_camera: Vec<Interior>,
     /// Whether some surface lets rays pass.
     masked: bool,
+    /// Whether some matter scatters: then every channel has paths of its own.
+    scatters: bool,
 }
 
 /// The K-channel state of the path under way; reused from path to path.
@@ -52,6 +55,18 @@ pub struct Path<'a> {
     emitted: Vec<f64>,
     /// The interiors that the path is in, the innermost last.
     interiors: Vec<Interior>,
+}
+
+/// What becomes of a path between two surfaces.
+enum Flight {
+    /// It comes to the next.
+    Passed,
+    /// Matter scatters it, into this ray with this density by solid angle.
+    Scattered {
+        next: Ray,
+        density: f64,
+    },
+    Ended,
 }
 
 /// A way to some light, chosen at a vertex.
@@ -140,8 +155,10 @@ impl<'a> Tracer<'a> {
         let mut gas_spectra = gas::spectra(scene);
         gas_spectra.extend(glass.values().map(|(eta, _)| *eta));
         let masked = scene.materials.iter().any(|material| material.opacity.is_some());
+        let scatters = scene.media.iter().any(|medium| medium.scatters());
         let around_camera = Vec::new();
-        let mut tracer = Tracer { scene, world, sky, lights, materials, gas_spectra, glass, around_camera, masked };
+        let mut tracer =
+            Tracer { scene, world, sky, lights, materials, gas_spectra, glass, around_camera, masked, scatters };
         tracer.around_camera = tracer.interiors_around(scene.camera.position);
         tracer
     }
@@ -151,8 +168,20 @@ impl<'a> Tracer<'a> {
     /// Emission is found in two ways, by aiming at lights and by meeting them, which are combined by the balance
     /// heuristic (Veach 1997, section 9.2.2). The uniform environment is only met.
     pub fn trace(&self, pixel: [u32; 2], rng: &mut Rng, path: &mut Path) {
-        let integrator = &self.scene.integrator;
         path.begin(rng.uniform());
+        if !self.scatters {
+            return self.trace_channels(pixel, rng, path);
+        }
+        // Where matter scatters, decisions are those of one wavelength.
+        for k in 0..path.throughput.len() {
+            path.alive = k..k + 1;
+            self.trace_channels(pixel, rng, path);
+        }
+    }
+
+    /// One path of the channels that are alive.
+    fn trace_channels(&self, pixel: [u32; 2], rng: &mut Rng, path: &mut Path) {
+        let integrator = &self.scene.integrator;
         let mut ray = camera::ray(&self.scene.camera, &self.scene.film, pixel, rng);
         // Density by solid angle with which the ray was chosen; none where lights could not have been aimed at instead:
         // for camera rays, mirrors and ideal refraction.
@@ -166,20 +195,35 @@ impl<'a> Tracer<'a> {
         for event in 0..=integrator.max_bounces {
             let mut pieces = Vec::new();
             let hit = self.follow(&ray, &mut path.interiors, &mut pieces, rng);
+            let before = path.throughput[path.alive.start];
             let Path { spectra, throughput, alive, radiance, .. } = &mut *path;
-            pieces.iter().for_each(|piece| piece.pass(spectra, alive.clone(), throughput, Some(radiance)));
-            let Some(hit) = hit else {
-                self.gather_from_afar(ray.direction, ray_density, path);
-                return;
-            };
-            self.gather_emission(&ray, &hit, ray_density, path);
+            // What arrives from infinity has been measured at the scene.
+            let counts = |piece: &&Piece| hit.is_some() || !piece.outer;
+            let counting = pieces.iter().filter(counts);
+            counting.for_each(|piece| piece.pass(spectra, alive.clone(), throughput, Some(radiance)));
+            match &hit {
+                None => self.gather_from_afar(ray.direction, ray_density, path),
+                Some(hit) => self.gather_emission(&ray, hit, ray_density, path),
+            }
             if event == integrator.max_bounces {
                 return;
             }
+            if self.scatters {
+                path.throughput[path.alive.start] = before;
+                match self.scatter(&pieces, ray.direction, event, rng, path) {
+                    Flight::Scattered { next, density } => {
+                        (ray, ray_density) = (next, Some(density));
+                        continue;
+                    }
+                    Flight::Ended => return,
+                    Flight::Passed => {}
+                }
+            }
+            let Some(hit) = hit else { return };
 
             let object = &self.scene.objects[self.world.primitives[hit.primitive].object];
             let bsdf = &self.materials[object.material.expect("paths pass null boundaries")];
-            let aim = self.aim(&hit, rng);
+            let aim = self.aim(hit.point.position, rng);
             path.spectra.fill(bsdf.spectra());
             if let Some(aim) = &aim {
                 self.look_up(&aim.emitted, path);
@@ -198,7 +242,7 @@ impl<'a> Tracer<'a> {
             let Path { spectra, throughput, alive, radiance, factor, emitted, interiors } = &mut *path;
             let Some(scattering) = bsdf.at(Vertex { o, inside, spectra, alive: alive.clone() }) else { return };
             let kept = aim.filter(|aim| shading.keeps_side(geometric, &frame, aim.direction));
-            let pieces = kept.as_ref().and_then(|aim| self.way_to(&hit, inside, aim, interiors, rng));
+            let pieces = kept.as_ref().and_then(|aim| self.way_from_surface(&hit, inside, aim, interiors, rng));
             if let Some((aim, pieces)) = kept.zip(pieces) {
                 pieces.iter().for_each(|piece| piece.pass(spectra, alive.clone(), emitted, None));
                 let scattered = scattering.evaluate(frame.transpose() * aim.direction, factor);
@@ -330,21 +374,21 @@ impl<'a> Tracer<'a> {
     }
 
     /// Chooses a light and a way to it; `None` where it sends nothing there.
-    fn aim(&self, hit: &Hit, rng: &mut Rng) -> Option<Aim> {
+    fn aim(&self, from: DVec3, rng: &mut Rng) -> Option<Aim> {
         match self.lights.sample(&self.world, rng)? {
-            Target::Surface(light) => self.aim_at_surface(hit, &light),
+            Target::Surface(light) => self.aim_at_surface(from, &light),
             Target::Light(light) => {
                 let probability = self.lights.probability(light);
                 match self.scene.lights[light] {
                     Light::Point { position, intensity } => {
-                        let towards = position - hit.point.position;
+                        let towards = position - from;
                         let distance2 = towards.length_squared();
                         let emitted = Emitted::Spectrum { spectrum: intensity, scale: 1.0 / (distance2 * probability) };
                         let direction = towards.try_normalize()?;
                         Some(Aim { direction, target: Some(position), density: None, emitted })
                     }
                     Light::Spot { position, direction: axis, intensity, cone } => {
-                        let towards = position - hit.point.position;
+                        let towards = position - from;
                         let direction = towards.try_normalize()?;
                         let share = spot_share(&cone, axis.angle_between(-direction));
                         let scale = share / (towards.length_squared() * probability);
@@ -372,8 +416,8 @@ impl<'a> Tracer<'a> {
         }
     }
 
-    fn aim_at_surface(&self, hit: &Hit, light: &LightPoint) -> Option<Aim> {
-        let towards = light.point.position - hit.point.position;
+    fn aim_at_surface(&self, from: DVec3, light: &LightPoint) -> Option<Aim> {
+        let towards = light.point.position - from;
         let distance = towards.length();
         if distance == 0.0 {
             return None;
@@ -391,8 +435,8 @@ impl<'a> Tracer<'a> {
         })
     }
 
-    /// The ways through media from a vertex to what is aimed at, if nothing but null boundaries stands between.
-    fn way_to(
+    /// The ways through media from a surface to what is aimed at, if nothing but null boundaries stands between.
+    fn way_from_surface(
         &self,
         hit: &Hit,
         inside: bool,
@@ -401,18 +445,22 @@ impl<'a> Tracer<'a> {
         rng: &mut Rng,
     ) -> Option<Vec<Piece<'_>>> {
         let origin = self.world.leave(hit.primitive, &hit.point, aim.direction);
+        let mut interiors = interiors.to_vec();
+        let goes_inside = hit.point.normal.dot(aim.direction) < 0.0;
+        if goes_inside != inside {
+            let object = &self.scene.objects[self.world.primitives[hit.primitive].object];
+            cross(&mut interiors, object.interior, goes_inside);
+        }
+        self.way_to(origin, interiors, aim, rng)
+    }
+
+    fn way_to(&self, origin: DVec3, mut interiors: Vec<Interior>, aim: &Aim, rng: &mut Rng) -> Option<Vec<Piece<'_>>> {
         if self.scene.media.is_empty() && !self.masked {
             let clear = match aim.target {
                 Some(target) => !self.world.occluded(origin, target),
                 None => self.world.closest_hit(&Ray { origin, direction: aim.direction }).is_none(),
             };
             return clear.then(Vec::new);
-        }
-        let mut interiors = interiors.to_vec();
-        let goes_inside = hit.point.normal.dot(aim.direction) < 0.0;
-        if goes_inside != inside {
-            let object = &self.scene.objects[self.world.primitives[hit.primitive].object];
-            cross(&mut interiors, object.interior, goes_inside);
         }
         // From just off the surface to the very target: a parallel line would meet a light seen obliquely too early.
         let direction = aim.target.map_or(aim.direction, |target| (target - origin).normalize());
@@ -437,9 +485,51 @@ impl<'a> Tracer<'a> {
         }
     }
 
+    /// How far the one channel that is alive goes through `pieces` until it is scattered, and where to then: what is
+    /// scattered weighs the same wherever it goes, what is absorbed is taken from the throughput.
+    fn scatter(&self, pieces: &[Piece], direction: DVec3, event: u32, rng: &mut Rng, path: &mut Path) -> Flight {
+        let integrator = &self.scene.integrator;
+        let k = path.alive.start;
+        let mut left = -(1.0 - rng.uniform()).ln();
+        let before = path.throughput[k];
+        let Path { spectra, throughput, .. } = &mut *path;
+        let fly = |piece| Some((piece, Piece::fly(piece, spectra, k, &mut left, &mut throughput[k])?));
+        let Some((piece, (position, cell))) = pieces.iter().find_map(fly) else { return Flight::Passed };
+        let strengths: Vec<_> = piece.strengths(&path.spectra, k, &cell).map(|(s, phase)| (s, phase.clone())).collect();
+        let all: f64 = strengths.iter().map(|(strength, _)| strength).sum();
+        let density = |spectra: &SpectralValues, to: DVec3| -> f64 {
+            strengths.iter().map(|(s, p)| s / all * phase::density(p, spectra, k, direction, to)).sum()
+        };
+        if let Some(aim) = self.aim(position, rng) {
+            self.look_up(&aim.emitted, path);
+            if let Some(pieces) = self.way_to(position, piece.around.clone(), &aim, rng) {
+                let Path { spectra, throughput, alive, radiance, emitted, .. } = &mut *path;
+                pieces.iter().for_each(|piece| piece.pass(spectra, alive.clone(), emitted, None));
+                let scattered = density(spectra, aim.direction);
+                let weight = aim.density.map_or(1.0, |density| 1.0 / (density + scattered));
+                radiance[k] += throughput[k] * scattered * emitted[k] * weight;
+            }
+        }
+        if integrator.russian_roulette_start > 0 && event + 1 >= integrator.russian_roulette_start {
+            let survival = (path.throughput[k] / before).clamp(0.05, 1.0);
+            if rng.uniform() >= survival {
+                return Flight::Ended;
+            }
+            path.throughput[k] /= survival;
+        }
+        let mut chosen = all * rng.uniform();
+        let kind = strengths.iter().find(|(strength, _)| {
+            chosen -= strength;
+            chosen < 0.0
+        });
+        let Some((_, pattern)) = kind.or(strengths.last()) else { return Flight::Ended };
+        let to = phase::sample(pattern, &path.spectra, k, direction, rng);
+        path.interiors.clone_from(&piece.around);
+        Flight::Scattered { next: Ray { origin: position, direction: to }, density: density(&path.spectra, to) }
+    }
+
     /// The first surface with a material along `ray`, at its distance from the start; null boundaries on the way change
-    /// what is around. `pieces`: the ways through media, but outside all interiors none that leads to infinity: what
-    /// arrives from there has been measured at the scene.
+    /// what is around. `pieces`: the ways through media.
     fn follow<'s>(
         &'s self,
         ray: &Ray,
@@ -449,10 +539,8 @@ impl<'a> Tracer<'a> {
     ) -> Option<Hit> {
         let (mut ray, mut passed) = (*ray, 0.0);
         loop {
-            let Some(mut hit) = self.world.closest_hit(&ray) else {
-                pieces.retain(|piece| !piece.outer);
-                return None;
-            };
+            // To infinity outside all interiors: nobody is scattered there, and what arrives has been measured at the scene.
+            let mut hit = self.world.closest_hit(&ray)?;
             pieces.extend(self.piece(interiors, ray.origin, ray.origin + hit.t * ray.direction));
             let object = &self.scene.objects[self.world.primitives[hit.primitive].object];
             if object.material.is_some() && !self.lets_pass(&hit, rng) {
@@ -491,7 +579,8 @@ impl<'a> Tracer<'a> {
         let medium = innermost.map(|interior| interior.medium).or(self.scene.camera_medium)?;
         let to_grid = innermost.map_or(DAffine3::IDENTITY, |interior| interior.to_grid);
         let indices = interiors.iter().filter_map(|interior| self.glass.get(&interior.body).copied()).collect();
-        Some(Piece { medium: &self.scene.media[medium], to_grid, outer: innermost.is_none(), from, to, indices })
+        let (medium, around) = (&self.scene.media[medium], interiors.to_vec());
+        Some(Piece { medium, to_grid, outer: innermost.is_none(), from, to, indices, around })
     }
 
     /// The interiors around a point: those that a ray from it leaves without having entered, in reverse.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::error::Problem;
 use crate::format::image::{Colours, Format, Image, Plane, Transfer};
-use crate::format::obj::{FaceRun, Labels, Obj};
+use crate::format::mesh::{self, Part};
 use crate::format::volume::{MAX_VOXELS, Volume};
 
 /// What stands in the place of a file. Each has a name, for messages, that no other of the same scene has.
@@ -112,7 +112,7 @@ impl Data {
     ///
     /// # Errors
     /// Where it is none: the face or vertex that is wrong.
-    pub fn mesh(&self) -> Result<Obj, Box<Problem>> {
+    pub fn mesh(&self) -> Result<mesh::Mesh, Box<Problem>> {
         const HELP: &str = "give vertices [vertex, 3] and faces [face, 3]";
         let Data::Mesh(Mesh { vertices, faces, uv, normals, .. }) = self else {
             return Err(self.problem("is an array, where a mesh is needed", HELP));
@@ -135,15 +135,8 @@ impl Data {
         let uv = uv.as_ref().map(|uv| self.corners(uv, "uv", vertices.len(), faces)).transpose()?;
         let normals =
             normals.as_ref().map(|normals| self.corners(normals, "normals", vertices.len(), faces)).transpose()?;
-        let part = FaceRun {
-            labels: Labels::default(),
-            line: 0,
-            positions: vertices.clone(),
-            triangles: faces.clone(),
-            uv,
-            normals,
-        };
-        Ok(Obj { parts: vec![part], without_surface: 0, bent: None, crossing: None })
+        let part = Part { positions: vertices.clone(), triangles: faces.clone(), uv, normals, ..Part::default() };
+        Ok(mesh::Mesh { parts: vec![part], ..mesh::Mesh::default() })
     }
 
     fn corners<const N: usize>(

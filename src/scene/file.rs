@@ -16,7 +16,7 @@ use super::medium::Media;
 use super::object::Objects;
 use super::overrides;
 use super::spectrum::Spectra;
-use super::tree::{Entry, Origin};
+use super::tree::{Entry, Origin, Value};
 use super::{Evaluation, Evaluator, Integrator, Sampler, Scene, Wavelengths};
 use crate::error::{Error, Problem, Result};
 
@@ -24,6 +24,8 @@ use crate::error::{Error, Problem, Result};
 /// the most that every driver runs.
 const MAX_BOUNCES: u32 = 16_383;
 const MAX_EPOCH: u32 = 1024;
+/// Of spectral MIS: the state of a path has a number for each.
+const MOST_TECHNIQUES: u32 = 16;
 const MOST_WAVELENGTHS: u32 = 16;
 
 /// Reads the scene in `file`. `overrides` are the `--set` arguments: a dotted key and the text of a TOML value; a bare
@@ -160,6 +162,7 @@ impl Default for Integrator {
             sampler: Sampler::Sobol,
             wavelengths: Wavelengths::Emission,
             wavelengths_per_channel: 1,
+            techniques: None,
             evaluation: Evaluation::Auto,
             evaluator: Evaluator::Auto,
             epoch: 64,
@@ -198,6 +201,11 @@ fn decode_integrator(item: &Item) -> Option<Integrator> {
     };
     let wavelengths_per_channel =
         power_of_two("wavelengths_per_channel", MOST_WAVELENGTHS, default.wavelengths_per_channel);
+    let techniques = match fields.get("techniques") {
+        Some(item) if matches!(&item.node.value, Value::String(word) if word == "auto") => Some(None),
+        Some(item) => item.whole(1..=MOST_TECHNIQUES).map(Some),
+        None => Some(default.techniques),
+    };
     let evaluation = match fields.get("evaluation") {
         Some(item) => item.choice(&Evaluation::ALL.map(|evaluation| (evaluation.name(), evaluation))),
         None => Some(default.evaluation),
@@ -213,6 +221,7 @@ fn decode_integrator(item: &Item) -> Option<Integrator> {
         sampler: sampler?,
         wavelengths: wavelengths?,
         wavelengths_per_channel: wavelengths_per_channel?,
+        techniques: techniques?,
         evaluation: evaluation?,
         evaluator: evaluator?,
         epoch: epoch?,

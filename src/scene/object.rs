@@ -1,12 +1,11 @@
 //! `[[objects]]`: a shape, a material, and what it emits.
 
 use std::collections::HashMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use glam::{DAffine3, DVec3};
 
-use super::arrays::Data;
 use super::closed;
 use super::decode::{Fields, Item, list};
 use super::keys;
@@ -19,7 +18,8 @@ use super::transform;
 use super::tree::Value;
 use super::{Attributes, Emission, Interior, MaterialId, MediumId, Object, Shape, Sides};
 use crate::error::Problem;
-use crate::format::obj::{self, FaceRun, Obj};
+use crate::format::gltf;
+use crate::format::mesh::{self, Format, Mesh, Part, Place};
 
 /// Decodes objects one after the other; a mesh file is read once.
 pub struct Objects<'s, 'a> {
@@ -27,10 +27,18 @@ pub struct Objects<'s, 'a> {
     pub materials: &'s mut Materials<'a>,
     pub media: &'s mut Media<'a>,
     /// `None` where the file is wrong, which has been said.
-    meshes: HashMap<PathBuf, Option<Rc<Obj>>>,
+    meshes: HashMap<PathBuf, Option<Loaded>>,
     scene: Vec<Object>,
     /// Interiors so far.
     bodies: usize,
+}
+
+/// A mesh file in memory.
+#[derive(Clone)]
+enum Loaded {
+    Mesh(Format, Rc<Mesh>),
+    /// Of which each object may have another node.
+    Gltf(Rc<gltf::File>),
 }
 
 /// What all pieces of one object share. An outer `None` is a mistake that has been said; the rest of the object is
@@ -74,8 +82,9 @@ impl<'s, 'a> Objects<'s, 'a> {
         let Some(fields) = item.table(&keys::OBJECT) else { return };
         let shape = fields.exactly_one("shape");
         let group = fields.get("group");
-        if let (Some(group), false) = (&group, fields.has("mesh")) {
-            group.error_help("goes with `mesh` only", "remove it");
+        let node = fields.get("node");
+        for of_mesh in [&group, &node].into_iter().flatten().filter(|_| !fields.has("mesh")) {
+            of_mesh.error_help("goes with `mesh` only", "remove it");
         }
         let mut common = self.common(&fields);
         let named = fields.get("material");
@@ -88,7 +97,7 @@ impl<'s, 'a> Objects<'s, 'a> {
         let Some(shape) = shape else { return };
 
         if shape.path.ends_with(".mesh") {
-            let Some(mesh) = self.read(&shape) else { return };
+            let Some((format, mesh)) = self.read(&shape, group.as_ref(), node.as_ref()) else { return };
             let Some(parts) = pick(&mesh, &shape, group.as_ref()) else { return };
             if fields.has("interior") {
                 common.interior = self.filling(&fields, &Shape::Mesh(shape::join(&parts, Needs::default()).0));
@@ -96,11 +105,11 @@ impl<'s, 'a> Objects<'s, 'a> {
             match covering {
                 Some(covering) => {
                     if let Some(Covering::Invisible) = covering {
-                        self.warn_about_usemtl(&shape, &parts);
+                        self.warn_about_names(&shape, format, &parts);
                     }
-                    self.push_mesh(&fields, &shape, &parts, None, covering, &common);
+                    self.push_mesh(&fields, &shape, format, &parts, covering, &common);
                 }
-                None => self.push_by_usemtl(&fields, &shape, &parts, &common),
+                None => self.push_by_name(&fields, &shape, format, &parts, &common),
             }
             return;
         }
@@ -175,14 +184,15 @@ impl<'s, 'a> Objects<'s, 'a> {
         Some(Some(Filling { body: self.bodies - 1, medium: medium?, bounds: local.bounds() }))
     }
 
-    /// A null boundary leaves usemtl names alone that may have been meant.
-    fn warn_about_usemtl(&self, shape: &Item, parts: &[&FaceRun]) {
+    /// A null boundary leaves names of materials alone that may have been meant.
+    fn warn_about_names(&self, shape: &Item, format: Format, parts: &[&Part]) {
         let named = parts.iter().filter_map(|part| part.labels.material.as_deref());
         if let Some(name) = named.into_iter().find(|name| self.materials.has(name)) {
             shape.cx.warn(format!(
-                "{}: its usemtl names, such as \"{name}\", are not used: without `material` the object is the invisible \
+                "{}: its {} names, such as \"{name}\", are not used: without `material` the object is the invisible \
                  boundary of its interior",
-                file_name(shape)
+                file_name(shape),
+                word_of_materials(format)
             ));
         }
     }
@@ -195,42 +205,93 @@ impl<'s, 'a> Objects<'s, 'a> {
         self.materials.take(name, self.spectra)
     }
 
-    /// The mesh file that `item` names.
-    fn read(&mut self, item: &Item<'a>) -> Option<Rc<Obj>> {
+    /// The mesh that `item`, and `node` where it is glTF, name; a file is read once.
+    fn read(
+        &mut self,
+        item: &Item<'a>,
+        group: Option<&Item<'a>>,
+        node: Option<&Item<'a>>,
+    ) -> Option<(Format, Rc<Mesh>)> {
         let (_, path) = item.source()?;
-        if let Some(known) = self.meshes.get(&path) {
-            return known.clone();
-        }
-        let mesh = match item.data().map_or_else(|| obj::read(&path), Data::mesh) {
-            Ok(mesh) => {
-                warn_about(item, &mesh);
-                Some(Rc::new(mesh))
-            }
-            Err(problem) => {
-                report_in_file(item, *problem);
-                None
+        let loaded = match self.meshes.get(&path) {
+            Some(known) => known.clone(),
+            None => {
+                let loaded = match item.data() {
+                    Some(data) => data.mesh().map(|mesh| Loaded::Mesh(Format::Memory, Rc::new(mesh))),
+                    None => load(&path),
+                };
+                let loaded = match loaded {
+                    Ok(loaded) => Some(loaded),
+                    Err(problem) => {
+                        report_in_file(item, *problem);
+                        None
+                    }
+                };
+                if let Some(Loaded::Mesh(_, mesh)) = &loaded {
+                    warn_about(item, mesh);
+                }
+                self.meshes.insert(path, loaded.clone());
+                loaded
             }
         };
-        self.meshes.insert(path, mesh.clone());
-        mesh
+        match loaded? {
+            Loaded::Mesh(format, mesh) => {
+                let wrong = [(node, true, "glTF"), (group, format != Format::Obj, "OBJ")];
+                for (key, _, kind) in wrong.into_iter().filter(|(_, is_wrong, _)| *is_wrong) {
+                    if let Some(key) = key {
+                        key.error_help(format!("goes with {kind} meshes only"), "remove it");
+                        return None;
+                    }
+                }
+                Some((format, mesh))
+            }
+            Loaded::Gltf(file) => {
+                if let Some(group) = group {
+                    group.error_help("goes with OBJ meshes only", "use `node`, or remove it");
+                    return None;
+                }
+                let name = match node {
+                    Some(node) => Some(node.text()?),
+                    None => None,
+                };
+                match file.mesh(name) {
+                    Ok(mesh) => {
+                        warn_about(item, &mesh);
+                        Some((Format::Gltf, Rc::new(mesh)))
+                    }
+                    Err(message) => {
+                        report_in_file(item, *file.problem(message));
+                        None
+                    }
+                }
+            }
+        }
     }
 
-    /// One object for each `usemtl` name, in the order of the file.
-    fn push_by_usemtl(&mut self, fields: &Fields<'a>, shape: &Item<'a>, parts: &[&FaceRun], common: &Common) {
+    /// One object for each material that the file names, in its order.
+    fn push_by_name(
+        &mut self,
+        fields: &Fields<'a>,
+        shape: &Item<'a>,
+        format: Format,
+        parts: &[&Part],
+        common: &Common,
+    ) {
         let mut names: Vec<&str> = Vec::new();
         let mut bare = None;
         for part in parts {
             match part.labels.material.as_deref() {
                 Some(name) if !names.contains(&name) => names.push(name),
                 Some(_) => {}
-                None => bare = bare.or(Some(part.line)),
+                None => bare = bare.or(Some(&part.place)),
             }
         }
-        if let Some(line) = bare {
+        let word = word_of_materials(format);
+        if let Some(place) = bare {
             let file = file_name(shape);
             let message = match names.len() {
-                0 => format!("the object has no `material`, and {file} no usemtl"),
-                _ => format!("the object has no `material`, and the faces from line {line} of {file} have no usemtl"),
+                0 => format!("the object has no `material`, and {file} no {word}"),
+                _ => format!("the object has no `material`, and the faces from {place} of {file} have no {word}"),
             };
             no_material(fields, &message);
             return;
@@ -239,23 +300,24 @@ impl<'s, 'a> Objects<'s, 'a> {
         if !unknown.is_empty() {
             shape.error_help(
                 format!("{} uses materials that [materials] does not have: {}", file_name(shape), list(&unknown)),
-                format!("define them, or set `material`; the file's usemtl names are {}", list(&names)),
+                format!("define them, or set `material`; the file's {word} names are {}", list(&names)),
             );
         }
         for name in names {
-            let of_name: Vec<&FaceRun> =
+            let of_name: Vec<&Part> =
                 parts.iter().copied().filter(|part| part.labels.material.as_deref() == Some(name)).collect();
             let material = self.materials.take(name, self.spectra);
-            self.push_mesh(fields, shape, &of_name, Some(name), material.map(Covering::Of), common);
+            self.push_mesh(fields, shape, format, &of_name, material.map(Covering::Of), common);
         }
     }
 
+    /// The parts as one object; where their file named its material, that stands in its name.
     fn push_mesh(
         &mut self,
         fields: &Fields<'a>,
         shape: &Item<'a>,
-        parts: &[&FaceRun],
-        usemtl: Option<&str>,
+        format: Format,
+        parts: &[&Part],
         covering: Option<Covering>,
         common: &Common,
     ) {
@@ -268,13 +330,20 @@ impl<'s, 'a> Objects<'s, 'a> {
                 (_, true) => format!("material \"{}\" has two roughnesses", self.materials.name(material)),
                 _ => "the emission is textured".to_owned(),
             };
-            let message = match shape.data() {
-                Some(_) => format!("{what}, but the mesh has no texture coordinates (`uv`)"),
-                None => format!("{what}, but the faces from here on have no texture coordinates (vt)"),
+            let from = match &part.place {
+                Place::Line(_) => "the faces from here on have".to_owned(),
+                Place::File => "it has".to_owned(),
+                place => format!("the triangles from {place} on have"),
             };
+            let word = match format {
+                Format::Obj => " (vt)",
+                Format::Memory => " (`uv`)",
+                _ => "",
+            };
+            let message = format!("{what}, but {from} no texture coordinates{word}");
             shape.cx.push(Problem {
                 file: shape.source().unwrap_or_default().1,
-                line: (part.line > 0).then_some(part.line),
+                line: part.place.line(),
                 key: Some(shape.path.clone()),
                 message,
                 help: Some("export the mesh with its UV map, or give it another material".to_owned()),
@@ -282,7 +351,8 @@ impl<'s, 'a> Objects<'s, 'a> {
             });
             return;
         }
-        let label = usemtl.map_or_else(String::new, |name| format!(", material \"{name}\""));
+        let named = parts.first().and_then(|part| part.labels.material.as_ref()).filter(|_| !fields.has("material"));
+        let label = named.map_or_else(String::new, |name| format!(", material \"{name}\""));
         let name = format!("{} ({}{label})", fields.path, file_name(shape));
         let (mesh, attributes) = shape::join(parts, needs);
         if needs.tangent {
@@ -377,10 +447,10 @@ fn no_material(fields: &Fields, message: &str) {
 }
 
 /// The parts that `group` picks, or all.
-fn pick<'m>(mesh: &'m Obj, shape: &Item, group: Option<&Item>) -> Option<Vec<&'m FaceRun>> {
+fn pick<'m>(mesh: &'m Mesh, shape: &Item, group: Option<&Item>) -> Option<Vec<&'m Part>> {
     let Some(group) = group else { return Some(mesh.parts.iter().collect()) };
     let wanted = group.text()?;
-    let parts: Vec<&FaceRun> = mesh.parts.iter().filter(|part| part.labels.in_group(wanted)).collect();
+    let parts: Vec<&Part> = mesh.parts.iter().filter(|part| part.labels.in_group(wanted)).collect();
     if parts.is_empty() {
         let mut names: Vec<&str> = Vec::new();
         for label in mesh.parts.iter().flat_map(|p| [p.labels.object.as_deref(), p.labels.group.as_deref()]).flatten() {
@@ -399,21 +469,42 @@ fn pick<'m>(mesh: &'m Obj, shape: &Item, group: Option<&Item>) -> Option<Vec<&'m
     Some(parts)
 }
 
-fn warn_about(item: &Item, mesh: &Obj) {
+/// What a format calls the names of materials that it has.
+fn word_of_materials(format: Format) -> &'static str {
+    match format {
+        Format::Obj => "usemtl",
+        Format::Ply | Format::Stl | Format::Gltf | Format::Memory => "material",
+    }
+}
+
+fn load(path: &Path) -> Result<Loaded, Box<Problem>> {
+    let bytes = mesh::content(path)?;
+    Ok(match Format::of(path, &bytes) {
+        Format::Gltf => Loaded::Gltf(Rc::new(gltf::parse(&bytes, path)?)),
+        format => Loaded::Mesh(format, Rc::new(mesh::parse(format, &bytes, path)?)),
+    })
+}
+
+fn warn_about(item: &Item, mesh: &Mesh) {
     let file = file_name(item);
     if mesh.without_surface > 0 {
         item.cx.warn(format!("{file}: {} points and lines have no surface and are left out", mesh.without_surface));
     }
-    if let Some((count, line)) = mesh.bent {
+    if let Some((count, place)) = &mesh.flaws.bent {
         item.cx.warn(format!(
-            "{file}: {count} faces of more than three corners, the first on line {line}, do not lie in one plane: how they are cut \
-             into triangles is a choice"
+            "{file}: {count} faces of more than three corners, the first {}, do not lie in one plane: how they are cut \
+             into triangles is a choice",
+            place.on()
         ));
     }
-    if let Some((count, line)) = mesh.crossing {
+    if let Some((count, place)) = &mesh.flaws.crossing {
         item.cx.warn(format!(
-            "{file}: the outlines of {count} faces, the first on line {line}, cross themselves: what they cover is not clear"
+            "{file}: the outlines of {count} faces, the first {}, cross themselves: what they cover is not clear",
+            place.on()
         ));
+    }
+    for note in &mesh.notes {
+        item.cx.warn(format!("{file}: {note}"));
     }
 }
 

@@ -167,7 +167,7 @@ fn rivals(parents: &[&str], key: &str) -> Vec<&'static str> {
         ["objects", _] => {
             let mut rivals = others(&keys::OBJECT);
             if is_one_of(&keys::OBJECT) && key != "mesh" {
-                rivals.push("group");
+                rivals.extend(["group", "node"]);
             }
             rivals
         }

@@ -6,7 +6,7 @@ use super::decode::{Fields, Item};
 use super::keys;
 use super::material::Needs;
 use super::{Attributes, Mesh, Shape};
-use crate::format::obj::FaceRun;
+use crate::format::mesh::Part;
 
 /// The shape `item` spells, one of sphere, quad, disk, cube and cylinder.
 pub fn decode(item: &Item) -> Option<Shape> {
@@ -117,9 +117,9 @@ fn axes_about(axis: DVec3) -> DMat3 {
     DMat3::from_cols(x.normalize(), axis, z.normalize())
 }
 
-/// The parts of an OBJ file in one mesh, with the attributes that `needs` asks for. Where there are texture coordinates,
+/// The parts of a mesh file in one mesh, with the attributes that `needs` asks for. Where there are texture coordinates,
 /// all parts have them.
-pub fn join(parts: &[&FaceRun], needs: Needs) -> (Mesh, Attributes) {
+pub fn join(parts: &[&Part], needs: Needs) -> (Mesh, Attributes) {
     let (mut mesh, mut attributes) = (Mesh::default(), Attributes::default());
     if needs.uv || needs.tangent {
         let corners = parts.iter().filter_map(|part| part.uv.as_ref()).flatten();

@@ -9,8 +9,9 @@ use proptest::prelude::*;
 use proptest::sample::Index;
 use proptest::test_runner::TestRunner;
 use spectile::error::Problem;
+use spectile::format::mesh::{self, Format};
 use spectile::format::text::{self, Column, SpectrumTable};
-use spectile::format::{image, maps, obj, refractive, response, volume};
+use spectile::format::{image, maps, phase, refractive, response, volume};
 use tempfile::{TempDir, tempdir};
 
 use crate::binary::repository;
@@ -22,6 +23,7 @@ enum Reader {
     Index,
     Responses,
     Columns,
+    Phase,
     Map,
     Volume,
     Picture,
@@ -66,6 +68,57 @@ const MESH: &str = "mtllib a.mtl\no a\nv 0 0 0\nv 4 0 0\nv 4 4 0\nv 0 4 0\nv 1 1
     f 1/1/1 2/2/1 3/3/1\nf 1 5 3 4\ng b\nf -1 -2 -3\n";
 const PAGE: &str = "REFERENCES: \"made up\"\nDATA:\n  - type: formula 2\n    wavelength_range: 0.4 2.0\n    coefficients: 0 1.04 0.006 \
     0.23 0.02 1.01 103.5\n  - type: tabulated k\n    data: |\n        0.4 1e-9\n        0.5 -1e-10\n        0.5 2e-9\n        0.8 1e-9\n";
+
+const PLY: &str = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty float u\n\
+    property float v\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0 0 0\n1 0 0 1 0\n1 1 0 1 1\n0 1 0 0 1\n\
+    4 0 1 2 3\n3 2 1 0\n";
+const STL: &str = "solid a\n facet normal 0 0 1\n  outer loop\n   vertex 0 0 0\n   vertex 1 0 0\n   vertex 0 1 0\n  endloop\n\
+    endfacet\nendsolid a\n";
+const GLTF: &str = r#"{"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
+    "nodes": [{"mesh": 0, "children": [1], "scale": [1, 2, -1]}, {"mesh": 0, "rotation": [0, 0, 1, 1], "name": "b"}],
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "NORMAL": 0, "TEXCOORD_0": 1}, "mode": 5, "material": 0}]}],
+    "materials": [{"name": "red"}],
+    "accessors": [{"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 3, "sparse": {"count": 1,
+        "indices": {"bufferView": 1, "componentType": 5121}, "values": {"bufferView": 0, "byteOffset": 12}}},
+        {"bufferView": 0, "componentType": 5123, "normalized": true, "byteOffset": 4, "type": "VEC2", "count": 3}],
+    "bufferViews": [{"buffer": 0, "byteLength": 48, "byteStride": 12}, {"buffer": 0, "byteLength": 4}],
+    "buffers": [{"byteLength": 48, "uri": "m.bin"}]}"#;
+
+/// In big bytes, with elements that do not matter.
+fn ply() -> Vec<u8> {
+    let mut bytes = b"ply\nformat binary_big_endian 1.0\nelement extra 1\nproperty list uchar short a\nelement vertex 3\n\
+        property float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar uint vertex_index\nend_header\n"
+        .to_vec();
+    bytes.extend([1, 0, 7]);
+    bytes.extend([0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].iter().flat_map(|x| x.to_be_bytes()));
+    bytes.push(3);
+    bytes.extend([0u32, 1, 2].iter().flat_map(|i| i.to_be_bytes()));
+    bytes
+}
+
+fn stl() -> Vec<u8> {
+    let mut bytes = vec![b'x'; 80];
+    bytes.extend(1u32.to_le_bytes());
+    bytes.extend(floats([0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]));
+    bytes.extend([0, 0]);
+    bytes
+}
+
+/// [`GLTF`] with its buffer in itself.
+fn glb() -> Vec<u8> {
+    let mut json = GLTF.replace(", \"uri\": \"m.bin\"", "").into_bytes();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let mut bytes = b"glTF".to_vec();
+    for word in [2, 12 + 8 + json.len() as u32 + 8 + 48, json.len() as u32] {
+        bytes.extend(u32::to_le_bytes(word));
+    }
+    bytes.extend(b"JSON");
+    bytes.extend(json);
+    bytes.extend(48u32.to_le_bytes());
+    bytes.extend(b"BIN\0");
+    bytes.extend(floats((0..12).map(|i| i as f32)));
+    bytes
+}
 
 fn floats(values: impl IntoIterator<Item = f32>) -> Vec<u8> {
     values.into_iter().flat_map(f32::to_le_bytes).collect()
@@ -139,6 +192,7 @@ fn valid_files() -> Vec<Valid> {
         one("a.csv", Reader::Spectrum(Column::Named("a")), TABLE),
         one("a.csv", Reader::Spectrum(Column::Number(3)), TABLE),
         one("a.csv", Reader::Columns, "nm,300,600 K\n400,1,2\n500,1,2\n"),
+        one("mie.csv", Reader::Phase, "degrees,400,0.7 um\n0,90,50\n10,2,3\n90,0.2,0.3\n180,0.5,0.4\n"),
         one("excel.csv", ONLY, utf16),
         one("lamp.spd", ONLY, "400 1 # begins\n500 2\n"),
         one("a.txt", Reader::Index, "wl\tn\n0.4\t1.5\n0.7\t1.4\n\nwl\tk\n0.4\t0\n0.7\t1\n"),
@@ -183,6 +237,16 @@ fn valid_files() -> Vec<Valid> {
         one("a.exr", Reader::Picture, case("abundance-by-name/abundance.exr")),
         one("a.png", Reader::Picture, png()),
         one("m.obj", Reader::Mesh, MESH),
+        one("m.ply", Reader::Mesh, PLY),
+        one("m.ply", Reader::Mesh, ply()),
+        one("m.stl", Reader::Mesh, STL),
+        one("m.stl", Reader::Mesh, stl()),
+        Valid {
+            open: "m.gltf",
+            reader: Reader::Mesh,
+            files: vec![("m.gltf", GLTF.into()), ("m.bin", floats((0..12).map(|i| i as f32)))],
+        },
+        one("m.glb", Reader::Mesh, glb()),
     ]
 }
 
@@ -271,6 +335,12 @@ fn read(reader: Reader, path: &Path) -> Result<(), Box<Problem>> {
             let responses = response::read_responses(path)?;
             assert!(responses.named.iter().all(|(_, response)| response.integral() > 0.0));
         }
+        Reader::Phase => {
+            let table = phase::read(path)?.table;
+            assert!(table.degrees.len() >= 2 && table.degrees.is_sorted() && table.nm.is_sorted());
+            assert!(table.values.iter().all(|column| column.len() == table.degrees.len()));
+            assert!(table.values.iter().flatten().all(|value| value.is_finite() && *value >= 0.0));
+        }
         Reader::Columns => text::read_columns(path)?.iter().for_each(|(_, table)| check_table(table)),
         Reader::Map => {
             let map = maps::read(path)?;
@@ -287,10 +357,13 @@ fn read(reader: Reader, path: &Path) -> Result<(), Box<Problem>> {
             assert!(picture.planes.iter().all(|plane| plane.samples.len() == width * height));
         }
         Reader::Mesh => {
-            let mesh = obj::read(path)?;
+            let bytes = mesh::content(path)?;
+            let mesh = mesh::parse(Format::of(path, &bytes), &bytes, path)?;
             for part in &mesh.parts {
                 assert!(part.positions.iter().flatten().all(|x| x.is_finite()));
                 assert!(part.triangles.iter().flatten().all(|i| (*i as usize) < part.positions.len()));
+                let given = [part.uv.as_ref().map(Vec::len), part.normals.as_ref().map(Vec::len)];
+                assert!(given.into_iter().flatten().all(|corners| corners == part.triangles.len()));
             }
         }
     }

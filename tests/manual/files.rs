@@ -25,12 +25,14 @@ pub fn make(folder: &Path) {
         b"DATA:\n  - type: tabulated n\n    data: |\n      0.35 1.539\n      0.6 1.516\n      0.85 1.510\n",
     );
     write("sensor.csv", b"nm,blue,red\n430,0,\n460,1,\n500,0,\n580,,0\n620,,1\n680,,0\n");
+    write("mie.csv", b"degrees,300,900\n0,9,5\n10,2,2\n180,0.9,0.9\n");
     write("co2.csv", b"nm,300,600,1000\n300,0,0.1,0.2\n900,0.3,0.4,0.5\n");
     write("h2o.csv", b"nm,300,600,1000\n300,1,2,3\n900,0,0,0.5\n");
     write(
         "floor.obj",
         b"g tiles\nusemtl floor\nv -1 0 -1\nv -1 0 1\nv 1 0 1\nv 1 0 -1\nf 1 2 3 4\ng rest\nv 1 0 3\nf 2 5 3\n",
     );
+    write("cage.gltf", CAGE.as_bytes());
     write("albedo.png", &png(png::ColorType::Rgb, &[200, 120, 40, 60, 70, 80]));
     write("abundance.png", &png(png::ColorType::Rgb, &[100, 100, 55, 0, 200, 0]));
     write("mask.png", &png(png::ColorType::Grayscale, &[0, 128]));
@@ -44,6 +46,15 @@ pub fn make(folder: &Path) {
         array.store_array_subset(&array.subset_all(), &[value; 6]).expect("written");
     }
 }
+
+/// Two nodes with one triangle, above the floor.
+const CAGE: &str = r#"{"asset": {"version": "2.0"}, "scenes": [{"nodes": [0, 1]}],
+    "nodes": [{"name": "bars", "mesh": 0, "translation": [0, 1, 0]}, {"name": "lock", "mesh": 0}],
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}}]}],
+    "accessors": [{"bufferView": 0, "componentType": 5121, "type": "VEC3", "count": 3},
+        {"bufferView": 0, "componentType": 5121, "type": "VEC2", "count": 3}],
+    "bufferViews": [{"buffer": 0, "byteLength": 9}],
+    "buffers": [{"byteLength": 9, "uri": "data:application/octet-stream;base64,AAAAAQAAAAEA"}]}"#;
 
 /// Two pixels beside each other.
 fn png(colour: png::ColorType, data: &[u8]) -> Vec<u8> {

@@ -12,6 +12,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("gpu", &[]),
     ("spectral", &[]),
     ("format", &["spectral"]),
+    ("import", &["spectral", "format"]),
     ("scene", &["spectral", "format"]),
     ("reference", &["scene", "spectral"]),
     // Of gpu the type of a kernel's text alone, which has no word of wgpu.
@@ -27,8 +28,8 @@ const ARROWS: &[(&str, &[&str])] = &[
     (
         "cli",
         &[
-            "stress", "report", "slurm", "render", "preview", "export", "sensor", "cube", "device", "gpu", "scene",
-            "format", "spectral",
+            "stress", "report", "slurm", "render", "preview", "export", "sensor", "cube", "device", "gpu", "import",
+            "scene", "format", "spectral",
         ],
     ),
 ];

@@ -5,6 +5,7 @@ mod heat;
 mod lights;
 mod materials;
 mod media;
+mod meshes;
 mod never_panics;
 mod resolved;
 mod sun;

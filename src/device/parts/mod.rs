@@ -11,6 +11,7 @@ pub mod opacity;
 pub mod origins;
 pub mod paths;
 pub mod radiators;
+pub mod scattering;
 pub mod sky;
 pub mod spectra;
 pub mod surfaces;

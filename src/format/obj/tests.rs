@@ -2,7 +2,7 @@
 
 use super::*;
 
-fn obj(text: &str) -> Result<Obj, Box<Problem>> {
+fn obj(text: &str) -> Result<Mesh, Box<Problem>> {
     parse(text.as_bytes(), Path::new("m.obj"))
 }
 
@@ -19,8 +19,8 @@ fn convex_polygons_become_fans() {
     assert_eq!(pentagon.parts[0].triangles, [[0, 1, 2], [0, 2, 3], [0, 3, 4]]);
 }
 
-fn area(mesh: &Obj) -> f64 {
-    let of = |part: &FaceRun| -> f64 {
+fn area(mesh: &Mesh) -> f64 {
+    let of = |part: &Part| -> f64 {
         let at = |i: u32| glam::DVec3::from_array(part.positions[i as usize]);
         part.triangles.iter().map(|t| 0.5 * (at(t[1]) - at(t[0])).cross(at(t[2]) - at(t[0])).z).sum()
     };
@@ -40,14 +40,14 @@ fn other_polygons_cover_their_outline_and_no_more() {
         assert!((area(&mesh) - expected).abs() < 1e-12, "{text}: {}", area(&mesh));
         let part = &mesh.parts[0];
         let single =
-            |t: &[u32; 3]| area(&Obj { parts: vec![FaceRun { triangles: vec![*t], ..part.clone() }], ..mesh.clone() });
+            |t: &[u32; 3]| area(&Mesh { parts: vec![Part { triangles: vec![*t], ..part.clone() }], ..mesh.clone() });
         assert!(part.triangles.iter().all(|t| single(t) > 0.0), "{text}: {:?}", part.triangles);
-        assert_eq!((mesh.bent, mesh.crossing), (None, None), "{text}");
+        assert_eq!(mesh.flaws, Flaws::default(), "{text}");
     }
     let bent = obj("v 0 0 0\nv 1 0 0\nv 1 1 0.5\nv 0 1 0\n\nf 1 2 3 4\n").unwrap();
-    assert_eq!((bent.bent, bent.crossing), (Some((1, 6)), None));
+    assert_eq!(bent.flaws, Flaws { bent: Some((1, Place::Line(6))), crossing: None });
     let crossing = obj("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3 4\n").unwrap();
-    assert_eq!(crossing.crossing, Some((1, 5)));
+    assert_eq!(crossing.flaws.crossing, Some((1, Place::Line(5))));
 }
 
 #[test]
@@ -64,7 +64,7 @@ fn parts_carry_object_group_and_material() {
                 p.labels.object.as_deref(),
                 p.labels.group.as_deref(),
                 p.labels.material.as_deref(),
-                p.line,
+                p.place.line().unwrap_or(0),
                 p.triangles.len(),
             )
         })
@@ -97,7 +97,7 @@ fn normals_and_texture_coordinates_stand_at_corners() {
          f 1//1 2//1 3//2\nf 1/1 2/2 4/3\nf 1/1/1 2/2 3/3/1 4/1/2\n"
     );
     let mesh = obj(&text).unwrap();
-    let given = |p: &FaceRun| (p.line, p.triangles.len(), p.uv.is_some(), p.normals.is_some());
+    let given = |p: &Part| (p.place.line().unwrap_or(0), p.triangles.len(), p.uv.is_some(), p.normals.is_some());
     let given: Vec<_> = mesh.parts.iter().map(given).collect();
     assert_eq!(given, [(10, 2, true, true), (12, 1, false, true), (13, 3, true, false)]);
     let whole = &mesh.parts[0];

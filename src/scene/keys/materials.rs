@@ -8,7 +8,7 @@ pub static MATERIAL: Section = Section {
     path: "materials.NAME",
     heading: "`[materials.NAME.KIND]`",
     summary: "what a surface does with light",
-    about: "A material has one of six kinds. Objects name it, and so do `usemtl` lines of OBJ files.",
+    about: "A material has one of six kinds. Objects name it, and so do `usemtl` lines of OBJ files and materials of glTF files.",
     keys: &[
         Key::one_of("diffuse", Table, "Lambert's law.").tables(&[&DIFFUSE]),
         Key::one_of("conductor", Table, "A metal, smooth, rough or brushed.").tables(&[&CONDUCTOR]),

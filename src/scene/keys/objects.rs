@@ -10,7 +10,7 @@ pub static OBJECT: Section = Section {
     summary: "a shape, its material, and what it emits",
     about: "An object has one shape.",
     keys: &[
-        Key::one_of("mesh", File, "A Wavefront OBJ file; see [Meshes](#meshes)."),
+        Key::one_of("mesh", File, "An OBJ, PLY, STL or glTF 2.0 (.gltf, .glb) file; see [Meshes](#meshes)."),
         Key::one_of("sphere", Table, "").tables(&[&SPHERE]),
         Key::one_of("quad", Table, "A parallelogram.").tables(&[&QUAD]),
         Key::one_of("disk", Table, "").tables(&[&DISK]),
@@ -20,7 +20,13 @@ pub static OBJECT: Section = Section {
             "group",
             Text,
             "all faces",
-            "The faces of a mesh that stand under this `o` or `g`. With `mesh` only.",
+            "The faces of an OBJ mesh that stand under this `o` or `g`. With `mesh` only.",
+        ),
+        Key::optional(
+            "node",
+            Text,
+            "all nodes",
+            "The node of a glTF mesh that has this name, with what hangs on it, where the file puts it. With `mesh` only.",
         ),
         Key::optional("material", Name("material"), "see below", "One of `[materials]`."),
         Key::optional(
@@ -54,6 +60,12 @@ mesh = "floor.obj"
 group = "tiles"
 material = "floor"
 transform = { scale = 0.01, rotate = [1, 0, 0, 90], translate = [0, 0, 0.2] }
+"#,
+        r#"
+[[objects]]
+mesh = "cage.gltf"
+node = "bars"
+material = "floor"
 "#,
         r#"
 [[objects]]                            # a lamp
@@ -94,7 +106,8 @@ material = "ball"
 "#,
     ],
     notes: "Without `material` an object with an `interior` is a *null boundary*: nothing but the bound of its gas, \
-            invisible and no bounce. A mesh without `material` takes its `usemtl` names as names of materials. \
+            invisible and no bounce. A mesh without `material` takes the names of materials in its file (OBJ: `usemtl`; \
+            glTF: `name`, or `material N` for the one at index N that has none) as those of materials here. \
             Anything else needs one.",
 };
 

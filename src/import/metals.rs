@@ -1,0 +1,89 @@
+//! Indices of refraction by the names that formats have for them.
+
+use crate::spectral::{Curve, Outside};
+
+/// Of metals, n and k; see the head of the file for where they are from.
+const METALS: &str = include_str!("data/metals.csv");
+
+/// Of other matter at 589 nm: Hecht, Optics, 4th edition, as Mitsuba lists them.
+const MATTER: [(&str, f64); 23] = [
+    ("vacuum", 1.0),
+    ("helium", 1.000036),
+    ("hydrogen", 1.000132),
+    ("air", 1.000277),
+    ("carbon dioxide", 1.00045),
+    ("water", 1.333),
+    ("acetone", 1.36),
+    ("ethanol", 1.361),
+    ("carbon tetrachloride", 1.461),
+    ("glycerol", 1.4729),
+    ("benzene", 1.501),
+    ("silicone oil", 1.52045),
+    ("bromine", 1.661),
+    ("water ice", 1.31),
+    ("fused quartz", 1.458),
+    ("pyrex", 1.47),
+    ("acrylic glass", 1.49),
+    ("polypropylene", 1.49),
+    ("bk7", 1.5046),
+    ("sodium chloride", 1.544),
+    ("amber", 1.55),
+    ("pet", 1.575),
+    ("diamond", 2.419),
+];
+
+/// n and k of a metal.
+pub fn metal(name: &str) -> Option<[Curve; 2]> {
+    let (mut nm, mut n, mut k) = (Vec::new(), Vec::new(), Vec::new());
+    for row in METALS.lines().filter(|row| !row.starts_with('#')) {
+        let mut cells = row.split(',');
+        if cells.next() != Some(name) {
+            continue;
+        }
+        let mut next = || cells.next().and_then(|cell| cell.parse::<f64>().ok()).unwrap_or(0.0);
+        nm.push(next());
+        n.push(next());
+        k.push(next());
+    }
+    let curve = |value| Curve::Linear { nm: nm.clone(), value, outside: Outside::Hold };
+    (!n.is_empty()).then(|| [curve(n), curve(k)])
+}
+
+/// The names of all metals.
+pub fn names() -> Vec<&'static str> {
+    let mut names: Vec<&str> =
+        METALS.lines().filter(|row| !row.starts_with('#')).skip(1).filter_map(|row| row.split(',').next()).collect();
+    names.dedup();
+    names
+}
+
+/// The index of clear matter, by its name in any letters.
+pub fn matter(name: &str) -> Option<f64> {
+    MATTER.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)).map(|(_, index)| *index)
+}
+
+/// Those names, for messages.
+pub fn matters() -> Vec<&'static str> {
+    MATTER.iter().map(|(name, _)| *name).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tables_are_whole() {
+        for name in names() {
+            let [n, k] = metal(name).unwrap();
+            for curve in [n, k] {
+                let Curve::Linear { nm, value, .. } = curve else { panic!("{name}") };
+                assert!(nm.is_sorted() && nm.len() >= 6 && value.iter().all(|v| *v >= 0.0), "{name}");
+            }
+        }
+        let [n, k] = metal("Au").unwrap();
+        // Johnson and Christy (1972) have 0.25 and 3.0 at 600 nm.
+        assert!((n.eval(600.0) - 0.25).abs() < 0.02 && (k.eval(600.0) - 3.0).abs() < 0.1);
+        assert_eq!((matter("Acrylic Glass"), matter("unobtainium")), (Some(1.49), None));
+        assert!(metal("Xx").is_none());
+    }
+}
