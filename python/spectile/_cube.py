@@ -17,8 +17,9 @@ from . import _spectile
 from ._engine import Engine, Temporary
 from ._errors import UsageError
 
-# A picture in a notebook is reduced to this many pixels.
+# A picture in a notebook is reduced to this many pixels, and one that takes more bytes to read is not shown.
 SHOWN_PIXELS = 1 << 18
+MOST_BYTES = 1 << 28
 
 
 class Cube(xarray.Dataset):
@@ -93,6 +94,10 @@ def tone(linear: Any, exposure: float | None = None) -> tuple[numpy.ndarray, flo
 
     Without `exposure` the 99th percentile of lit pixels is white. What is brighter or outside the gamut is cut, NaN is black: the same
     bytes as in pictures of `spectile export`.
+
+    >>> picture, ev = tone(numpy.full((1, 2, 3), 0.5), exposure=1.0)
+    >>> picture.shape, picture.dtype.name, int(picture[0, 0, 0]), ev
+    ((1, 2, 3), 'uint8', 255, 1.0)
     """
     linear = numpy.ascontiguousarray(linear, dtype=numpy.float32)
     ev, data = _spectile.tone(linear, exposure)
@@ -121,6 +126,8 @@ def _reduced(size: int, other: int) -> int:
 
 
 def _picture(preview: xarray.DataArray) -> str:
+    if preview.nbytes > MOST_BYTES:
+        return f"<p>a picture of {preview.nbytes / (1 << 20):.0f} MiB: spectile.rgb shows it</p>"
     factor = _reduced(*preview.shape[:2])
     picture, ev = tone(preview[::factor, ::factor].values)
     data = base64.b64encode(png(picture)).decode()

@@ -101,6 +101,15 @@ def render(
     render in order and raises KeyboardInterrupt: what was merged stays in the cube, and `resume=True` goes on from there; a second one
     does not wait for that. The same scene, settings and seed give the same bytes as the program `spectile render`.
 
+    >>> cube = render({
+    ...     "camera": {"orthographic": {"position": [0, 0, 1], "look_at": [0, 0, 0], "up": [0, 1, 0], "width": 2}},
+    ...     "film": {"width": 4, "height": 2},
+    ...     "channels": {"equal": {"from": 400, "to": 700, "count": 3}},  # nm
+    ...     "environment": {"radiance": 0.25},  # W m-2 sr-1 nm-1, seen by every pixel
+    ... }, spp=1)
+    >>> cube.radiance.dims, cube.radiance.shape, float(cube.radiance.min()), cube.radiance.attrs["units"]
+    (('wavelength', 'y', 'x'), (3, 2, 4), 0.25, 'W m-2 sr-1 nm-1')
+
     Raises `SceneError`, `UsageError`, `NoDevice`, `DeviceLost`, `DeviceMemoryError`, `StorageError`, `Stopped`.
     """
     settings = {name: value for name, value in locals().items() if name not in ("scene", "out")}

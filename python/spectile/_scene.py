@@ -77,6 +77,17 @@ class Scene(dict[str, Any]):
         (width and height in pixels) and `bounds_nm`, the two ends of each channel.
 
         Raises `SceneError` with every independent mistake.
+
+        >>> import numpy
+        >>> scene = Scene({
+        ...     "camera": {"orthographic": {"position": [0, 0, 1], "look_at": [0, 0, 0], "up": [0, 1, 0], "width": 2}},
+        ...     "film": {"width": 4, "height": 2},
+        ...     "channels": {"intervals": numpy.array([[400, 500], [500, 700]])},  # [channel, 2], nm
+        ...     "environment": {"radiance": numpy.array([[400, 0.0], [700, 0.3]])},  # [n, 2]: nm, W m-2 sr-1 nm-1
+        ... })
+        >>> facts = scene.check()
+        >>> facts["size"], facts["bounds_nm"], len(facts["digest"])
+        ([4, 2], [[400.0, 500.0], [500.0, 700.0]], 64)
         """
         return self._draft().check(_overrides(overrides))
 

@@ -252,6 +252,13 @@ def to_colour(spectra: xarray.DataArray) -> Any:
     order of its other dimensions, labelled by their positions. Wavelengths must be in nm, and ascend once sorted.
 
     Raises ImportError where colour-science is not installed.
+
+    >>> import numpy, xarray
+    >>> flat = xarray.DataArray(numpy.ones((3, 2)), dims=("wavelength", "x"), coords={"wavelength": [400.0, 500.0, 600.0]})
+    >>> to_colour(flat.isel(x=0)).values.tolist()
+    [1.0, 1.0, 1.0]
+    >>> to_colour(flat).labels
+    ['0', '1']
     """
     import colour
     import numpy

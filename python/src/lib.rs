@@ -11,6 +11,7 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyAny, PyBytes, PyDict, PyList};
+use spectile::cli::catch;
 use spectile::scene;
 use spectile::spectral::tone::Picture;
 use spectile::spectral::{D65, columns};
@@ -30,7 +31,7 @@ impl Draft {
 
     /// Checks everything that the scene says and names: its digest, warnings, size and wavelengths.
     fn check<'py>(&self, py: Python<'py>, overrides: Vec<(String, String)>) -> PyResult<Bound<'py, PyDict>> {
-        let scene = py.detach(|| self.0.resolve(&overrides)).map_err(|error| errors::raise(py, &error))?;
+        let scene = py.detach(|| catch(|| self.0.resolve(&overrides))).map_err(|error| errors::raise(py, &error))?;
         let facts = PyDict::new(py);
         facts.set_item("digest", &scene.digest)?;
         facts.set_item("warnings", &scene.warnings)?;
@@ -43,7 +44,7 @@ impl Draft {
 /// The text of a scene file and its tree as nested dicts and lists.
 #[pyfunction]
 fn read_scene(py: Python<'_>, file: PathBuf) -> PyResult<(String, Bound<'_, PyDict>)> {
-    let (text, root) = scene::read(&file).map_err(|error| errors::raise(py, &error))?;
+    let (text, root) = catch(|| scene::read(&file)).map_err(|error| errors::raise(py, &error))?;
     Ok((text, tree::dict(py, &root)?))
 }
 
@@ -62,10 +63,13 @@ fn tone<'py>(
     let side =
         |n: usize| u32::try_from(n).map_err(|_| pyo3::exceptions::PyValueError::new_err("the picture is too large"));
     let picture = Picture { size: [side(width)?, side(height)?], rgb };
-    let (ev, bytes) = py.detach(|| {
-        let ev = exposure.unwrap_or_else(|| picture.auto_exposure());
-        (ev, picture.to_srgb8(ev))
+    let toned = py.detach(|| {
+        catch(|| {
+            let ev = exposure.unwrap_or_else(|| picture.auto_exposure());
+            Ok((ev, picture.to_srgb8(ev)))
+        })
     });
+    let (ev, bytes) = toned.map_err(|error| errors::raise(py, &error))?;
     Ok((ev, PyBytes::new(py, &bytes)))
 }
 

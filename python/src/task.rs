@@ -71,7 +71,8 @@ impl Task {
             Heard::Again(error) => return Err(error),
         };
         let result = py.detach(|| worker.join());
-        let result = result.unwrap_or_else(|panic| Err(Error::Internal(words(&*panic))));
+        // `call` lets no panic out.
+        let result = result.unwrap_or_else(|_| Err(Error::Internal("a thread panicked".into())));
         finish(py, result, raised)
     }
 
@@ -159,10 +160,4 @@ fn finish(py: Python<'_>, result: Result<()>, raised: Option<PyErr>) -> PyResult
             Err(raised)
         }
     }
-}
-
-/// What a panic says.
-fn words(panic: &(dyn std::any::Any + Send)) -> String {
-    let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
-    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "a thread panicked".to_owned())
 }

@@ -102,7 +102,7 @@ def decoded(png):
     return numpy.array(picture, numpy.uint8).reshape(height, width, 3)
 
 
-def test_notebooks_show_picture_and_spectrum(cube, tmp_path):
+def test_notebooks_show_picture_and_spectrum(cube, tmp_path, monkeypatch):
     import base64
     import re
 
@@ -113,6 +113,16 @@ def test_notebooks_show_picture_and_spectrum(cube, tmp_path):
     unrendered = sp.render(ball(film={"width": 64, "height": 64}), tmp_path / "c.zarr", spp=1, tiles=(0, 1), tile=8)
     assert "nothing is rendered in the middle yet" in unrendered._repr_html_()
     assert "<img" not in cube[["samples"]]._repr_html_()
+    monkeypatch.setattr("spectile._cube.MOST_BYTES", 1000)
+    assert "<img" not in cube._repr_html_() and "spectile.rgb shows it" in cube._repr_html_()
+
+
+def test_cubes_are_written_again_as_any_dataset(cube, tmp_path):
+    part = cube.isel(wavelength=slice(1, 4), x=slice(2, 9))
+    assert isinstance(part, sp.Cube)
+    part.to_zarr(tmp_path / "part.zarr", zarr_format=3, consolidated=False)
+    again = xarray.open_zarr(tmp_path / "part.zarr", consolidated=False)
+    assert again.radiance.equals(part.radiance) and again.radiance.attrs["units"] == "W m-2 sr-1 nm-1"
 
 
 def test_compare_by_channel(cube, tmp_path):
@@ -208,6 +218,12 @@ def test_units_are_quantities_of_pint(cube):
 
 def test_colour_science_both_ways(cube):
     colour = pytest.importorskip("colour")
+    nm = numpy.arange(400.0, 701.0, 10.0)
+    bands = numpy.stack([numpy.exp(-(((nm - centre) / 30) ** 2)) for centre in (480, 600)], axis=1)
+    with pytest.warns(sp.SpectileWarning, match="channels"):
+        by_colour = sp.sensor(cube, responses=colour.MultiSpectralDistributions(bands, nm, labels=["a", "b"]))
+        by_arrays = sp.sensor(cube, responses={"a": (nm, bands[:, 0]), "b": (nm, bands[:, 1])})
+    assert by_colour.attrs["channel_names"] == ["a", "b"] and by_colour.radiance.equals(by_arrays.radiance)
     pixel = sp.to_colour(cube.radiance.isel(x=8, y=8))
     assert isinstance(pixel, colour.SpectralDistribution)
     assert pixel.wavelengths.tolist() == cube.wavelength.values.tolist()

@@ -159,3 +159,46 @@ def test_import_takes_no_other_package_with_it():
 
     code = "import spectile, sys; print([m for m in ('numpy', 'xarray', 'zarr', 'pandas', 'tqdm', 'colour') if m in sys.modules])"
     assert subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"
+
+
+def spoilt(numbers, value, depth=0):
+    """The value with something in it replaced, removed or doubled."""
+    import numpy
+
+    odd = [
+        None, True, -1, 0, 1 << 70, 1e308, float("nan"), float("inf"), "", "paint", "\x00", "é" * 50, [], {}, [[]], {"": 1}, {"a.b": {}},
+        (), object, b"x", {1, 2}, numpy.float32(3), numpy.array(2), numpy.zeros(0), numpy.ones((2, 2)), numpy.ones((1, 1, 1, 1)),
+        numpy.array(["a"]), (numpy.arange(3.0), numpy.arange(3.0)), datetime.date(2026, 1, 1), datetime.time(1), {"mesh": {}},
+        {"texture": numpy.ones(3)}, {"grid": numpy.ones((2, 2, 2), bool)}, {"samples": numpy.ones((2, 2))},
+    ]  # fmt: skip
+    if depth > 1 and numbers.random() < 0.3 or not isinstance(value, (dict, list)) or not value:
+        return numbers.choice(odd)
+    keys = list(value) if isinstance(value, dict) else range(len(value))
+    key = numbers.choice(keys)
+    kind = numbers.random()
+    if isinstance(value, dict):
+        if kind < 0.1:
+            return {k: v for k, v in value.items() if k != key}
+        if kind < 0.2:
+            return value | {numbers.choice(["mesh", "texture", "grid", "x", 3]): numbers.choice(odd)}
+        return value | {key: spoilt(numbers, value[key], depth + 1)}
+    if kind < 0.2:
+        return value[:key] + value[key + 1 :]
+    return [*value[:key], spoilt(numbers, value[key], depth + 1), *value[key + 1 :]]
+
+
+def test_spoilt_scenes_are_refused_in_a_sentence():
+    import random
+
+    numbers = random.Random(7)
+    refused = 0
+    for _ in range(400):
+        scene = sp.Scene(ball())
+        for _ in range(numbers.choice([1, 1, 2, 5])):
+            scene = sp.Scene(spoilt(numbers, dict(scene)))
+        try:
+            assert len(scene.digest) == 64
+        except sp.SceneError as error:
+            refused += 1
+            assert error.problems and all(p["message"] for p in error.problems)
+    assert refused > 200, refused

@@ -61,6 +61,10 @@ def main() -> None:
             for words in (["--version"], ["info", "cube.zarr"], ["compare", "cube.zarr", "cube.zarr", "--tolerance", "0"]):
                 done = subprocess.run([f"{there}/spectile", *words], cwd=folder, capture_output=True, text=True)
                 assert done.returncode == 0, done
+            # Nodes of a cluster run the script that was called.
+            words = ["submit", str(scene), "-o", "c.zarr", "--spp", "1", "--size", "16x16", "--dry-run"]
+            said = subprocess.run([f"{there}/spectile", *words], cwd=folder, capture_output=True, text=True, check=True).stdout
+            assert f"exec {there}/spectile array-task" in said, said
     print("works")
 
 

@@ -2,6 +2,7 @@
 //! watched, and errors are values.
 
 use std::ffi::OsString;
+use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
 
 use clap::Parser;
@@ -29,7 +30,7 @@ pub struct Host {
 /// Runs `spectile ARGUMENTS`, where the name of a scene stands for `draft`, if there is one.
 ///
 /// # Errors
-/// [`Error::Usage`] where the arguments make no sense, else what the command ends with.
+/// [`Error::Usage`] where the arguments make no sense, [`Error::Internal`] where the command panics, else what it ends with.
 pub fn call(arguments: &[OsString], draft: Option<Arc<Draft>>, host: Host) -> Result<()> {
     let program = OsString::from("spectile");
     let mut cli = Cli::try_parse_from([program].iter().chain(arguments)).map_err(|usage| {
@@ -44,7 +45,20 @@ pub fn call(arguments: &[OsString], draft: Option<Arc<Draft>>, host: Host) -> Re
         };
         scene.given = Some(draft);
     }
-    cli.run(&Output::of_host(host))
+    catch(|| cli.run(&Output::of_host(host)))
+}
+
+/// Does something for a program that a panic must not reach.
+///
+/// # Errors
+/// [`Error::Internal`] with what a panic said, else what the work ends with.
+pub fn catch<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
+    // What the work has left half done goes with it: whoever called gets nothing but the error.
+    std::panic::catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
+        let words = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
+        let words = words.or_else(|| panic.downcast_ref::<String>().cloned());
+        Err(Error::Internal(words.unwrap_or_else(|| "a thread panicked".into())))
+    })
 }
 
 #[cfg(test)]
@@ -68,6 +82,17 @@ mod tests {
         let result = call(&arguments.iter().map(OsString::from).collect::<Vec<_>>(), None, host);
         let events = events.lock().expect("no panic").clone();
         (result, events)
+    }
+
+    #[test]
+    fn panics_are_errors() {
+        let (mut host, _) = host();
+        host.event = Box::new(|event| panic!("no room for {}", event["event"]));
+        match call(&["devices".into()], None, host) {
+            Err(Error::Internal(what)) => assert!(what.starts_with("no room for"), "{what}"),
+            other => panic!("{other:?}"),
+        }
+        assert!(catch(|| Ok(3)).is_ok_and(|three| three == 3));
     }
 
     #[test]

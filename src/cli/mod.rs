@@ -30,7 +30,7 @@ use clap::{Parser, Subcommand};
 
 use crate::Result;
 
-pub use call::{Host, call};
+pub use call::{Host, call, catch};
 pub use output::Output;
 pub use program::{program, program_of_script};
 

@@ -63,7 +63,9 @@ fn place_table(edited: &[Entry], written: &[Entry]) -> (Vec<Entry>, bool) {
         };
         let (node, is_same) = place(&entry.node, &old.node);
         same &= is_same;
-        Entry { key: entry.key.clone(), key_origin: old.key_origin.clone(), node }
+        // A table that has changed is not what stands below its key there.
+        let key_origin = if is_same { old.key_origin.clone() } else { Origin::Whole };
+        Entry { key: entry.key.clone(), key_origin, node }
     });
     let entries = entries.collect();
     (entries, same)
@@ -141,6 +143,8 @@ mod tests {
         let edited = problems(|root| set(root, &["film", "height"], Value::Integer(-1)));
         assert_eq!(line_of(&edited, "film.height"), None);
         assert_eq!(line_of(&edited, "camera.perspective.fov"), Some(6));
+        let without = problems(|root| set(root, &["film"], Value::Table(Vec::new())));
+        assert_eq!(line_of(&without, "film.height"), None);
     }
 
     #[test]

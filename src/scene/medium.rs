@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use super::arrays::Data;
 use super::decode::{Fields, Item, did_you_mean, list};
 use super::keys;
 use super::material::kelvin;
@@ -366,11 +367,7 @@ impl Grids {
         if let Some(known) = self.0.get(&key) {
             return known.clone();
         }
-        let read = match item.data() {
-            Some(data) => data.volume(),
-            None => volume::read(&key.0),
-        };
-        let grid = match read {
+        let grid = match item.data().map_or_else(|| volume::read(&key.0), Data::volume) {
             Ok(volume) => checked(item, volume, describes).map(Arc::new),
             Err(problem) => {
                 report_in_file(item, *problem);

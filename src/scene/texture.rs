@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use glam::DVec2;
 
+use super::arrays::Data;
 use super::decode::{Fields, Item, list};
 use super::keys;
 use super::spectrum::{self, Quantity, Spectra, report_in_file};
@@ -222,10 +223,7 @@ impl Textures {
         let image = match self.files.get(&path) {
             Some(known) => known.clone(),
             None => {
-                let read = match file.data() {
-                    Some(data) => data.image(),
-                    None => image::read(&path),
-                };
+                let read = file.data().map_or_else(|| image::read(&path), Data::image);
                 let read = read.map_err(|problem| report_in_file(file, *problem)).ok().map(Rc::new);
                 self.files.insert(path.clone(), read.clone());
                 read
