@@ -203,7 +203,7 @@ pub fn mie(x: f64, index: Complex, cosines: &[f64]) -> Sphere {
     let mut sums = [0.0; 2];
     let mut amplitudes = vec![[Complex(0.0, 0.0); 2]; cosines.len()];
     let mut angular = vec![[0.0, 1.0]; cosines.len()];
-    for n in 1..=terms {
+    for (n, derivative) in derivatives.iter().enumerate().take(terms + 1).skip(1) {
         let order = n as f64;
         let next = (2.0 * order - 1.0) / x * psi - psi_before;
         (psi_before, psi) = (psi, next);
@@ -214,8 +214,8 @@ pub fn mie(x: f64, index: Complex, cosines: &[f64]) -> Sphere {
             let slope = inside + Complex(order / x, 0.0);
             (slope.times(psi) - Complex(psi_before, 0.0)) / (slope * xi - xi_before)
         };
-        let a = coefficient(derivatives[n] / index);
-        let b = coefficient(index * derivatives[n]);
+        let a = coefficient(*derivative / index);
+        let b = coefficient(index * *derivative);
         sums[0] += (2.0 * order + 1.0) * (a.0 + b.0);
         sums[1] += (2.0 * order + 1.0) * (a.norm() + b.norm());
         let weight = (2.0 * order + 1.0) / (order * (order + 1.0));

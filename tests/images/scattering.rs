@@ -156,7 +156,8 @@ fn what_is_scattered_once() {
     // Straight back: (1 - g²) / (1 + g)³ and 3/4 (1 + cos²).
     let table = PhaseTable { degrees: vec![0.0, 90.0, 180.0], nm: vec![500.0], values: vec![vec![1.0; 3]] };
     let table = Arc::new(table);
-    let cases: [(&str, &dyn Fn(&mut Builder) -> Phase, f64); 4] = [
+    type Case<'a> = (&'a str, &'a dyn Fn(&mut Builder) -> Phase, f64);
+    let cases: [Case; 4] = [
         ("isotropic", &isotropic, 1.0),
         ("forward", &|b| b.henyey_greenstein(0.5), 0.75 / 1.5f64.powi(3)),
         ("Rayleigh", &|_| Phase::Rayleigh { depolarisation: 0.0 }, 1.5),
