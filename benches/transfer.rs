@@ -84,7 +84,7 @@ fn into_cube(worker: &mut Worker, header: &Header, unit: UnitRect, samples: u32,
     let mut merge = |means: &[f32]| -> Result<()> {
         cube.merge_unit(0, merged, portion, means)?;
         merged += portion;
-        Ok(())
+        Ok::<(), spectile::Error>(())
     };
     std::thread::scope(|threads| {
         let committer = threads.spawn(|| cube.commit_regularly());

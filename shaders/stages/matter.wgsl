@@ -37,7 +37,7 @@ fn choose_turn(u: vec2<f32>, u_kind: f32) -> DirectionChoice {
 fn note_turn(direction: vec3<f32>) {
 #if RATIOS
     let versine = versine_between(collision.direction, direction);
-    let own = turn_density(collision.technique, versine);
+    let own = max(turn_density(collision.technique, versine), 1.0e-30);
     for (var t = 0u; t < TECHNIQUES; t += 1u) {
         if (ratios[t] > 0.0) {
             ratios[t] = min(ratios[t] * turn_density(t, versine) / own, 1.0e30);

@@ -49,6 +49,27 @@ pub fn metal(name: &str) -> Option<[Curve; 2]> {
     (!n.is_empty()).then(|| [curve(n), curve(k)])
 }
 
+/// Sellmeier's coefficients B and C (µm²) of glasses that pbrt names: Schott's, as refractiveindex.info has them.
+const GLASSES: [(&str, [f64; 6]); 7] = [
+    ("BK7", [1.03961212, 0.00600069867, 0.231792344, 0.0200179144, 1.01046945, 103.560653]),
+    ("BAF10", [1.5851495, 0.00926681282, 0.143559385, 0.0424489805, 1.08521269, 105.613573]),
+    ("FK51A", [0.971247817, 0.00472301995, 0.216901417, 0.0153575612, 0.904651666, 168.68133]),
+    ("LASF9", [2.00029547, 0.0121426017, 0.298926886, 0.0538736236, 1.80691843, 156.530829]),
+    ("SF5", [1.52481889, 0.011254756, 0.187085527, 0.0588995392, 1.42729015, 129.141675]),
+    ("SF10", [1.62153902, 0.0122241457, 0.256287842, 0.0595736775, 1.64447552, 147.468793]),
+    ("SF11", [1.73759695, 0.013188707, 0.313747346, 0.0623068142, 1.89878101, 155.23629]),
+];
+
+/// The index of a glass over wavelength.
+pub fn glass(name: &str) -> Option<Curve> {
+    let (_, terms) = GLASSES.iter().find(|(known, _)| *known == name)?;
+    Some(super::picture::sampled(&|nm| {
+        let square = (1e-3 * nm).powi(2);
+        let sum: f64 = terms.as_chunks::<2>().0.iter().map(|[b, c]| b * square / (square - c)).sum();
+        (1.0 + sum).sqrt()
+    }))
+}
+
 /// The names of all metals.
 pub fn names() -> Vec<&'static str> {
     let mut names: Vec<&str> =
@@ -85,5 +106,17 @@ mod tests {
         assert!((n.eval(600.0) - 0.25).abs() < 0.02 && (k.eval(600.0) - 3.0).abs() < 0.1);
         assert_eq!((matter("Acrylic Glass"), matter("unobtainium")), (Some(1.49), None));
         assert!(metal("Xx").is_none());
+        // Schott's data sheets at the d line.
+        for (name, index) in [
+            ("BK7", 1.5168),
+            ("BAF10", 1.67),
+            ("FK51A", 1.48656),
+            ("LASF9", 1.85025),
+            ("SF5", 1.6727),
+            ("SF10", 1.72825),
+            ("SF11", 1.78472),
+        ] {
+            assert!((glass(name).unwrap().eval(587.56) - index).abs() < 2e-4, "{name}");
+        }
     }
 }

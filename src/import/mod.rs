@@ -6,6 +6,7 @@ mod environment;
 mod geometry;
 mod metals;
 mod mitsuba;
+mod pbrt;
 mod picture;
 mod report;
 mod scene;
@@ -49,9 +50,10 @@ pub fn import(source: &Path, folder: &Path) -> Result<Summary> {
     let extension = source.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     let read = match extension.as_str() {
         "xml" => mitsuba::read,
+        "pbrt" => pbrt::read,
         _ => {
             return Err(Error::Usage(format!(
-                "{}: scenes of Mitsuba 3 (.xml) are imported; this name ends otherwise",
+                "{}: scenes of Mitsuba 3 (.xml) and pbrt-v4 (.pbrt) are imported; this name ends otherwise",
                 source.display()
             )));
         }

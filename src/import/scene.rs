@@ -89,6 +89,14 @@ impl Scene {
         Section::new(format!("[materials.{}.{kind}]", text::key(name)))
     }
 
+    /// Adds a material of the name nearest to `wanted`; gives that.
+    pub fn put(&mut self, wanted: &str, kind: &str, mut section: Section) -> String {
+        let name = self.material_name(wanted);
+        section.header = format!("[materials.{}.{kind}]", text::key(&name));
+        self.materials.push(section);
+        name
+    }
+
     /// Writes a file into `sort`, one of meshes, spectra, textures; gives its path in the scene.
     pub fn write(&mut self, sort: &str, name: &str, bytes: &[u8]) -> Result<String> {
         let path = self.place(sort, name)?;

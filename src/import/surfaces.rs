@@ -2,6 +2,14 @@
 
 use super::picture::{Colour, sampled};
 use crate::spectral::Curve;
+use crate::spectral::colour::Observer;
+
+/// Y of a light: 1 where ∫L ȳ dλ = ∫ȳ dλ (CIE 1931).
+pub fn luminance(curve: &Curve) -> f64 {
+    let observer = &Observer::Cie1931.curves()[1];
+    let nm = || (0..=470).map(|i| 360.0 + f64::from(i));
+    nm().map(|nm| observer.eval(nm) * curve.eval(nm)).sum::<f64>() / nm().map(|nm| observer.eval(nm)).sum::<f64>()
+}
 
 /// Unpolarised reflectance of a boundary of relative index `eta` at an angle of this cosine (Born and Wolf, section 1.5.2).
 pub fn fresnel(cosine: f64, eta: f64) -> f64 {

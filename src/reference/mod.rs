@@ -6,6 +6,7 @@
 
 mod bsdf;
 mod camera;
+mod flight;
 mod gas;
 mod lights;
 mod path;

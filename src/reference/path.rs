@@ -8,9 +8,9 @@ use glam::{DAffine3, DVec3};
 
 use super::bsdf::{Bsdf, SpectralValues, Vertex};
 use super::camera;
+use super::flight::Flight;
 use super::gas::{self, Piece};
 use super::lights::{LightPoint, Lights, Target, disk_solid_angle, emits, sample_disk, spot_share};
-use super::phase;
 use super::primitive::{Ray, SurfacePoint};
 use super::rng::Rng;
 use super::shading::Shading;
@@ -21,7 +21,7 @@ use crate::scene::{Bsdf as Description, Environment, Interior, Light, Projection
 
 /// What tracing needs of a scene, prepared once and shared by all threads.
 pub struct Tracer<'a> {
-    scene: &'a Scene,
+    pub(super) scene: &'a Scene,
     world: World,
     /// The environment, where it is a map.
     sky: Option<Sky<'a>>,
@@ -42,45 +42,33 @@ pub struct Tracer<'a> {
 
 /// The K-channel state of the path under way; reused from path to path.
 pub struct Path<'a> {
-    spectra: SpectralValues<'a>,
+    pub(super) spectra: SpectralValues<'a>,
     /// Product of what the surfaces did so far.
-    throughput: Vec<f64>,
+    pub(super) throughput: Vec<f64>,
     /// The channels that have not stopped: all, or the one that ideal dispersive refraction left.
-    alive: Range<usize>,
+    pub(super) alive: Range<usize>,
     /// Radiance gathered so far, W m⁻² sr⁻¹ nm⁻¹.
     pub radiance: Vec<f64>,
     /// What one vertex does to each channel.
     factor: Vec<f64>,
     /// Radiance of what is aimed at or met, or what takes its place.
-    emitted: Vec<f64>,
+    pub(super) emitted: Vec<f64>,
     /// The interiors that the path is in, the innermost last.
-    interiors: Vec<Interior>,
-}
-
-/// What becomes of a path between two surfaces.
-enum Flight {
-    /// It comes to the next.
-    Passed,
-    /// Matter scatters it, into this ray with this density by solid angle.
-    Scattered {
-        next: Ray,
-        density: f64,
-    },
-    Ended,
+    pub(super) interiors: Vec<Interior>,
 }
 
 /// A way to some light, chosen at a vertex.
-struct Aim {
-    direction: DVec3,
+pub(super) struct Aim {
+    pub(super) direction: DVec3,
     /// Where the light is; `None` at infinity.
     target: Option<DVec3>,
     /// Density by solid angle of the choice; `None` for lights without extent, which are never met.
-    density: Option<f64>,
-    emitted: Emitted,
+    pub(super) density: Option<f64>,
+    pub(super) emitted: Emitted,
 }
 
 /// Radiance in all channels; of lights without extent, irradiance over the probability of their choice.
-enum Emitted {
+pub(super) enum Emitted {
     Spectrum {
         spectrum: SpectrumId,
         scale: f64,
@@ -334,7 +322,7 @@ impl<'a> Tracer<'a> {
     }
 
     /// Sets `path.emitted`.
-    fn look_up(&self, emitted: &Emitted, path: &mut Path) {
+    pub(super) fn look_up(&self, emitted: &Emitted, path: &mut Path) {
         match emitted {
             Emitted::Surface { primitive, point, towards } => {
                 if !self.emit(*primitive, point, *towards, path) {
@@ -374,7 +362,7 @@ impl<'a> Tracer<'a> {
     }
 
     /// Chooses a light and a way to it; `None` where it sends nothing there.
-    fn aim(&self, from: DVec3, rng: &mut Rng) -> Option<Aim> {
+    pub(super) fn aim(&self, from: DVec3, rng: &mut Rng) -> Option<Aim> {
         match self.lights.sample(&self.world, rng)? {
             Target::Surface(light) => self.aim_at_surface(from, &light),
             Target::Light(light) => {
@@ -454,7 +442,13 @@ impl<'a> Tracer<'a> {
         self.way_to(origin, interiors, aim, rng)
     }
 
-    fn way_to(&self, origin: DVec3, mut interiors: Vec<Interior>, aim: &Aim, rng: &mut Rng) -> Option<Vec<Piece<'_>>> {
+    pub(super) fn way_to(
+        &self,
+        origin: DVec3,
+        mut interiors: Vec<Interior>,
+        aim: &Aim,
+        rng: &mut Rng,
+    ) -> Option<Vec<Piece<'_>>> {
         if self.scene.media.is_empty() && !self.masked {
             let clear = match aim.target {
                 Some(target) => !self.world.occluded(origin, target),
@@ -483,49 +477,6 @@ impl<'a> Tracer<'a> {
             cross(&mut interiors, object.interior, hit.point.normal.dot(ray.direction) < 0.0);
             ray.origin += self.world.beyond(&ray, &hit) * ray.direction;
         }
-    }
-
-    /// How far the one channel that is alive goes through `pieces` until it is scattered, and where to then: what is
-    /// scattered weighs the same wherever it goes, what is absorbed is taken from the throughput.
-    fn scatter(&self, pieces: &[Piece], direction: DVec3, event: u32, rng: &mut Rng, path: &mut Path) -> Flight {
-        let integrator = &self.scene.integrator;
-        let k = path.alive.start;
-        let mut left = -(1.0 - rng.uniform()).ln();
-        let before = path.throughput[k];
-        let Path { spectra, throughput, .. } = &mut *path;
-        let fly = |piece| Some((piece, Piece::fly(piece, spectra, k, &mut left, &mut throughput[k])?));
-        let Some((piece, (position, cell))) = pieces.iter().find_map(fly) else { return Flight::Passed };
-        let strengths: Vec<_> = piece.strengths(&path.spectra, k, &cell).map(|(s, phase)| (s, phase.clone())).collect();
-        let all: f64 = strengths.iter().map(|(strength, _)| strength).sum();
-        let density = |spectra: &SpectralValues, to: DVec3| -> f64 {
-            strengths.iter().map(|(s, p)| s / all * phase::density(p, spectra, k, direction, to)).sum()
-        };
-        if let Some(aim) = self.aim(position, rng) {
-            self.look_up(&aim.emitted, path);
-            if let Some(pieces) = self.way_to(position, piece.around.clone(), &aim, rng) {
-                let Path { spectra, throughput, alive, radiance, emitted, .. } = &mut *path;
-                pieces.iter().for_each(|piece| piece.pass(spectra, alive.clone(), emitted, None));
-                let scattered = density(spectra, aim.direction);
-                let weight = aim.density.map_or(1.0, |density| 1.0 / (density + scattered));
-                radiance[k] += throughput[k] * scattered * emitted[k] * weight;
-            }
-        }
-        if integrator.russian_roulette_start > 0 && event + 1 >= integrator.russian_roulette_start {
-            let survival = (path.throughput[k] / before).clamp(0.05, 1.0);
-            if rng.uniform() >= survival {
-                return Flight::Ended;
-            }
-            path.throughput[k] /= survival;
-        }
-        let mut chosen = all * rng.uniform();
-        let kind = strengths.iter().find(|(strength, _)| {
-            chosen -= strength;
-            chosen < 0.0
-        });
-        let Some((_, pattern)) = kind.or(strengths.last()) else { return Flight::Ended };
-        let to = phase::sample(pattern, &path.spectra, k, direction, rng);
-        path.interiors.clone_from(&piece.around);
-        Flight::Scattered { next: Ray { origin: position, direction: to }, density: density(&path.spectra, to) }
     }
 
     /// The first surface with a material along `ray`, at its distance from the start; null boundaries on the way change

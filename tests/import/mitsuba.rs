@@ -264,7 +264,7 @@ fn against_mitsuba(scene: &str, reference: &str, samples: &str, bounds: [f64; 2]
     assert!(output.status.success(), "{}", binary::text(&output.stderr));
     let cube = spectile::cube::Cube::open(&folder.join("cube.zarr")).expect("a cube");
     let [width, height]: [u32; 2] = serde_json::from_value(truth["size"].clone()).expect("two sides");
-    let mut sum = vec![0.0; 8];
+    let mut sum = [0.0; 8];
     for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
         let spectrum = cube.spectrum(x, y).expect("read").expect("rendered");
         sum.iter_mut().zip(&spectrum).for_each(|(sum, value)| *sum += f64::from(*value));

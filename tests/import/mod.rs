@@ -1,6 +1,7 @@
 //! `spectile import`: what scenes of other programs become.
 
 mod mitsuba;
+mod pbrt;
 mod spoilt;
 
 use std::path::{Path, PathBuf};

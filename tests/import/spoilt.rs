@@ -82,6 +82,26 @@ const MITSUBA: &str = r#"<scene version="3.0.0">
 </scene>
 "#;
 
+const PBRT: &str = r#"LookAt 0 0 5  0 0 0  0 1 0
+Camera "perspective" "float fov" [60] "float lensradius" 0.1 "float screenwindow" [-1 1 -1 1]
+Film "rgb" "integer xresolution" [40] "integer yresolution" [20] "float cropwindow" [0 0.5 0 1]
+WorldBegin
+Texture "c" "spectrum" "checkerboard" "rgb tex1" [1 0.5 0.25] "float uscale" 4
+MakeNamedMaterial "m" "string type" "coateddiffuse" "texture reflectance" "c" "float roughness" 0.1
+AttributeBegin
+ObjectBegin "o" Rotate 30 0 1 0 Shape "sphere" "float radius" 0.5 ObjectEnd
+NamedMaterial "m"
+AreaLightSource "diffuse" "blackbody L" 3000 "float power" 10
+Shape "loopsubdiv" "integer levels" 1 "integer indices" [0 1 2] "point3 P" [0 0 0  1 0 0  0 1 0]
+AttributeEnd
+ObjectInstance "o"
+Shape "bilinearmesh" "point3 P" [0 0 0  1 0 0  0 1 0  1 1 0.5]
+Material "conductor" "spectrum eta" "metal-Cu-eta" "spectrum k" "metal-Cu-k"
+Shape "cylinder" "float zmin" 0 "float zmax" 2
+LightSource "spot" "spectrum I" [400 1 700 2] "float coneangle" 40
+LightSource "infinite" "rgb L" [0.4 0.45 0.5]
+"#;
+
 fn many(name: &str, valid: &str, cases: usize) {
     let (folder, path) = written(name, valid);
     std::fs::write(folder.path().join("m.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").expect("written");
@@ -98,6 +118,7 @@ fn many(name: &str, valid: &str, cases: usize) {
 #[test]
 fn spoilt_scenes_are_imported_or_refused() {
     many("scene.xml", MITSUBA, 300);
+    many("scene.pbrt", PBRT, 300);
 }
 
 #[test]

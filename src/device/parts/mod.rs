@@ -3,6 +3,7 @@
 
 pub mod attributes;
 pub mod camera;
+pub mod crossings;
 pub mod geometry;
 pub mod heat;
 pub mod lights;

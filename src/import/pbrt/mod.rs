@@ -1,0 +1,511 @@
+//! Scenes of pbrt-v4.
+
+mod camera;
+mod colour;
+mod light;
+mod material;
+mod shape;
+mod token;
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use glam::{DAffine3, DMat3, DVec3};
+
+use self::shape::Form;
+use self::token::{At, Parameters, Token, Tokens, shown};
+use super::geometry::similarity;
+use super::picture::Colour;
+use super::scene::{Scene, Section};
+use super::text;
+use crate::error::Problem;
+use crate::{Error, Result};
+
+/// Shapes that instances may become, and files that a scene may be made of.
+const MOST_COPIES: usize = 100_000;
+const MOST_FILES: usize = 10_000;
+const DEEPEST: usize = 64;
+
+/// What a material became.
+#[derive(Debug, Clone)]
+pub enum Look {
+    Material {
+        name: String,
+        textured: bool,
+    },
+    /// Rays pass.
+    Nothing,
+}
+
+/// An area light that following shapes are.
+#[derive(Debug, Clone)]
+struct AreaLight {
+    parameters: Parameters,
+    at: At,
+}
+
+/// What attributes save.
+#[derive(Debug, Clone)]
+struct State {
+    ctm: DAffine3,
+    /// None: pbrt's own, as the scene has not named one.
+    look: Option<Look>,
+    area: Option<AreaLight>,
+    reversed: bool,
+    /// Of `Attribute`, by what they are for.
+    defaults: HashMap<String, Parameters>,
+}
+
+/// A shape of an object that is placed later.
+#[derive(Debug, Clone)]
+struct Kept {
+    form: Form,
+    to_world: DAffine3,
+    look: Look,
+    emission: Option<(String, bool)>,
+    line: usize,
+}
+
+pub struct Importer<'s> {
+    pub scene: &'s mut Scene,
+    pub textures: HashMap<String, Colour>,
+    pub named: HashMap<String, Look>,
+    state: State,
+    saved: Vec<(State, &'static str)>,
+    systems: HashMap<String, DAffine3>,
+    objects: HashMap<String, Vec<Kept>>,
+    /// The object that shapes go into.
+    open: Option<(String, Vec<Kept>)>,
+    copies: usize,
+    files: usize,
+    film: Parameters,
+    camera: Option<(String, Parameters, DAffine3, At)>,
+    filter: Option<String>,
+    in_world: bool,
+    default_look: Option<Look>,
+}
+
+/// Translates the scene in the file `source`.
+pub fn read(source: &Path, scene: &mut Scene) -> Result<()> {
+    let state = State { ctm: DAffine3::IDENTITY, look: None, area: None, reversed: false, defaults: HashMap::new() };
+    let mut importer = Importer {
+        scene,
+        textures: HashMap::new(),
+        named: HashMap::new(),
+        state,
+        saved: Vec::new(),
+        systems: HashMap::new(),
+        objects: HashMap::new(),
+        open: None,
+        copies: 0,
+        files: 0,
+        film: Parameters::default(),
+        camera: None,
+        filter: None,
+        in_world: false,
+        default_look: None,
+    };
+    importer.file(source, &mut Vec::new())?;
+    importer.finish(source)
+}
+
+/// A problem of another file, at the place where it is named.
+fn beside(at: &At, problem: &Problem) -> Box<Problem> {
+    let file = text::file_name(&problem.file.file_name().unwrap_or_default().to_string_lossy());
+    let line = problem.line.map_or_else(String::new, |line| format!(":{line}"));
+    at.problem(format!("{file}{line}: {}", problem.message))
+}
+
+impl Importer<'_> {
+    fn file(&mut self, path: &Path, open: &mut Vec<PathBuf>) -> Result<()> {
+        let whole = |message: String| Error::input(path, message);
+        let identity = std::fs::canonicalize(path).map_err(|e| whole(format!("cannot be read: {e}")))?;
+        if open.contains(&identity) {
+            return Err(whole("includes itself".to_owned()));
+        }
+        self.files += 1;
+        if self.files > MOST_FILES {
+            return Err(whole(format!("is included after {MOST_FILES} others: that many are read at most")));
+        }
+        let bytes = std::fs::read(path).map_err(|e| whole(format!("cannot be read: {e}")))?;
+        if bytes.contains(&0) {
+            return Err(whole("is no text".to_owned()));
+        }
+        open.push(identity);
+        if open.len() > DEEPEST {
+            return Err(whole(format!("is included by more than {DEEPEST} files, one in the other")));
+        }
+        let mut tokens = Tokens::new(bytes, path);
+        while let Some((token, at)) = tokens.next()? {
+            let Token::Word(word) = token else {
+                return Err(at.problem("a directive is expected here").into());
+            };
+            self.directive(&word, &mut tokens, &at, open)?;
+        }
+        open.pop();
+        Ok(())
+    }
+
+    fn directive(&mut self, word: &str, tokens: &mut Tokens, at: &At, open: &mut Vec<PathBuf>) -> Result<()> {
+        if self.transform(word, tokens, at)? || self.block(word, tokens, at)? {
+            return Ok(());
+        }
+        match word {
+            "Include" | "Import" => {
+                let name = tokens.text("a file", at)?;
+                self.file(&at.file(&name)?, open)?;
+            }
+            "WorldBegin" => {
+                self.in_world = true;
+                self.state.ctm = DAffine3::IDENTITY;
+                self.systems.insert("world".to_owned(), DAffine3::IDENTITY);
+            }
+            "Camera" => {
+                let (kind, parameters) = self.plugin(tokens, at)?;
+                let from_camera = self.state.ctm.inverse();
+                self.systems.insert("camera".to_owned(), from_camera);
+                self.camera = Some((kind, parameters, from_camera, at.clone()));
+            }
+            "Film" => {
+                let (kind, parameters) = self.plugin(tokens, at)?;
+                self.scene.report.translated(format!("Film `{}`", shown(&kind)), at.place());
+                self.film = parameters;
+            }
+            "PixelFilter" => {
+                let (kind, parameters) = self.plugin(tokens, at)?;
+                parameters.ask_for_all();
+                self.filter = Some(kind);
+            }
+            "Integrator" => {
+                let (kind, parameters) = self.plugin(tokens, at)?;
+                self.integrator(&kind, &parameters, at)?;
+            }
+            "Sampler" | "Accelerator" => drop(self.plugin(tokens, at)?),
+            "Option" => drop(tokens.parameters()?),
+            "ColorSpace" => {
+                let name = tokens.text("a colour space", at)?;
+                if name != "srgb" {
+                    self.scene.report.approximated(at.place(), format!("colours of `{}` as sRGB", shown(&name)));
+                }
+            }
+            "Material" => {
+                let (kind, parameters) = self.plugin(tokens, at)?;
+                let parameters = self.with_defaults("material", parameters);
+                let name = format!("{kind}-{}", at.line);
+                self.state.look = Some(self.material(&name, &kind, &parameters, at)?);
+            }
+            "MakeNamedMaterial" => {
+                let (name, parameters) = self.plugin(tokens, at)?;
+                let parameters = self.with_defaults("material", parameters);
+                let kind = parameters.text("type")?.ok_or_else(|| at.problem("the material has no `type`"))?.to_owned();
+                let look = self.material(&name, &kind, &parameters, at)?;
+                self.named.insert(name, look);
+            }
+            "NamedMaterial" => {
+                let name = tokens.text("a name", at)?;
+                let found = self.named.get(&name).cloned();
+                let found = found.ok_or_else(|| at.problem(format!("no material is named \"{}\"", shown(&name))))?;
+                self.state.look = Some(found);
+            }
+            "Texture" => {
+                let name = tokens.text("a name", at)?;
+                let kind = tokens.text("`spectrum` or `float`", at)?;
+                let (class, parameters) = self.plugin(tokens, at)?;
+                let parameters = self.with_defaults("texture", parameters);
+                self.texture(&name, &kind, &class, &parameters, at)?;
+            }
+            "LightSource" => {
+                let (kind, parameters) = self.plugin(tokens, at)?;
+                let parameters = self.with_defaults("light", parameters);
+                let ctm = self.state.ctm;
+                self.source(&kind, &parameters, &ctm, at)?;
+            }
+            "AreaLightSource" => {
+                let (kind, parameters) = self.plugin(tokens, at)?;
+                if kind == "diffuse" {
+                    let parameters = self.with_defaults("light", parameters);
+                    self.state.area = Some(AreaLight { parameters, at: at.clone() });
+                } else {
+                    self.scene.report.left_out(at.place(), format!("the area light `{}`", shown(&kind)));
+                }
+            }
+            "Shape" => {
+                let (kind, parameters) = self.plugin(tokens, at)?;
+                let parameters = self.with_defaults("shape", parameters);
+                self.shape(&kind, &parameters, at)?;
+            }
+            "MediumInterface" | "MakeNamedMedium" => {
+                let name = tokens.text("a name", at)?;
+                if matches!(tokens.peek()?, Some((Token::Text(text), _)) if !text.contains(' ')) {
+                    tokens.next()?;
+                }
+                tokens.parameters()?;
+                if !name.is_empty() {
+                    self.scene.report.left_out(at.place(), format!("the medium \"{}\"", shown(&name)));
+                }
+            }
+            _ => return Err(at.problem(format!("`{}` is no directive of pbrt-v4", shown(word))).into()),
+        }
+        Ok(())
+    }
+
+    /// `"name"` and the parameters of a directive.
+    fn plugin(&mut self, tokens: &mut Tokens, at: &At) -> Result<(String, Parameters)> {
+        Ok((tokens.text("a name", at)?, tokens.parameters()?))
+    }
+
+    fn with_defaults(&self, of: &str, parameters: Parameters) -> Parameters {
+        match self.state.defaults.get(of) {
+            Some(defaults) => parameters.over(defaults),
+            None => parameters,
+        }
+    }
+
+    /// Directives that change the current transform.
+    fn transform(&mut self, word: &str, tokens: &mut Tokens, at: &At) -> Result<bool> {
+        let step = match word {
+            "Identity" => {
+                self.state.ctm = DAffine3::IDENTITY;
+                return Ok(true);
+            }
+            "Translate" => DAffine3::from_translation(DVec3::from_array(tokens.numbers(at)?)),
+            "Scale" => {
+                let factors = DVec3::from_array(tokens.numbers(at)?);
+                if factors.to_array().contains(&0.0) {
+                    return Err(at.problem("a `Scale` of 0 flattens space").into());
+                }
+                DAffine3::from_scale(factors)
+            }
+            "Rotate" => {
+                let [degrees, x, y, z] = tokens.numbers(at)?;
+                let axis = DVec3::new(x, y, z).try_normalize().ok_or_else(|| at.problem("`Rotate` has no axis"))?;
+                DAffine3::from_axis_angle(axis, degrees.to_radians())
+            }
+            "LookAt" => {
+                let [ex, ey, ez, lx, ly, lz, ux, uy, uz] = tokens.numbers(at)?;
+                let (eye, look, up) = (DVec3::new(ex, ey, ez), DVec3::new(lx, ly, lz), DVec3::new(ux, uy, uz));
+                let frame = || {
+                    let forward = (look - eye).try_normalize()?;
+                    let right = up.try_normalize()?.cross(forward).try_normalize()?;
+                    Some(DMat3::from_cols(right, forward.cross(right), forward))
+                };
+                let matrix3 =
+                    frame().ok_or_else(|| at.problem("`LookAt` has no direction, or its up lies along it"))?;
+                DAffine3 { matrix3, translation: eye }.inverse()
+            }
+            "Transform" | "ConcatTransform" => {
+                let m: [f64; 16] = tokens.numbers(at)?;
+                if [m[3], m[7], m[11], m[15]] != [0.0, 0.0, 0.0, 1.0] {
+                    return Err(at.problem("the matrix has a last row that is not 0, 0, 0, 1").into());
+                }
+                let column = |i: usize| DVec3::new(m[i], m[i + 1], m[i + 2]);
+                let matrix3 = DMat3::from_cols(column(0), column(4), column(8));
+                if matrix3.determinant() == 0.0 {
+                    return Err(at.problem("the matrix flattens space").into());
+                }
+                let affine = DAffine3 { matrix3, translation: column(12) };
+                if word == "Transform" {
+                    self.state.ctm = affine;
+                    return Ok(true);
+                }
+                affine
+            }
+            "CoordinateSystem" => {
+                self.systems.insert(tokens.text("a name", at)?, self.state.ctm);
+                return Ok(true);
+            }
+            "CoordSysTransform" => {
+                let name = tokens.text("a name", at)?;
+                let found = self.systems.get(&name).copied();
+                self.state.ctm =
+                    found.ok_or_else(|| at.problem(format!("no coordinate system is named \"{}\"", shown(&name))))?;
+                return Ok(true);
+            }
+            "ReverseOrientation" => {
+                self.state.reversed = !self.state.reversed;
+                return Ok(true);
+            }
+            "TransformTimes" | "ActiveTransform" => {
+                if word == "TransformTimes" {
+                    tokens.numbers::<2>(at)?;
+                } else {
+                    tokens.next()?;
+                }
+                self.scene.report.left_out(at.place(), "motion: everything is where the last transform puts it");
+                return Ok(true);
+            }
+            _ => return Ok(false),
+        };
+        self.state.ctm = self.state.ctm * step;
+        if !self.state.ctm.is_finite() {
+            return Err(at.problem("the transform is not finite").into());
+        }
+        Ok(true)
+    }
+
+    /// Directives that begin and end something.
+    fn block(&mut self, word: &str, tokens: &mut Tokens, at: &At) -> Result<bool> {
+        match word {
+            "AttributeBegin" | "TransformBegin" => {
+                if self.saved.len() >= 10_000 {
+                    return Err(at.problem("more than 10,000 attributes are open").into());
+                }
+                self.saved
+                    .push((self.state.clone(), if word == "AttributeBegin" { "AttributeEnd" } else { "TransformEnd" }));
+            }
+            "AttributeEnd" | "TransformEnd" => match self.saved.pop() {
+                Some((state, end)) if end == word && word == "AttributeEnd" => self.state = state,
+                Some((state, end)) if end == word => self.state.ctm = state.ctm,
+                _ => return Err(at.problem(format!("`{word}` ends what has not begun")).into()),
+            },
+            "Attribute" => {
+                let of = tokens.text("what it is for", at)?;
+                let parameters = tokens.parameters()?;
+                let before = self.state.defaults.remove(&of).unwrap_or_default();
+                self.state.defaults.insert(of, parameters.over(&before));
+            }
+            "ObjectBegin" => {
+                let name = tokens.text("a name", at)?;
+                if self.open.is_some() {
+                    return Err(at.problem("`ObjectBegin` within another").into());
+                }
+                self.saved.push((self.state.clone(), "ObjectEnd"));
+                self.open = Some((name, Vec::new()));
+            }
+            "ObjectEnd" => match (self.saved.pop(), self.open.take()) {
+                (Some((state, "ObjectEnd")), Some((name, kept))) => {
+                    self.state = state;
+                    self.objects.insert(name, kept);
+                }
+                _ => return Err(at.problem("`ObjectEnd` ends what has not begun").into()),
+            },
+            "ObjectInstance" => {
+                let name = tokens.text("a name", at)?;
+                let kept = self.objects.get(&name).cloned();
+                let kept = kept.ok_or_else(|| at.problem(format!("no object is named \"{}\"", shown(&name))))?;
+                self.copies += kept.len();
+                if self.copies > MOST_COPIES {
+                    let message = format!(
+                        "the scene has more than {MOST_COPIES} shapes in instances, each of which becomes a copy"
+                    );
+                    return Err(at.problem(message).into());
+                }
+                if !kept.is_empty() {
+                    self.scene
+                        .report
+                        .approximated(at.place(), "an instance as a copy: the same picture, in more memory");
+                }
+                for mut shape in kept {
+                    shape.to_world = self.state.ctm * shape.to_world;
+                    self.place(shape, at)?;
+                }
+            }
+            _ => return Ok(false),
+        }
+        Ok(true)
+    }
+
+    fn shape(&mut self, kind: &str, parameters: &Parameters, at: &At) -> Result<()> {
+        let to_world = self.state.ctm;
+        let round = similarity(to_world.matrix3).is_some();
+        let reversed = self.state.reversed;
+        if let Some(alpha) = parameters.get("alpha")
+            && alpha.numbers.first() != Some(&1.0)
+        {
+            self.scene.report.left_out(alpha.at.place(), "the `alpha` of a shape: it is there for all rays");
+        }
+        let Some(form) = self.form(kind, parameters, at, round, reversed)? else { return Ok(()) };
+        let emission = match self.state.area.clone() {
+            Some(area) => Some(self.emission(&area, &form, &to_world, at)?),
+            None => None,
+        };
+        parameters.finish(&format!("the shape `{kind}`"), &mut self.scene.report);
+        self.scene.report.translated(format!("Shape `{kind}`"), at.place());
+        let look = self.look();
+        let kept = Kept { form, to_world, look, emission, line: at.line };
+        match &mut self.open {
+            Some((_, shapes)) => shapes.push(kept),
+            None => self.place(kept, at)?,
+        }
+        Ok(())
+    }
+
+    /// The material of shapes now.
+    fn look(&mut self) -> Look {
+        if let Some(look) = &self.state.look {
+            return look.clone();
+        }
+        let scene = &mut self.scene;
+        let made = || {
+            let section = Section::default().comment("of shapes that have none in pbrt").with("reflectance", "0.5");
+            Look::Material { name: scene.put("default", "diffuse", section), textured: false }
+        };
+        self.default_look.get_or_insert_with(made).clone()
+    }
+
+    /// What a shape emits, and whether from both sides.
+    fn emission(&mut self, area: &AreaLight, form: &Form, to_world: &DAffine3, at: &At) -> Result<(String, bool)> {
+        let parameters = &area.parameters;
+        let both = parameters.boolean("twosided", false)?;
+        for unread in ["filename", "spread"] {
+            if parameters.get(unread).is_some() {
+                let what = format!("`{unread}` of an area light: it shines evenly, in all directions");
+                self.scene.report.left_out(area.at.place(), what);
+            }
+        }
+        let unit = std::f64::consts::PI * form.area(to_world) * if both { 2.0 } else { 1.0 };
+        let scale = self.photometric(parameters, "power", "L", unit)?;
+        let light = self.light(parameters, "L", scale, &format!("area-{}", at.line))?;
+        parameters.finish("the area light", &mut self.scene.report);
+        Ok((light, both))
+    }
+
+    fn place(&mut self, kept: Kept, at: &At) -> Result<()> {
+        let (material, textured) = match (&kept.look, &kept.emission) {
+            (Look::Material { name, textured }, _) => (name.clone(), *textured),
+            (Look::Nothing, Some(_)) => {
+                let known = self.named.get("lamp that is nothing else").cloned();
+                let name = match known {
+                    Some(Look::Material { name, .. }) => name,
+                    _ => self.scene.put("lamp", "black", Section::default()),
+                };
+                let look = Look::Material { name: name.clone(), textured: false };
+                self.named.insert("lamp that is nothing else".to_owned(), look);
+                (name, false)
+            }
+            (Look::Nothing, None) => {
+                self.scene.report.left_out(at.place(), "a shape of which nothing is seen (material `interface`)");
+                return Ok(());
+            }
+        };
+        let Some(mut object) = kept.form.section(&kept.to_world, textured) else {
+            self.scene.report.left_out(at.place(), "an instance that stretches a round shape");
+            return Ok(());
+        };
+        object.comments.push(format!("line {}", kept.line));
+        object.set("material", text::quoted(&material));
+        if let Some((emission, both)) = kept.emission {
+            object.set("emission", emission);
+            if both {
+                object.set("emission_sides", "\"both\"");
+            }
+        }
+        if let Some(at) = object.entries.iter().position(|(key, _)| key == "transform") {
+            let transform = object.entries.remove(at);
+            object.entries.push(transform);
+        }
+        self.scene.objects.push(object);
+        Ok(())
+    }
+
+    fn integrator(&mut self, kind: &str, parameters: &Parameters, at: &At) -> Result<()> {
+        if !["path", "volpath", "bdpt", "mlt", "sppm", "simplepath", "simplevolpath"].contains(&kind) {
+            self.scene.report.approximated(at.place(), format!("the integrator `{}` as a path tracer", shown(kind)));
+        }
+        let depth = parameters.number("maxdepth")?.unwrap_or(5.0).clamp(0.0, 16_383.0);
+        parameters.ask_for_all();
+        self.scene.report.translated(format!("Integrator `{}`", shown(kind)), at.place());
+        self.scene.integrator = Some(Section::new("[integrator]").with("max_bounces", (depth as u32).to_string()));
+        Ok(())
+    }
+}

@@ -1,0 +1,438 @@
+//! Shapes of pbrt.
+
+use glam::{DAffine3, DMat3, DVec2, DVec3};
+
+use super::token::{At, Parameters, shown};
+use super::{Importer, beside};
+use crate::Result;
+use crate::format::mesh::{self as meshes, Format};
+use crate::import::geometry::{AROUND, Mesh, similarity};
+use crate::import::scene::Section;
+use crate::import::text;
+
+/// What a shape is, before it is placed.
+#[derive(Debug, Clone)]
+pub enum Form {
+    Sphere {
+        radius: f64,
+    },
+    Disk {
+        height: f64,
+        radius: f64,
+        reversed: bool,
+    },
+    Cylinder {
+        radius: f64,
+        low: f64,
+        high: f64,
+    },
+    /// The path of a file that is written already, and the area in the mesh's own space.
+    Mesh {
+        path: String,
+        area: f64,
+    },
+}
+
+/// From Spectile's own axes of a sphere, whose poles are ±y, to those of pbrt's, whose are ±z, with the same longitudes.
+const POLES: DMat3 = DMat3::from_cols(DVec3::NEG_Y, DVec3::Z, DVec3::NEG_X);
+
+impl Form {
+    /// The object's shape and transform.
+    pub fn section(&self, to_world: &DAffine3, textured: bool) -> Option<Section> {
+        let object = Section::new("[[objects]]");
+        Some(match self {
+            Form::Sphere { radius } => {
+                let factor = similarity(to_world.matrix3)?;
+                if textured {
+                    let turned = *to_world * DAffine3::from_mat3(POLES * *radius);
+                    let object = object.with("sphere", "{ center = [0.0, 0.0, 0.0], radius = 1.0 }");
+                    object.with("transform", text::transform(&turned))
+                } else {
+                    let center = text::vector(to_world.translation);
+                    let radius = text::rounded(radius * factor);
+                    object.with("sphere", format!("{{ center = {center}, radius = {radius} }}"))
+                }
+            }
+            Form::Disk { height, radius, reversed } => {
+                let factor = similarity(to_world.matrix3)?;
+                let sign = if *reversed { -1.0 } else { 1.0 };
+                let normal = (to_world.matrix3.inverse().transpose() * DVec3::Z).normalize() * sign;
+                let center = to_world.transform_point3(DVec3::new(0.0, 0.0, *height));
+                let [center, normal] = [center, normal].map(text::vector);
+                let radius = text::rounded(radius * factor);
+                object.with("disk", format!("{{ center = {center}, normal = {normal}, radius = {radius} }}"))
+            }
+            Form::Cylinder { radius, low, high } => {
+                let factor = similarity(to_world.matrix3)?;
+                let [from, to] = [low, high].map(|z| text::vector(to_world.transform_point3(DVec3::new(0.0, 0.0, *z))));
+                let radius = text::rounded(radius * factor);
+                object.with("cylinder", format!("{{ from = {from}, to = {to}, radius = {radius} }}"))
+            }
+            Form::Mesh { path, .. } => {
+                let object = object.with("mesh", text::quoted(path));
+                match *to_world == DAffine3::IDENTITY {
+                    true => object,
+                    false => object.with("transform", text::transform(to_world)),
+                }
+            }
+        })
+    }
+
+    /// The area under `to_world`, of what a power is spread over.
+    pub fn area(&self, to_world: &DAffine3) -> f64 {
+        let scale = to_world.matrix3.determinant().abs().powf(2.0 / 3.0);
+        let pi = std::f64::consts::PI;
+        scale
+            * match self {
+                Form::Sphere { radius } => 4.0 * pi * radius * radius,
+                Form::Disk { radius, .. } => pi * radius * radius,
+                Form::Cylinder { radius, low, high } => 2.0 * pi * radius * (high - low),
+                Form::Mesh { area, .. } => *area,
+            }
+    }
+}
+
+impl Importer<'_> {
+    /// The shape of a directive; `None` where there is none, which has been said.
+    pub fn form(
+        &mut self,
+        kind: &str,
+        parameters: &Parameters,
+        at: &At,
+        round: bool,
+        reversed: bool,
+    ) -> Result<Option<Form>> {
+        let radius = || -> Result<f64> {
+            let radius = parameters.number("radius")?.unwrap_or(1.0);
+            if radius > 0.0 { Ok(radius) } else { Err(at.problem("`radius` must be above 0").into()) }
+        };
+        let partly = |names: &[&str]| names.iter().any(|name| parameters.get(name).is_some());
+        let mesh = match kind {
+            "sphere" => {
+                let radius = radius()?;
+                if partly(&["zmin", "zmax", "phimax"]) {
+                    self.scene.report.approximated(at.place(), "a part of a sphere as the whole");
+                }
+                if round && !reversed {
+                    return Ok(Some(Form::Sphere { radius }));
+                }
+                self.tessellated(at);
+                Mesh::grid(AROUND, AROUND / 2, |u, v| {
+                    let (azimuth, polar) = (std::f64::consts::TAU * u, std::f64::consts::PI * (1.0 - v));
+                    let p = DVec3::new(polar.sin() * azimuth.cos(), polar.sin() * azimuth.sin(), polar.cos());
+                    (radius * p, p, DVec2::new(u, v))
+                })
+            }
+            "disk" => {
+                let (radius, height) = (radius()?, parameters.number("height")?.unwrap_or(0.0));
+                let inner = parameters.number("innerradius")?.unwrap_or(0.0);
+                if parameters.get("phimax").is_some() {
+                    self.scene.report.approximated(at.place(), "a part of a disk as the whole");
+                }
+                if round && inner == 0.0 {
+                    return Ok(Some(Form::Disk { height, radius, reversed }));
+                }
+                self.tessellated(at);
+                Mesh::grid(AROUND, 1, |u, v| {
+                    let azimuth = std::f64::consts::TAU * u;
+                    let r = radius + v * (inner - radius);
+                    (DVec3::new(r * azimuth.cos(), r * azimuth.sin(), height), DVec3::Z, DVec2::new(u, v))
+                })
+            }
+            "cylinder" => {
+                let radius = radius()?;
+                let (low, high) =
+                    (parameters.number("zmin")?.unwrap_or(-1.0), parameters.number("zmax")?.unwrap_or(1.0));
+                if high <= low {
+                    return Err(at.problem("`zmax` must be above `zmin`").into());
+                }
+                if parameters.get("phimax").is_some() {
+                    self.scene.report.approximated(at.place(), "a part of a cylinder as the whole");
+                }
+                if round && !reversed {
+                    return Ok(Some(Form::Cylinder { radius, low, high }));
+                }
+                self.tessellated(at);
+                Mesh::grid(AROUND, 1, |u, v| {
+                    let azimuth = std::f64::consts::TAU * u;
+                    let normal = DVec3::new(azimuth.cos(), azimuth.sin(), 0.0);
+                    (radius * normal + DVec3::Z * (low + v * (high - low)), normal, DVec2::new(u, v))
+                })
+            }
+            "trianglemesh" => triangles(parameters, at)?,
+            "bilinearmesh" => self.patches(parameters, at)?,
+            "loopsubdiv" => {
+                let levels = parameters.number("levels")?.unwrap_or(3.0).clamp(0.0, 10.0) as u32;
+                parameters.get("scheme");
+                let base = triangles(parameters, at)?;
+                self.scene.report.approximated(
+                    at.place(),
+                    format!("a `loopsubdiv` surface by {levels} refinements, without their limit"),
+                );
+                subdivided(base, levels, at)?
+            }
+            "plymesh" => {
+                let name = parameters.text("filename")?.ok_or_else(|| at.problem("`plymesh` has no `filename`"))?;
+                let path = at.file(name)?;
+                let bytes = meshes::content(&path).map_err(|problem| beside(at, &problem))?;
+                let read =
+                    meshes::parse(Format::of(&path, &bytes), &bytes, &path).map_err(|problem| beside(at, &problem))?;
+                if parameters.get("displacement").is_some() {
+                    self.scene.report.left_out(at.place(), "the displacement of a `plymesh`");
+                }
+                let mesh = match &read.parts[..] {
+                    [part] => Mesh::of_vertices(part),
+                    _ => Mesh::of_file(&read),
+                };
+                if !reversed && agrees(&mesh) {
+                    let area = area(&mesh);
+                    return Ok(Some(Form::Mesh { path: self.scene.copy("meshes", &path)?, area }));
+                }
+                mesh
+            }
+            other => {
+                self.scene.report.left_out(at.place(), format!("the shape `{}`", shown(other)));
+                parameters.ask_for_all();
+                return Ok(None);
+            }
+        };
+        let mut mesh = mesh;
+        if reversed {
+            mesh.reverse();
+        }
+        turn_to_normals(&mut mesh);
+        let name = format!("{kind}-{}", at.line);
+        let area = area(&mesh);
+        Ok(Some(Form::Mesh { path: mesh.write(self.scene, &name)?, area }))
+    }
+
+    fn tessellated(&mut self, at: &At) {
+        let off = 100.0 * (1.0 - (std::f64::consts::PI / f64::from(AROUND)).cos());
+        let what = format!("a round shape by {AROUND} segments around, up to {off:.2} % of its radius within it");
+        self.scene.report.approximated(at.place(), what);
+    }
+
+    /// Patches of four corners each: flat parallelograms are two triangles, others a grid.
+    fn patches(&mut self, parameters: &Parameters, at: &At) -> Result<Mesh> {
+        let points = vectors(parameters, "P")?;
+        let indices = indices(parameters, points.len(), 4, at)?.unwrap_or_else(|| vec![0, 1, 2, 3]);
+        let corners_uv = parameters.get("uv").map(|uv| uv.numbers.as_chunks::<2>().0.to_vec());
+        for unread in ["N", "emissionfilename"] {
+            if parameters.get(unread).is_some() {
+                self.scene.report.left_out(at.place(), format!("`{unread}` of a `bilinearmesh`"));
+            }
+        }
+        const STEPS: u32 = 8;
+        let mut all = Mesh { uv: Some(Vec::new()), ..Mesh::default() };
+        for patch in indices.as_chunks::<4>().0 {
+            if patch.iter().any(|i| *i as usize >= points.len()) {
+                return Err(at.problem("`indices` name a point that is not there").into());
+            }
+            let [a, b, c, d] = patch.map(|i| points[i as usize]);
+            let uv = |i: usize, default: [f64; 2]| {
+                let given = corners_uv.as_ref().and_then(|all| all.get(patch[i] as usize));
+                DVec2::from_array(*given.unwrap_or(&default))
+            };
+            let [ua, ub, uc, ud] = [uv(0, [0., 0.]), uv(1, [1., 0.]), uv(2, [0., 1.]), uv(3, [1., 1.])];
+            let is_flat = (a - b - c + d).length() <= 1e-9 * (a - d).length();
+            let steps = if is_flat { 1 } else { STEPS };
+            if !is_flat {
+                self.scene
+                    .report
+                    .approximated(at.place(), format!("a bent patch of a `bilinearmesh` by {STEPS} x {STEPS} quads"));
+            }
+            let first = all.positions.len() as u32;
+            let ends = |s: f64, t: f64| [(1.0 - s) * (1.0 - t), s * (1.0 - t), (1.0 - s) * t, s * t];
+            for j in 0..=steps {
+                for i in 0..=steps {
+                    let [wa, wb, wc, wd] = ends(f64::from(i) / f64::from(steps), f64::from(j) / f64::from(steps));
+                    all.positions.push(wa * a + wb * b + wc * c + wd * d);
+                    all.uv.iter_mut().for_each(|all| all.push(wa * ua + wb * ub + wc * uc + wd * ud));
+                }
+            }
+            for (j, i) in (0..steps).flat_map(|j| (0..steps).map(move |i| (j, i))) {
+                let p = first + j * (steps + 1) + i;
+                let q = p + steps + 1;
+                all.triangles.extend([[p, p + 1, q + 1], [p, q + 1, q]]);
+            }
+        }
+        Ok(all)
+    }
+}
+
+fn vectors(parameters: &Parameters, name: &str) -> Result<Vec<DVec3>> {
+    let Some(found) = parameters.get(name) else { return Ok(Vec::new()) };
+    let (vectors, rest) = found.numbers.as_chunks::<3>();
+    if !rest.is_empty() {
+        return Err(found.at.problem(format!("`{name}` needs three numbers each")).into());
+    }
+    Ok(vectors.iter().copied().map(DVec3::from_array).collect())
+}
+
+fn indices(parameters: &Parameters, points: usize, each: usize, at: &At) -> Result<Option<Vec<u32>>> {
+    let Some(found) = parameters.get("indices") else {
+        return if points == each {
+            Ok(None)
+        } else {
+            Err(at.problem(format!("the shape has {points} points and no `indices`")).into())
+        };
+    };
+    let whole = |x: &f64| (x.fract() == 0.0 && (0.0..points as f64).contains(x)).then_some(*x as u32);
+    let all: Option<Vec<u32>> = found.numbers.iter().map(whole).collect();
+    let all = all.ok_or_else(|| {
+        found.at.problem(format!("`indices` must be whole numbers from 0 to {}", points.saturating_sub(1)))
+    })?;
+    if all.len() % each != 0 || all.is_empty() {
+        return Err(found.at.problem(format!("`indices` has {} numbers, not {each} each", all.len())).into());
+    }
+    Ok(Some(all))
+}
+
+fn triangles(parameters: &Parameters, at: &At) -> Result<Mesh> {
+    let positions = vectors(parameters, "P")?;
+    if positions.is_empty() {
+        return Err(at.problem("the shape has no points `P`").into());
+    }
+    let indices = indices(parameters, positions.len(), 3, at)?.unwrap_or_else(|| vec![0, 1, 2]);
+    let normals = vectors(parameters, "N")?;
+    let uv = parameters.get("uv").or(parameters.get("st")).map(|uv| uv.numbers.as_chunks::<2>().0.to_vec());
+    let fits = |found: usize, name: &str| match found == positions.len() {
+        true => Ok(()),
+        false => Err(at.problem(format!("has {} points, but {found} of `{name}`", positions.len()))),
+    };
+    if !normals.is_empty() {
+        fits(normals.len(), "N")?;
+    }
+    if let Some(uv) = &uv {
+        fits(uv.len(), "uv")?;
+    }
+    for unread in ["S", "faceIndices", "alpha", "displacement"] {
+        // What would change the picture is said where materials are.
+        if unread != "alpha" && unread != "displacement" {
+            parameters.get(unread);
+        }
+    }
+    Ok(Mesh {
+        positions,
+        normals: (!normals.is_empty()).then_some(normals),
+        uv: uv.map(|uv| uv.into_iter().map(DVec2::from_array).collect()),
+        triangles: indices.as_chunks::<3>().0.to_vec(),
+    })
+}
+
+/// Whether all triangles are turned to where the normals of their corners point.
+fn agrees(mesh: &Mesh) -> bool {
+    let Some(normals) = &mesh.normals else { return true };
+    mesh.triangles.iter().all(|t| {
+        let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
+        let sum: DVec3 = t.iter().map(|i| normals[*i as usize]).sum();
+        (b - a).cross(c - a).dot(sum) >= 0.0
+    })
+}
+
+/// A triangle of pbrt has its front where the normals of its corners are.
+fn turn_to_normals(mesh: &mut Mesh) {
+    let Some(normals) = &mesh.normals else { return };
+    for t in &mut mesh.triangles {
+        let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
+        let sum: DVec3 = t.iter().map(|i| normals[*i as usize]).sum();
+        if (b - a).cross(c - a).dot(sum) < 0.0 {
+            t.swap(1, 2);
+        }
+    }
+}
+
+fn area(mesh: &Mesh) -> f64 {
+    let of = |t: &[u32; 3]| {
+        let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
+        0.5 * (b - a).cross(c - a).length()
+    };
+    mesh.triangles.iter().map(of).sum()
+}
+
+/// Loop's subdivision (1987), with the rules of boundaries.
+fn subdivided(base: Mesh, levels: u32, at: &At) -> Result<Mesh> {
+    use std::collections::BTreeMap;
+    let mut mesh = Mesh { normals: None, uv: None, ..base };
+    for _ in 0..levels {
+        if mesh.triangles.len() > 5_000_000 {
+            return Err(at.problem("the surface has more than 20 million triangles when it is refined").into());
+        }
+        // Of each edge the corners opposite; of each vertex its neighbours, and those along a boundary.
+        let mut edges: BTreeMap<[u32; 2], Vec<u32>> = BTreeMap::new();
+        for t in &mesh.triangles {
+            for i in 0..3 {
+                let (a, b) = (t[i], t[(i + 1) % 3]);
+                edges.entry([a.min(b), a.max(b)]).or_default().push(t[(i + 2) % 3]);
+            }
+        }
+        let count = mesh.positions.len();
+        let mut around = vec![Vec::new(); count];
+        let mut boundary = vec![Vec::new(); count];
+        for (&[a, b], opposite) in &edges {
+            around[a as usize].push(b);
+            around[b as usize].push(a);
+            if opposite.len() == 1 {
+                boundary[a as usize].push(b);
+                boundary[b as usize].push(a);
+            }
+        }
+        let p = |i: u32| mesh.positions[i as usize];
+        let mut positions: Vec<DVec3> = (0..count as u32)
+            .map(|i| match &boundary[i as usize][..] {
+                [] => {
+                    let neighbours = &around[i as usize];
+                    let n = neighbours.len().max(1) as f64;
+                    let beta = if neighbours.len() == 3 { 3.0 / 16.0 } else { 3.0 / (8.0 * n) };
+                    let sum: DVec3 = neighbours.iter().map(|j| p(*j)).sum();
+                    (1.0 - n * beta) * p(i) + beta * sum
+                }
+                [a, b] => 0.75 * p(i) + 0.125 * (p(*a) + p(*b)),
+                _ => p(i),
+            })
+            .collect();
+        let mut middle: BTreeMap<[u32; 2], u32> = BTreeMap::new();
+        for (&[a, b], opposite) in &edges {
+            middle.insert([a, b], positions.len() as u32);
+            positions.push(match opposite[..] {
+                [c, d] => 0.375 * (p(a) + p(b)) + 0.125 * (p(c) + p(d)),
+                _ => 0.5 * (p(a) + p(b)),
+            });
+        }
+        let of = |a: u32, b: u32| middle[&[a.min(b), a.max(b)]];
+        let split = mesh.triangles.iter().flat_map(|&[a, b, c]| {
+            let (ab, bc, ca) = (of(a, b), of(b, c), of(c, a));
+            [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+        });
+        mesh = Mesh { triangles: split.collect(), positions, normals: None, uv: None };
+    }
+    mesh.smooth();
+    Ok(mesh)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A regular octahedron becomes a body without corners, of the volume that Loop's rules leave; all its vertices stay alike.
+    #[test]
+    fn loops_rules_keep_what_is_alike_alike() {
+        let positions = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::NEG_X, DVec3::NEG_Y, DVec3::NEG_Z].to_vec();
+        let triangles = vec![[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]];
+        let at = At { file: std::path::Path::new("a").into(), line: 1 };
+        let base = Mesh { positions, triangles, ..Mesh::default() };
+        let once = subdivided(base.clone(), 1, &at).unwrap();
+        assert_eq!((once.positions.len(), once.triangles.len()), (18, 32));
+        // Four neighbours: 1 - 4 · 3/32 of itself, and neighbours that cancel.
+        assert!(once.positions[..6].iter().all(|p| (p.length() - 0.625).abs() < 1e-12));
+        // Middles: 3/8 of both ends, 1/8 of the opposite corners, which cancel.
+        assert!(once.positions[6..].iter().all(|p| (p.length() - 0.375 * 2f64.sqrt()).abs() < 1e-12));
+        let plane = Mesh {
+            positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::new(1.0, 1.0, 0.0)],
+            triangles: vec![[0, 1, 2], [1, 3, 2]],
+            ..Mesh::default()
+        };
+        let fine = subdivided(plane, 2, &at).unwrap();
+        assert!(fine.positions.iter().all(|p| p.z == 0.0) && fine.triangles.len() == 32);
+    }
+}
