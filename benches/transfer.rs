@@ -81,7 +81,7 @@ fn into_cube(worker: &mut Worker, header: &Header, unit: UnitRect, samples: u32,
     let path = folder.path().join("cube.zarr");
     let cube = Writer::open(&path, &header, Existing::Refuse, 0..1, &mut |what| panic!("{what}"))?;
     let mut merged = 0;
-    let mut merge = |means: &[f32]| {
+    let mut merge = |means: &[f32]| -> Result<()> {
         cube.merge_unit(0, merged, portion, means)?;
         merged += portion;
         Ok::<(), spectile::Error>(())
