@@ -336,7 +336,7 @@ impl Importer<'_> {
             }
             _ => return Ok(false),
         };
-        self.state.ctm = self.state.ctm * step;
+        self.state.ctm *= step;
         if !self.state.ctm.is_finite() {
             return Err(at.problem("the transform is not finite").into());
         }
