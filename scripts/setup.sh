@@ -106,6 +106,33 @@ need_python() {
   export SPECTILE_PYTHON=$venv/bin/python
 }
 
+# The Python package, put together in the folder of what is built; sets SPECTILE_PACKAGE for the tests. Needs `build` and `need_python`.
+need_package() {
+  [ -n "${SPECTILE_PYTHON:-}" ] || return 0
+  local built=${spectile%/spectile}
+  export PYO3_PYTHON=$SPECTILE_PYTHON PYO3_BUILD_EXTENSION_MODULE=1
+  [ -d "$built/package" ] || say "building the Python package"
+  (cd "$root" && cargo build --release --locked --quiet -p spectile-python)
+  "$SPECTILE_PYTHON" "$root/python/develop.py" "$built" "$built/package"
+  export SPECTILE_PACKAGE=$built/package
+}
+
+# Makes a wheel of the Python package, of the release build; prints its path.
+make_wheel() {
+  local built=${spectile%/spectile} tools out
+  tools=$built/wheel-tools out=$built/wheels
+  command -v python3 >/dev/null || install "Python" python3 python3-venv
+  if [ ! -x "$tools/bin/maturin" ]; then
+    python3 -c 'import ensurepip' 2>/dev/null || install "Python's venv" python3-venv
+    say "installing maturin, which makes wheels"
+    python3 -m venv --clear "$tools"
+    "$tools/bin/pip" install --quiet --disable-pip-version-check 'maturin>=1.9,<2'
+  fi
+  rm -f "$out"/spectile-*.whl
+  "$tools/bin/maturin" build --quiet --release --locked --manifest-path "$root/python/Cargo.toml" --out "$out" >&2
+  ls "$out"/spectile-*.whl
+}
+
 # A browser and what drives it, for the tests of the page; sets SPECTILE_CHROMIUM for them.
 need_browser() {
   local folder=$root/tests/page

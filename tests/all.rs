@@ -8,6 +8,7 @@ mod images;
 mod import;
 mod kernels;
 mod manual;
+mod package;
 mod physics;
 #[cfg(feature = "web")]
 mod preview;

@@ -6,10 +6,13 @@
 //! reads the scene folder's `spectra/` and writes to its `generated/`.
 
 mod aircraft;
+mod cloud;
 mod conference;
 mod gases;
+mod haze;
 mod image;
 mod isosurface;
+pub mod matter;
 mod mesh;
 mod plume;
 mod shape;
@@ -21,16 +24,22 @@ use std::io;
 use std::path::Path;
 use std::process::ExitCode;
 
-pub const NAMES: [&str; 3] = ["conference", "aircraft", "statues"];
+pub const NAMES: [&str; 5] = ["conference", "aircraft", "statues", "haze", "cloud"];
 
-/// Makes what the scene in the folder `scene` needs, in its folder `generated`.
+/// Makes what the scene in the folder `scene` needs, in its folder `generated`; or, named `matter`, what several have in common and the
+/// repository holds.
 pub fn make(name: &str, scene: &Path) -> io::Result<()> {
+    if name == "matter" {
+        return matter::make(scene);
+    }
     let folder = &scene.join("generated");
     std::fs::create_dir_all(folder)?;
     match name {
         "conference" => conference::make(folder),
         "aircraft" => aircraft::make(scene, folder),
         "statues" => statues::make(scene, folder),
+        "haze" => haze::make(folder),
+        "cloud" => cloud::make(folder),
         _ => Err(io::Error::other(format!("there is no scene `{name}` to make"))),
     }
 }

@@ -55,13 +55,12 @@ pub fn write(folder: &Path) -> io::Result<()> {
             }
         }
     }
-    array(&folder.join("density.zarr"), &density)?;
-    array(&folder.join("temperature.zarr"), &temperature)
+    write_array(&folder.join("density.zarr"), SIZE, &density)?;
+    write_array(&folder.join("temperature.zarr"), SIZE, &temperature)
 }
 
 /// A Zarr v3 array [z, y, x] of f32 in one chunk.
-fn array(path: &Path, values: &[f32]) -> io::Result<()> {
-    let [nx, ny, nz] = SIZE;
+pub fn write_array(path: &Path, [nx, ny, nz]: [usize; 3], values: &[f32]) -> io::Result<()> {
     fs::create_dir_all(path.join("c/0/0"))?;
     let metadata = json!({
         "zarr_format": 3, "node_type": "array", "shape": [nz, ny, nx], "data_type": "float32",

@@ -30,7 +30,7 @@ impl Table {
     }
 
     /// The value of a column at `nm`, linear in between, held beyond the ends.
-    fn at(&self, nm: f64, column: usize) -> f64 {
+    pub fn at(&self, nm: f64, column: usize) -> f64 {
         let i = self.0.partition_point(|row| row[0] <= nm).clamp(1, self.0.len() - 1);
         let (a, b) = (&self.0[i - 1], &self.0[i]);
         let t = ((nm - a[0]) / (b[0] - a[0])).clamp(0.0, 1.0);

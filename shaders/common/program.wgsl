@@ -139,6 +139,18 @@ fn operation_value(record: vec4<u32>, raw: vec4<f32>, quad: u32, s: SpectralSamp
             return exp(-parameter * a);
         }
 #endif
+#if SCATTERS
+        case OP_HENYEY_GREENSTEIN: {
+            let g = spectrum_value(record.y >> 16u, quad, s);
+            let x = (1.0 - g) * (1.0 - g) + 2.0 * parameter * g;
+            return a * (1.0 - g) * (1.0 + g) / (x * sqrt(x));
+        }
+#endif
+#if PHASE_TABLES
+        case OP_PHASE_TABLE: {
+            return phase_columns(record.y >> 16u, parameter, a);
+        }
+#endif
 #if OP_FRESNEL
         case OP_FRESNEL, OP_TRANSMIT: {
             let eta = select(index, 1.0 / index, (record.x & MODE_BEHIND) != 0u);

@@ -11,6 +11,9 @@
 #if RADIATORS
     var held_$v = vec4<f32>(0.0);
 #endif
+#if SCATTERS
+    var saved_$v = vec4<f32>(0.0);
+#endif
 #end
 #endif
 #if THINNED
@@ -58,16 +61,36 @@
             let march_from = bitcast<vec4<f32>>(records[r + 1u]).xyz;
             let march_to = bitcast<vec4<f32>>(records[r + 2u]).xyz;
             r += 2u;
+#repeat VECTORS v
+            march(record, march_from, march_to, quad_$v, s, weight, &throughput_$v, &radiance_$v);
+#end
+            continue;
+        }
+        if ((record.x & 0x3fu) == OP_AMOUNTS) {
             let on_factor = (record.x & MODE_ON_F) != 0u;
 #repeat VECTORS v
-            var through_$v = select(throughput_$v, factor_$v, on_factor);
-            march(record, march_from, march_to, quad_$v, s, select(weight, 0.0, on_factor), &through_$v, &radiance_$v);
-            throughput_$v = select(through_$v, throughput_$v, on_factor);
-            factor_$v = select(factor_$v, through_$v, on_factor);
+            let first_depth_$v = weight * spectrum_value(record.y & 0xffffu, quad_$v, s);
+            let through_$v = exp(-(first_depth_$v + bitcast<f32>(record.w) * spectrum_value(record.y >> 16u, quad_$v, s)));
+            throughput_$v *= select(through_$v, vec4<f32>(1.0), on_factor);
+            factor_$v *= select(vec4<f32>(1.0), through_$v, on_factor);
             if ((record.x & MODE_GATHER) != 0u) {
                 radiance_$v += throughput_$v * factor_$v * spectrum_value(record.x >> 16u, quad_$v, s);
                 factor_$v = vec4<f32>(0.0);
             }
+#end
+            continue;
+        }
+#endif
+#if SCATTERS
+        if ((record.x & 0x3fu) == OP_SAVE) {
+#repeat VECTORS v
+            saved_$v = throughput_$v;
+#end
+            continue;
+        }
+        if ((record.x & 0x3fu) == OP_RESTORE) {
+#repeat VECTORS v
+            throughput_$v = saved_$v;
 #end
             continue;
         }

@@ -6,7 +6,7 @@
 @group(1) @binding(3) var<storage, read_write> heads: array<vec2<u32>>;
 @group(1) @binding(5) var<storage, read_write> counters: array<atomic<u32>>;
 @group(1) @binding(6) var<uniform> step: Step;
-#if ROULETTE
+#if SCALED
 @group(1) @binding(7) var<storage, read_write> throughputs: array<f32>;
 #endif
 // Paths still under way: two lists that take turns, and how long each became.
@@ -41,8 +41,13 @@ fn load_path(number: u32, second: vec4<u32>) -> Path {
 #if MEDIA
     path.nested = states[STATE_WORDS * number + 2u].yz;
 #endif
-#if ROULETTE
+#if SCALED
     path.scale = throughputs[number];
+#endif
+#if RATIOS
+    for (var t = 0u; t < TECHNIQUES; t += 1u) {
+        ratios[t] = bitcast<f32>(states[STATE_WORDS * number + 3u + t / 4u][t & 3u]);
+    }
 #endif
     return path;
 }
@@ -53,8 +58,13 @@ fn save_path(path: Path, records: u32) {
 #if THIRD_STATE
     states[STATE_WORDS * path.number + 2u] = vec4<u32>(path.live, path.nested, 0u);
 #endif
-#if ROULETTE
+#if SCALED
     throughputs[path.number] = path.scale;
+#endif
+#if RATIOS
+    for (var t = 0u; t < TECHNIQUES; t += 1u) {
+        states[STATE_WORDS * path.number + 3u + t / 4u][t & 3u] = bitcast<u32>(ratios[t]);
+    }
 #endif
 }
 
@@ -91,6 +101,10 @@ struct Site {
     from_front: bool,
     // The geometric normal on the side of the ray.
     face: vec3<f32>,
+#if SCATTERS
+    // Whether there is none, and matter scatters.
+    in_matter: bool,
+#endif
 }
 
 // A light that is aimed at, and the way to it.

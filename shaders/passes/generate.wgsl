@@ -40,7 +40,11 @@ fn append_light(list: ptr<function, RecordList>, path: u32, aim: Aim, way: ptr<f
 // Both directions in turn: the light's, if it is seen, adds its radiance; `choice` goes on, unless it is the only one of its lobe.
 fn scatter(list: ptr<function, RecordList>, path: Path, site: Site, v: Vertex, aim: Aim, choice: ptr<function, DirectionChoice>, overflow: ptr<function, bool>) {
     let material = site.material;
+#if SCATTERS
+    let ab = lobes[select((*choice).lobe, 0u, site.in_matter)].ab;
+#else
     let ab = lobes[(*choice).lobe].ab;
+#endif
     var way: LightWay;
     var advanced = false;
     for (var turn = select(1u, 0u, aim.density > 0.0); turn < 2u; turn += 1u) {
@@ -49,7 +53,16 @@ fn scatter(list: ptr<function, RecordList>, path: Path, site: Site, v: Vertex, a
             break;
         }
         let direction = select((*choice).direction, aim.direction, to_light);
+#if SCATTERS
+        var chance: f32;
+        if (site.in_matter) {
+            chance = matter_density(direction);
+        } else {
+            chance = bsdf_density(material, v, direction);
+        }
+#else
         let chance = bsdf_density(material, v, direction);
+#endif
         var weight = 1.0 / chance;
         if (to_light) {
 #lines LIGHT_WEIGHT
@@ -80,11 +93,19 @@ fn scatter(list: ptr<function, RecordList>, path: Path, site: Site, v: Vertex, a
             }
             continue;
         }
+#if SCATTERS
+        if (site.in_matter) {
+            append_turn(list, direction, weight);
+        } else {
+#endif
         for (var p = material.first_lobe; p < material.first_lobe + material.lobe_count; p += 1u) {
             if (lobe_pick(p, v) > 0.0) {
                 append_lobe(list, lobe_at(p, v), v, direction, weight);
             }
         }
+#if SCATTERS
+        }
+#endif
         if (to_light) {
             if ((*list).count > begin) {
                 append_light(list, path.number, aim, &way);
@@ -126,22 +147,50 @@ fn generate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroup
     var overflow = false;
 
     // The next vertex, or what comes from beyond the scene.
+#if SCATTERS
+    let way_begins = list;
+#if RATIOS
+    if (step.bounce == 0u) {
+        for (var t = 0u; t < TECHNIQUES; t += 1u) {
+            ratios[t] = 1.0;
+        }
+    }
+#endif
+#endif
     let meeting = meet(&path, &list, &overflow);
+    var site: Site;
+    var v: Vertex;
     if (meeting.hit.primitive == NONE) {
 #lines BEYOND
+#if SCATTERS
+    } else {
+#else
         end_path(list, 2u * step.bounce + 1u, overflow);
         return;
     }
-    var site: Site;
+#endif
     site.surface = surface_at(meeting.ray, meeting.hit);
     site.hit = meeting.hit;
     site.material = surface_materials[site.surface.material];
     site.from_front = dot(site.surface.normal, path.ray.direction) < 0.0;
     site.face = select(-site.surface.normal, site.surface.normal, site.from_front);
-    var v = vertex_at(meeting.hit, site.surface, site.from_front, -path.ray.direction);
+    v = vertex_at(meeting.hit, site.surface, site.from_front, -path.ray.direction);
 
     // What it emits.
 #lines EMIT
+#if SCATTERS
+    }
+    // Or matter scatters the path before.
+    var position: vec3<f32>;
+    var survival: f32;
+    if (!overflow && is_scattered(&path, &list, way_begins, &position, &survival)) {
+        site = site_in_matter(position, survival);
+        v = vertex_in_matter();
+    } else if (meeting.hit.primitive == NONE) {
+        end_path(list, 2u * step.bounce + 1u, overflow);
+        return;
+    }
+#endif
     if (step.bounce == frame.max_bounces || site.material.lobe_count == 0u || !(v.o.z > 0.0) || overflow) {
         end_path(list, 2u * step.bounce + 1u, overflow);
         return;
@@ -153,7 +202,16 @@ fn generate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroup
     let u_bsdf = draw(from_path, dimension + DIMENSION_BSDF);
     let u_choice = draw(from_path, dimension + DIMENSION_CHOICE);
     let u_lobe = draw(from_path, dimension + DIMENSION_LOBE);
+#if SCATTERS
+    var choice: DirectionChoice;
+    if (site.in_matter) {
+        choice = choose_turn(u_bsdf, u_lobe.x);
+    } else {
+        choice = choose_direction(site.material, &v, u_bsdf, u_lobe, heads[number].x, path.live);
+    }
+#else
     var choice = choose_direction(site.material, &v, u_bsdf, u_lobe, heads[number].x, path.live);
+#endif
     if (choice.lobe == NONE) {
         end_path(list, 2u * step.bounce + 1u, overflow);
         return;
@@ -176,6 +234,12 @@ fn generate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroup
     path.density = choice.density;
     path.ray.direction = to_world(v, choice.direction);
     path.ray.origin = offset_origin(site.surface.position, select(-site.face, site.face, choice.direction.z > 0.0));
+#if SCATTERS
+    if (site.in_matter) {
+        path.ray.origin = site.surface.position;
+        note_turn(path.ray.direction);
+    }
+#endif
 #lines PASSED
     if (overflow) {
         atomicAdd(&counters[COUNTER_OVERFLOW], 1u);

@@ -4,7 +4,7 @@
 @group(1) @binding(1) var<storage, read> units: array<vec4<u32>>;
 @group(1) @binding(2) var<storage, read_write> states: array<vec4<u32>>;
 @group(1) @binding(3) var<storage, read_write> heads: array<vec2<u32>>;
-#if ROULETTE
+#if SCALED
 @group(1) @binding(7) var<storage, read_write> throughputs: array<f32>;
 #endif
 
@@ -98,7 +98,7 @@ fn generate_camera(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     states[2u * path] = bitcast<vec4<u32>>(vec4<f32>(origin, 0.0));
     states[2u * path + 1u] = vec4<u32>(bitcast<vec3<u32>>(direction), 0u);
 #endif
-#if ROULETTE
+#if SCALED
     throughputs[path] = 1.0;
 #endif
 }

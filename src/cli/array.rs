@@ -49,7 +49,13 @@ pub fn probe(args: &Args) -> Result<()> {
 
 /// The scene that was submitted, as this node sees it.
 fn scene_of(job: &Job) -> Result<Scene> {
-    let args = SceneArgs { scene: job.scene.clone(), overrides: job.overrides.clone(), size: job.size, tile: job.tile };
+    let args = SceneArgs {
+        scene: job.scene.clone(),
+        overrides: job.overrides.clone(),
+        size: job.size,
+        tile: job.tile,
+        given: None,
+    };
     let scene = args.load().map_err(on_node)?;
     if scene.digest != job.scene_digest {
         return Err(Error::Usage(format!(

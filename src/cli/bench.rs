@@ -7,7 +7,6 @@ use std::time::{Duration, Instant};
 use serde_json::json;
 
 use super::Output;
-use super::output::say;
 use super::render::parse_time;
 use crate::device::example::with_everything;
 use crate::files::shown;
@@ -99,7 +98,7 @@ struct Step<'a> {
 }
 
 pub fn run(args: &Args, output: &Output) -> Result<()> {
-    let interrupt = super::interrupt::watch()?;
+    let interrupt = output.interrupt()?;
     let files = if args.scenes.is_empty() { SCENES.map(PathBuf::from).to_vec() } else { args.scenes.clone() };
     if let Some(missing) = files.iter().find(|file| args.scenes.is_empty() && !file.exists()) {
         return Err(Error::Usage(format!(
@@ -132,7 +131,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         if began.elapsed() > args.budget {
             report.missing.push(format!("{what}: the time of --budget was over"));
         } else {
-            say(&what);
+            output.say(&what);
             measure_step(args, &step, &name, &gpu, &interrupt, &mut report)?;
         }
         write(&args.output, "bench", &report.csv(), &report.json(), &report.html()?)?;
@@ -144,7 +143,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         if began.elapsed() > args.budget {
             report.missing.push(format!("{what}: the time of --budget was over"));
         } else {
-            say(&what);
+            output.say(&what);
             let scene = load(file, side, CHANNELS)?;
             let seconds = frames(&mut Trial::new(&scene, &gpu, None, &interrupt)?, args.rounds)?;
             report.frames.push(Frames { scene: name, channels: CHANNELS as usize, side, seconds });

@@ -7,7 +7,6 @@ use std::time::Duration;
 use serde_json::json;
 
 use super::Output;
-use super::output::say;
 use super::render::parse_time;
 use super::scene::SceneArgs;
 use crate::cube::Cube;
@@ -80,7 +79,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, output: &Output) -> Result<()> {
-    let interrupt = super::interrupt::watch()?;
+    let interrupt = output.interrupt()?;
     let scenes = scenes(args)?;
     make_folder(&args.output, "converge")?;
     let gpu = Arc::new(Gpu::open_all(&args.devices)?.remove(0));
@@ -91,7 +90,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     for (name, scene) in &scenes {
         let channels = &scene.channels;
         if references.iter().all(|(known, _)| *known != channels) {
-            references.push((channels, reference(args, scene, &gpu, &interrupt)?));
+            references.push((channels, reference(args, scene, &gpu, &interrupt, output)?));
         }
         let (_, reference) = references.iter().find(|(known, _)| *known == channels).expect("just seen to");
         report.curves.push(Curve {
@@ -104,7 +103,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         measure(scene, args.seed, &gpu, limit, &interrupt, reference, |point| {
             let curve = report.curves.last_mut().expect("just pushed");
             let (samples, seconds, rel_mse) = (point.samples, point.seconds, point.mean_rel_mse());
-            say(&format!("{name}: {samples} samples/pixel, {seconds:.1} s, mean relMSE {rel_mse:.3e}"));
+            output.say(&format!("{name}: {samples} samples/pixel, {seconds:.1} s, mean relMSE {rel_mse:.3e}"));
             curve.points.push(point);
             write(&args.output, "converge", &report.csv(), &report.json(), &report.html()?)
         })?;
@@ -114,8 +113,14 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
 }
 
 /// What curves in the channels of `scene` are compared with: the cube that was given, or a render of its own.
-fn reference(args: &Args, scene: &Scene, gpu: &Arc<Gpu>, interrupt: &Arc<Interrupt>) -> Result<Reference> {
-    say(&format!("reference for {} channels", scene.channels.len()));
+fn reference(
+    args: &Args,
+    scene: &Scene,
+    gpu: &Arc<Gpu>,
+    interrupt: &Arc<Interrupt>,
+    output: &Output,
+) -> Result<Reference> {
+    output.say(&format!("reference for {} channels", scene.channels.len()));
     if let Some(path) = &args.reference {
         return Reference::of_cube(&Cube::open(path)?, scene);
     }

@@ -7,7 +7,6 @@ use serde_json::{Value, json};
 
 use super::Output;
 use super::bands::Bands;
-use super::output::say;
 use crate::cube::{Cube, Quantity, Rect, View, White};
 use crate::export::{self, Shown};
 use crate::format::envi::Interleave;
@@ -223,7 +222,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         Some(_) => export::BLOCKS.check_target(&args.output)?,
         None => format.check_target(&args.output)?,
     }
-    let files = write(args, &view, format)?;
+    let files = write(args, &view, format, output)?;
     if let (export::Format::Envi { .. }, None) = (format, args.blocks)
         && let Some(other) = export::other_header(&args.output)
     {
@@ -256,7 +255,7 @@ impl Said<'_> {
         if !self.aside {
             return self.output.text(text);
         }
-        say(text.trim_end());
+        self.output.say(text.trim_end());
         Ok(())
     }
 
@@ -357,8 +356,8 @@ fn interleave(args: &Args) -> Result<Interleave> {
 }
 
 /// Writes the files, with a bar on a terminal; an interrupt leaves nothing behind.
-fn write(args: &Args, view: &View, format: export::Format) -> Result<Vec<PathBuf>> {
-    super::progress::watched(args.json, |progress| match args.blocks {
+fn write(args: &Args, view: &View, format: export::Format, output: &Said) -> Result<Vec<PathBuf>> {
+    super::progress::watched(output.output, |progress| match args.blocks {
         None => export::write(view, &args.output, format, progress),
         Some(side) => export::write_blocks(view, &args.output, format, side, progress),
     })
@@ -445,7 +444,7 @@ fn write_png(args: &Args, cube: &Cube, output: &Said) -> Result<()> {
             }
         }
     };
-    let tone = picture(args, &view, &shown, args.exposure.map(Tone::Exposure))?;
+    let tone = picture(args, &view, &shown, args.exposure.map(Tone::Exposure), output)?;
     let Tone::Exposure(ev) = tone else { return Err(Error::Internal("colours have an exposure".into())) };
     let missing = missing(cube)?;
     output.event(
@@ -466,8 +465,8 @@ fn write_png(args: &Args, cube: &Cube, output: &Said) -> Result<()> {
 }
 
 /// Writes a picture, with a bar on a terminal; an interrupt leaves nothing behind.
-fn picture(args: &Args, view: &View, shown: &Shown, tone: Option<Tone>) -> Result<Tone> {
-    super::progress::watched(args.json, |progress| export::write_png(view, &args.output, shown, tone, progress))
+fn picture(args: &Args, view: &View, shown: &Shown, tone: Option<Tone>, output: &Said) -> Result<Tone> {
+    super::progress::watched(output.output, |progress| export::write_png(view, &args.output, shown, tone, progress))
 }
 
 /// A colour map of the bands of `view` together.
@@ -477,7 +476,7 @@ fn write_map(args: &Args, view: &View, output: &Said) -> Result<()> {
         (_, true) => (export::Map::Integrated, "radiance", "W m-2 sr-1"),
         _ => (export::Map::Radiance, "mean radiance", "W m-2 sr-1 nm-1"),
     };
-    let tone = picture(args, view, &Shown::Map(map), args.range.map(Tone::Range))?;
+    let tone = picture(args, view, &Shown::Map(map), args.range.map(Tone::Range), output)?;
     let Tone::Range(range) = tone else { return Err(Error::Internal("a colour map has ends".into())) };
     let channels = view.channels();
     let from = channels.bounds.iter().map(|b| b[0]).fold(f64::INFINITY, f64::min);

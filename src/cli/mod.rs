@@ -3,6 +3,7 @@
 mod array;
 mod bands;
 mod bench;
+mod call;
 mod compare;
 mod converge;
 mod devices;
@@ -13,6 +14,7 @@ mod info;
 mod interrupt;
 mod output;
 mod plan;
+mod program;
 mod progress;
 mod render;
 mod scene;
@@ -28,7 +30,9 @@ use clap::{Parser, Subcommand};
 
 use crate::Result;
 
+pub use call::{Host, call, catch};
 pub use output::Output;
+pub use program::{program, program_of_script};
 
 /// Spectral image renderer: the radiance of a scene in hundreds or thousands of channels.
 #[derive(Debug, Parser)]

@@ -1,25 +1,58 @@
-//! What a command says: text for people, or with `--json` one object a line for programs.
+//! What a command says: text for people, or with `--json` one object a line for programs; or, within another program, to that.
 
 use std::io::{ErrorKind, Write};
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 
 use serde_json::{Map, Value, json};
 
+use super::call::Host;
 use crate::files::shown;
+use crate::preview::Feed;
+use crate::render::interrupt::Interrupt;
 use crate::{Error, Result};
 
-/// The standard output of one command.
-#[derive(Debug)]
+/// Where a command says what it has to say, and hears that it should end.
 pub struct Output {
     json: bool,
     started: Instant,
+    host: Option<Host>,
 }
 
 impl Output {
-    /// `time_s` of events counts from here.
+    /// The standard output. `time_s` of events counts from here.
     pub fn new(json: bool) -> Self {
-        Output { json, started: Instant::now() }
+        Output { json, started: Instant::now(), host: None }
+    }
+
+    /// A program that runs the command within itself: it gets every event, and nothing is printed.
+    pub(super) fn of_host(host: Host) -> Self {
+        Output { json: true, started: Instant::now(), host: Some(host) }
+    }
+
+    /// What asks for the end of the command: signals, or the program around it.
+    pub(super) fn interrupt(&self) -> Result<Arc<Interrupt>> {
+        match &self.host {
+            Some(host) => Ok(Arc::clone(&host.interrupt)),
+            None => super::interrupt::watch(),
+        }
+    }
+
+    /// Where the program around a render looks how far it is.
+    pub(super) fn feed(&self) -> Option<Arc<Feed>> {
+        self.host.as_ref().map(|host| Arc::clone(&host.feed))
+    }
+
+    /// Says a line aside: on stderr, or to the program around the command as an event `message`.
+    pub(super) fn say(&self, line: &str) {
+        match &self.host {
+            // It is told, not asked.
+            Some(host) => {
+                let _ = (host.event)(&json!({ "event": "message", "message": line }));
+            }
+            None => say(line),
+        }
     }
 
     pub fn json(&self) -> bool {
@@ -43,12 +76,18 @@ impl Output {
         if let Value::Object(fields) = fields {
             object.extend(fields);
         }
-        write(&format!("{}\n", Value::Object(object)))
+        let object = Value::Object(object);
+        match &self.host {
+            Some(host) => (host.event)(&object),
+            None => write(&format!("{object}\n")),
+        }
     }
 
     /// Says a warning on stderr, and in JSON as an event on stdout too.
     pub fn warn(&self, text: &str) -> Result<()> {
-        say(&format!("warning: {text}"));
+        if self.host.is_none() {
+            say(&format!("warning: {text}"));
+        }
         self.event("warning", json!({ "message": text }))
     }
 

@@ -6,7 +6,6 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 
 use super::Output;
-use super::output::say;
 use super::progress::short;
 use super::scene::SceneArgs;
 use crate::cube::{Choices, Header};
@@ -84,7 +83,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     let mut gpus = match Gpu::open_all(&args.devices) {
         Ok(gpus) => gpus,
         Err(error @ Error::NoDevice(_)) => {
-            say(&format!("warning: {error}"));
+            warn(output, &error.to_string())?;
             Vec::new()
         }
         Err(error) => return Err(error),
@@ -114,8 +113,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
 }
 
 fn warn(output: &Output, what: &str) -> Result<()> {
-    say(&format!("warning: {what}"));
-    output.event("warning", json!({ "message": what }))
+    output.warn(what)
 }
 
 /// What a short trial on a device told.

@@ -8,7 +8,6 @@ use serde_json::{Value, json};
 
 use super::Output;
 use super::info::ROUGH_BELOW;
-use super::output::say;
 use crate::cube::{Cube, Existing, Progress, reduction};
 use crate::files::{format_bytes, shown};
 use crate::preview::Status;
@@ -25,9 +24,9 @@ const LINE_AT_LEAST_EVERY: Duration = Duration::from_secs(10);
 pub type Steps<'a> = &'a mut dyn FnMut(u64, u64) -> Result<()>;
 
 /// Does work that is not a render: with a bar on a terminal, and until a signal ends it.
-pub fn watched<T>(json: bool, work: impl FnOnce(Steps) -> Result<T>) -> Result<T> {
-    let interrupt = super::interrupt::watch()?;
-    let bar = (!json && std::io::stderr().is_terminal()).then(|| {
+pub fn watched<T>(output: &Output, work: impl FnOnce(Steps) -> Result<T>) -> Result<T> {
+    let interrupt = output.interrupt()?;
+    let bar = (!output.json() && std::io::stderr().is_terminal()).then(|| {
         let bar = ProgressBar::with_draw_target(Some(1), ProgressDrawTarget::stderr_with_hz(5));
         let style = ProgressStyle::with_template("{bar:30} {percent} %  {eta} left").expect("a valid template");
         bar.with_style(style)
@@ -70,7 +69,7 @@ impl<'a> Reporter<'a> {
     fn line(&self, text: &str) {
         match &self.bar {
             Some(bar) => bar.println(text),
-            None if !self.quiet && !self.output.json() => say(text),
+            None if !self.quiet && !self.output.json() => self.output.say(text),
             None => {}
         }
     }
@@ -79,7 +78,7 @@ impl<'a> Reporter<'a> {
     fn say_always(&self, text: &str) {
         match &self.bar {
             Some(bar) => bar.println(text),
-            None => say(text),
+            None => self.output.say(text),
         }
     }
 
@@ -93,8 +92,14 @@ impl<'a> Reporter<'a> {
 
     /// Warnings are always said, and are events of their own.
     pub fn warn(&self, text: &str) -> Result<()> {
-        self.say_always(&format!("warning: {text}"));
-        self.emit("warning", json!({ "message": text }))
+        match &self.bar {
+            Some(bar) => bar.println(format!("warning: {text}")),
+            None => match self.output.warn(text) {
+                Err(Error::BrokenPipe) => {}
+                result => return result,
+            },
+        }
+        Ok(())
     }
 
     /// Where the page is; always said, since nobody else knows.
@@ -141,6 +146,10 @@ impl<'a> Reporter<'a> {
     pub fn event(&mut self, event: Event) -> Result<()> {
         match event {
             Event::Warning(text) => self.warn(&text),
+            Event::Note(text) => {
+                self.line(&text);
+                self.emit("note", json!({ "message": text }))
+            }
             Event::Device(name) => {
                 self.line(&format!("device: {name}"));
                 self.emit("device", json!({ "name": name }))
@@ -203,12 +212,12 @@ impl<'a> Reporter<'a> {
         let summary = match summary {
             Ok(summary) => summary,
             Err(error @ Error::Interrupted { .. }) => {
-                say(&self.interrupted(job));
+                self.output.say(&self.interrupted(job));
                 return Err(error);
             }
             Err(error) => {
                 if self.merged && matches!(error, Error::DevicesLost(_) | Error::Storage { .. }) {
-                    say("what is merged is kept: the same command with --resume goes on from there");
+                    self.output.say("what is merged is kept: the same command with --resume goes on from there");
                 }
                 return Err(error);
             }

@@ -187,13 +187,13 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
             return Err(Error::Usage(format!("{}: {what}", preview.display())));
         }
     }
-    let interrupt = super::interrupt::watch()?;
+    let interrupt = output.interrupt()?;
     let scene = args.scene.load()?;
     let mut reporter = Reporter::new(args.quiet, output);
     for warning in &scene.warnings {
         reporter.warn(warning)?;
     }
-    let sinks = Sinks::start(args, &mut reporter)?;
+    let sinks = Sinks::start(args, output, &mut reporter)?;
     let job = Job {
         output: args.output.clone(),
         existing: match args.overwrite {

@@ -2,8 +2,9 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use crate::scene::{self, Scene};
+use crate::scene::{self, Draft, Scene};
 use crate::{Error, Result, files};
 
 /// Arguments of every command that reads a scene.
@@ -34,6 +35,10 @@ pub struct SceneArgs {
     /// when the cube is created.
     #[arg(long, value_name = "PIXELS", value_parser = parse_tile)]
     pub tile: Option<u32>,
+
+    /// What is rendered in the place of `scene`, where a program around the command has made one
+    #[arg(skip)]
+    pub given: Option<Arc<Draft>>,
 }
 
 impl SceneArgs {
@@ -50,7 +55,10 @@ impl SceneArgs {
             overrides.push(("film.width".into(), width.to_string()));
             overrides.push(("film.height".into(), height.to_string()));
         }
-        scene::load(&self.scene, &overrides)
+        match &self.given {
+            Some(draft) => draft.resolve(&overrides),
+            None => scene::load(&self.scene, &overrides),
+        }
     }
 }
 
@@ -63,6 +71,9 @@ impl SceneArgs {
         let scene = fs::read_to_string(&self.scene).unwrap_or_default();
         if let Ok(scene) = scene.parse::<toml::Table>() {
             scene.values().for_each(|value| each_text(value, &mut note));
+        }
+        if let Some(draft) = &self.given {
+            draft.texts().into_iter().for_each(&mut note);
         }
         self.overrides.iter().for_each(|(_, value)| note(value.trim_matches(['"', '\''])));
         match named.iter().any(|file| fs::canonicalize(file).is_ok_and(|file| file == output_there)) {

@@ -106,7 +106,7 @@ fn expose(args: &Args, file: &Path, output: &Output) -> Result<()> {
         about: file.file_name().unwrap_or_default().to_string_lossy().into_owned(),
     };
     let Applied { bands, left_out, negative, pixels } =
-        super::progress::watched(args.json, |progress| apply(&cube, &model, &settings, &args.output, progress))?;
+        super::progress::watched(output, |progress| apply(&cube, &model, &settings, &args.output, progress))?;
     warn_left_out(&left_out, output)?;
     if negative > 0 {
         output.warn(&format!("{negative} negative signals, which the noise of the cube makes, are taken as 0"))?;
@@ -169,7 +169,7 @@ fn integrate_with(args: &Args, file: &Path, output: &Output) -> Result<()> {
     }
     let about = file.file_name().unwrap_or_default().to_string_lossy();
     let existing = if args.overwrite { Existing::Replace } else { Existing::Refuse };
-    let findings = super::progress::watched(args.json, |progress| {
+    let findings = super::progress::watched(output, |progress| {
         integrate(&cube, &responses.named, &about, &args.output, existing, progress)
     })?;
 

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use super::Output;
 use super::progress::Reporter;
 use super::render::Args;
 use super::view;
@@ -19,16 +20,16 @@ pub struct Sinks {
 }
 
 impl Sinks {
-    pub fn start(args: &Args, reporter: &mut Reporter) -> Result<Sinks> {
+    pub fn start(args: &Args, output: &Output, reporter: &mut Reporter) -> Result<Sinks> {
         if args.listen.is_none() && args.tev.is_none() {
             return Ok(Sinks {
-                feed: None,
+                feed: output.feed(),
                 #[cfg(feature = "web")]
                 server: None,
                 tev: None,
             });
         }
-        let feed = Feed::of_render();
+        let feed = output.feed().unwrap_or_else(Feed::of_render);
         let name = view::name_of(&args.output);
         #[cfg(not(feature = "web"))]
         if args.listen.is_some() {

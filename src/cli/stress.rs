@@ -53,7 +53,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         }
         return Ok(());
     }
-    let interrupt = super::interrupt::watch()?;
+    let interrupt = output.interrupt()?;
     if let Some(folder) = &args.output {
         report::make_folder(folder, "stress")?;
     }

@@ -151,7 +151,7 @@ fn parse_options(text: &str) -> std::result::Result<Options, String> {
 
 pub fn run(args: &Args, output: &Output) -> Result<()> {
     let cube = std::path::absolute(&args.output).map_err(|error| Error::storage(&args.output, error))?;
-    let program = std::env::current_exe().map_err(|error| Error::storage(Path::new("spectile"), error))?;
+    let program = super::program::path().map_err(|error| Error::storage(Path::new("spectile"), error))?;
     for path in [&cube, &args.scene.scene, &program] {
         if path.to_str().is_none() {
             let what = "is not UTF-8, which neither batch scripts nor Slurm's options take; give it another name";

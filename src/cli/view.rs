@@ -59,7 +59,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     use crate::cube::Cube;
     use crate::preview::{Feed, follow, web};
 
-    let interrupt = super::interrupt::watch()?;
+    let interrupt = output.interrupt()?;
     let feed = Feed::of_cube(Cube::open(&args.cube)?);
     follow(Cube::open(&args.cube)?, &feed)?;
     let about = web::About { name: name_of(&args.cube), exposure: args.exposure, controls: false };

@@ -3,8 +3,8 @@
 use std::borrow::Cow;
 
 use crate::device::accel::{Accel, bounds};
-use crate::device::parts::media::terms;
-use crate::scene::{Cone, Field, Light, Medium, Profile, Scene, Sides};
+use crate::device::parts::media::absorption;
+use crate::scene::{Cone, Light, Medium, Profile, Scene, Sides};
 use crate::spectral::{Curve, planck};
 
 /// A spectrum of radiance or the like, and what its power is proportional to.
@@ -95,8 +95,10 @@ fn hot_gases<'a>(scene: &'a Scene, accel: &Accel) -> Vec<Share<'a>> {
     }
     bodies.extend(scene.camera_medium.map(|medium| (medium, accel.space.radius / accel.space.scale)));
     let share = |(medium, radius): (usize, f64)| {
-        let (kelvin, density) = typical(&scene.media[medium])?;
-        let (spectra, factors) = terms(&scene.media[medium], Some(kelvin), density);
+        let medium = &scene.media[medium];
+        let (kelvin, densities) = typical(medium)?;
+        let mut densities = densities.into_iter();
+        let (spectra, factors) = absorption(medium, Some(kelvin), |_| densities.next().unwrap_or(0.0));
         let curves: Vec<&Curve> = spectra.iter().map(|&s| &scene.spectra[s].curve).collect();
         // The mean way through a sphere.
         let way = 4.0 / 3.0 * radius;
@@ -110,21 +112,18 @@ fn hot_gases<'a>(scene: &'a Scene, accel: &Accel) -> Vec<Share<'a>> {
     bodies.into_iter().filter_map(share).collect()
 }
 
-/// The temperature and density of a medium that emits: means over its voxels, weighted with density x T⁴.
-fn typical(medium: &Medium) -> Option<(f64, f64)> {
+/// The temperature of a medium that emits and the densities of its kinds of matter: means over its voxels, weighted with density x
+/// T⁴, the density that of all kinds together.
+fn typical(medium: &Medium) -> Option<(f64, Vec<f64>)> {
     let temperature = medium.temperature.as_ref()?;
-    let at = |field: &Field, i: usize| match field {
-        Field::Constant(value) => *value,
-        Field::Grid(grid) => f64::from(grid.values[i]),
-    };
     let count = medium.grid_size().map_or(1, |size| size.iter().map(|&side| side as usize).product());
-    let (mut weights, mut kelvin, mut density) = (0.0, 0.0, 0.0);
+    let (mut weights, mut kelvin, mut densities) = (0.0, 0.0, vec![0.0; medium.components.len()]);
     for i in 0..count {
-        let (t, n) = (at(temperature, i), at(&medium.density, i));
-        let weight = n * t.powi(4);
+        let (t, n) = (temperature.at(i), medium.components.iter().map(|component| component.density.at(i)));
+        let weight = n.clone().sum::<f64>() * t.powi(4);
         weights += weight;
         kelvin += weight * t;
-        density += weight * n;
+        densities.iter_mut().zip(n).for_each(|(sum, n)| *sum += weight * n);
     }
-    (weights > 0.0).then(|| (kelvin / weights, density / weights))
+    (weights > 0.0).then(|| (kelvin / weights, densities.into_iter().map(|sum| sum / weights).collect()))
 }

@@ -9,9 +9,9 @@ use glam::{DAffine3, DMat3, DVec2, DVec3};
 use crate::device::accel;
 use crate::device::part::{PARTS, Part};
 use crate::scene::{
-    Absorber, Attributes, Bsdf, Cone, Emission, Environment, EnvironmentMap, Field, Grid, Interior, Light, Material,
-    Medium, Mesh, Object, Placement, Profile, Reflectance, Scene, Shape, Sides, Spectrum, Temperature, Texels, Texture,
-    TextureKind, Weight,
+    Absorber, Attributes, Bsdf, Component, Cone, Emission, Environment, EnvironmentMap, Field, Grid, Interior, Light,
+    Material, Medium, Mesh, Object, Phase, PhaseTable, Placement, Profile, Reflectance, Scattering, Scene, Shape,
+    Sides, Spectrum, Temperature, Texels, Texture, TextureKind, Weight,
 };
 use crate::spectral::{Curve, Outside};
 
@@ -222,13 +222,41 @@ impl Exhibit {
         self.add_medium(grid(1.0), grid(1.0));
     }
 
+    /// Fog of two kinds, in voxels.
+    pub fn add_cloud(&mut self) {
+        let coefficient = self.spectrum(Curve::Constant(DARK));
+        let g = self.spectrum(Curve::Constant(0.5));
+        self.add_matter([Phase::HenyeyGreenstein(g), Phase::Rayleigh { depolarisation: 0.03 }], coefficient);
+    }
+
+    pub fn add_droplets(&mut self) {
+        let coefficient = self.spectrum(Curve::Constant(DARK));
+        let nm = vec![self.lowest(), self.highest()];
+        let table = PhaseTable { degrees: vec![0.0, 180.0], nm, values: vec![vec![1.0; 2]; 2] };
+        self.add_matter([Phase::Table(Arc::new(table))], coefficient);
+    }
+
+    fn add_matter(&mut self, phases: impl IntoIterator<Item = Phase>, coefficient: usize) {
+        self.add_gas();
+        let medium = self.scene.media.last_mut().expect("just pushed");
+        let absorbers =
+            std::mem::take(&mut medium.components).into_iter().next().map_or_else(Vec::new, |gas| gas.absorbers);
+        let kind = |phase| Component {
+            absorbers: absorbers.clone(),
+            scattering: Some(Scattering { coefficient, phase }),
+            density: Field::Constant(1.0),
+        };
+        medium.components = phases.into_iter().map(kind).collect();
+    }
+
     /// A cold gas in a null boundary.
     fn add_medium(&mut self, temperature: Field, density: Field) {
         let absorption = self.spectrum(Curve::Constant(DARK));
         let columns = vec![(1.0, absorption), (300.0, absorption)];
         let absorbers = vec![Absorber { strength: 1.0, columns }];
         let name = "gas of everything".into();
-        self.scene.media.push(Medium { name, absorbers, temperature: Some(temperature), density });
+        let components = vec![Component { absorbers, scattering: None, density }];
+        self.scene.media.push(Medium { name, components, temperature: Some(temperature) });
         self.object(self.cube(0.5 * self.size), None, Attributes::default());
         let taken = self.scene.objects.iter().filter_map(|object| object.interior).map(|interior| interior.body + 1);
         let body = taken.max().unwrap_or(0);

@@ -60,7 +60,7 @@ pub fn table(scene: &OnDevice) -> Vec<PartRow> {
             stages,
             buffers: buffers.into_iter().map(|buffer| (buffer.name, buffer.bytes.len())).collect(),
             records: if used { (part.records)(scene) } else { Records::NONE },
-            state_words: part.state_words,
+            state_words: if used { (part.state_words)(scene) } else { 0 },
         }
     };
     PARTS.iter().map(row).collect()

@@ -57,12 +57,20 @@ instructions! {
         "a stretch through a medium of absorption S_a: R += weight T (1 - exp(-S_a metres)) S_source, T *= exp(-S_a metres); no mode";
     OP_EXTINCTION = 23, 1, "a, weight, metres", "exp(-S_a metres)";
     OP_MARCH = 24, 3, "volume, weight, metres; from; to (voxels)",
-        "a stretch through voxels, on T and R, or with ON_F on F; no other mode but GATHER";
+        "a stretch through voxels that emit, on T and R; no mode";
     OP_PLANCK = 25, 1, "weight, kelvin", "Planck's law";
     OP_HOLD = 26, 1, "", "H = F, F = 0; no mode";
     OP_HELD = 27, 1, "weight", "H";
     OP_ABSORBED = 28, 1, "a, weight, share",
         "(1 - Q) / (1 - Q S_a share), Q = 0: what a base of reflectance Q keeps of what it gets, under a coat (share 1) or none (0)";
+    OP_AMOUNTS = 29, 1, "a, b, amounts of both",
+        "T *= exp(-(S_a amount + S_b amount)), or with ON_F F; no other mode but GATHER";
+    OP_SAVE = 30, 1, "", "T is put aside; no mode";
+    OP_RESTORE = 31, 1, "", "T is what was put aside; no mode";
+    OP_HENYEY_GREENSTEIN = 32, 1, "a, b, weight, 1 - cosine",
+        "S_a (1 - g²) / ((1 - g)² + 2 g (1 - cosine))^1.5, g = S_b: what matter scatters by that angle, times 4π";
+    OP_PHASE_TABLE = 33, 1, "a, table, weight, place",
+        "a table's phase function at a place among its rows and, S_a, its columns";
     OP_ROUGH_TRANSMIT = 48, 2, "a, weight, roughness; cos o, i",
         "D(h) |o h| |i h| / (o h + n i h)² (1 - F), each channel with its own half vector h";
 }

@@ -5,7 +5,7 @@ use std::ops::Deref;
 
 use crate::device::example::Exhibit;
 use crate::device::parts::{
-    attributes, camera, geometry, heat, lights, media, opacity, paths, sky, spectra, surfaces, textures,
+    attributes, camera, geometry, heat, lights, media, opacity, paths, scattering, sky, spectra, surfaces, textures,
 };
 use crate::device::prepared::Prepared;
 use crate::device::text::{Defines, Module};
@@ -32,7 +32,7 @@ pub struct Part {
     /// Records that it may take.
     pub records: fn(&OnDevice) -> Records,
     /// Words of a path's state between two bounces.
-    pub state_words: u32,
+    pub state_words: fn(&OnDevice) -> u32,
     /// Adds something to a scene that needs this part; `None` where it is a matter of settings, or in every scene.
     pub example: Option<fn(&mut Exhibit)>,
 }
@@ -80,6 +80,9 @@ pub const PARTS: &[&Part] = &[
     &media::CAMERA_CUT,
     &media::VOXELS,
     &media::PLANCK,
+    &scattering::SCATTERING,
+    &scattering::TECHNIQUES,
+    &scattering::TABLES,
     &surfaces::DISPERSION,
     &surfaces::KNOTS_OF_ONE_CHANNEL,
     &paths::ROULETTE_ON_EVALUATION,
@@ -100,7 +103,7 @@ impl Part {
         defines: |_, _, _| (),
         buffers: |_| Vec::new(),
         records: |_| Records::NONE,
-        state_words: 0,
+        state_words: |_| 0,
         example: None,
     };
 

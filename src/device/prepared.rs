@@ -15,6 +15,7 @@ use crate::device::parts::lights::{self, LightPicks, STEPS, light_picks};
 use crate::device::parts::media::Media;
 use crate::device::parts::paths::Thinning;
 use crate::device::parts::radiators::Radiators;
+use crate::device::parts::scattering::Scattering;
 use crate::device::parts::sky::SkyMap;
 use crate::device::parts::surfaces::{Needed, Surfaces};
 use crate::device::spectra::{MAX_REGISTER_SPECTRA, SpectrumIds, daylight, spectral_tables};
@@ -32,6 +33,8 @@ use crate::{Error, Result};
 const MAX_RECORDS: u32 = LOOP_LIMIT;
 /// Words of a path's state that every scene has: origin and density; direction, counts of records.
 const STATE_WORDS: u32 = 8;
+/// Iterations that one bounce may take beside the voxels on its ways.
+const MOST_STEPS: u32 = 8_192;
 
 /// Settings, and how geometry, lights and spectra are held: what is false is left out of kernels and buffers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -65,6 +68,8 @@ pub struct Prepared {
     /// Of general scenes, instead: their records have 16 bytes.
     pub surfaces: Option<Surfaces>,
     pub media: Option<Media>,
+    /// What media that scatter need.
+    pub scattering: Option<Scattering>,
     /// Emitting primitives, then lamps, then the spectra of what emits by angle.
     pub emitters: Vec<Emitter>,
     pub lamps: Vec<Lamp>,
@@ -127,7 +132,8 @@ impl Prepared {
         if scene.materials.len() > MAX_MATERIALS {
             return Err(Error::input(&scene.file, format!("more than {MAX_MATERIALS} materials")));
         }
-        let General { mut surfaces, mut media, mut radiators, mut sky } = General::of(scene, &heat, &accel)?;
+        let General { mut surfaces, mut media, scattering, mut radiators, mut sky } =
+            General::of(scene, &heat, &accel)?;
         let is_general = surfaces.is_some();
 
         // General scenes meet a uniform environment by sampling the BSDF, and do not aim at it.
@@ -172,6 +178,7 @@ impl Prepared {
             wavelength: media.as_ref().and_then(|m| m.wavelength).or(radiators.as_ref().map(|r| r.wavelength)),
             surfaces,
             media,
+            scattering,
             emitters,
             lamps,
             suns,
@@ -208,11 +215,21 @@ impl Prepared {
             return Err(Error::input(&scene.file, message));
         }
         self.frame.max_records = most;
+        // The way to what is met, that to a light, and the flight; what else a ray does takes some thousand.
+        let walked = self.media.as_ref().map_or(0, |media| media.cells.saturating_mul(3));
+        if walked > LOOP_LIMIT - MOST_STEPS {
+            let message = format!(
+                "a straight way may go through {} voxels, at most {} are supported: use coarser grids",
+                walked / 3,
+                (LOOP_LIMIT - MOST_STEPS) / 3
+            );
+            return Err(Error::input(&scene.file, message));
+        }
         if self.path_iterations() > LOOP_LIMIT {
             let message = format!(
-                "a path of {bounces} bounces may go through {} voxels on each of its ways, more than one evaluation can: lower \
+                "a path of {bounces} bounces may go through {} voxels that emit on each of its ways, more than one evaluation can: lower \
                  integrator.max_bounces or integrator.wavelengths_per_channel, or use coarser grids",
-                self.media.as_ref().map_or(0, |media| media.cells)
+                self.media.as_ref().map_or(0, |media| media.marched)
             );
             return Err(Error::input(&scene.file, message));
         }
@@ -237,7 +254,7 @@ impl Prepared {
     /// Iterations that evaluation may take for one path, at each of its wavelengths: its records, and the voxels on its ways with the
     /// absorbers in each.
     pub fn path_iterations(&self) -> u32 {
-        let cells = self.media.as_ref().map_or(0, |media| media.cells.saturating_mul(1 + media.most_absorbers));
+        let cells = self.media.as_ref().map_or(0, |media| media.marched.saturating_mul(1 + media.most_absorbers));
         let ways = self.vertices_at_once().saturating_mul(2) + 1;
         let walk = (self.frame.max_records + 1).saturating_add(ways.saturating_mul(cells));
         walk.saturating_mul(self.wavelengths_per_channel)
@@ -261,7 +278,7 @@ impl Prepared {
 
     /// Bytes of a path's state between two bounces: whole vectors of four words.
     pub fn state_bytes(&self) -> u32 {
-        let words: u32 = self.whole().parts().map(|part| part.state_words).sum();
+        let words: u32 = self.whole().parts().map(|part| (part.state_words)(&self.whole())).sum();
         4 * (STATE_WORDS + words).next_multiple_of(4)
     }
 }
@@ -271,6 +288,7 @@ impl Prepared {
 struct General {
     surfaces: Option<Surfaces>,
     media: Option<Media>,
+    scattering: Option<Scattering>,
     radiators: Option<Radiators>,
     sky: Option<SkyMap>,
 }
@@ -292,6 +310,7 @@ impl General {
             return Ok(General::default());
         }
         let mut media = Media::new(scene, accel)?;
+        let scattering = media.as_mut().and_then(|media| Scattering::new(scene, media));
         let mut surfaces = Surfaces::new(scene);
         let radiators = match heat.radiating.is_empty() {
             true => None,
@@ -302,9 +321,10 @@ impl General {
             SkyMap { axis_id: surfaces.need(axis), ..sky }
         });
         if let Some(media) = &mut media {
+            media.finish();
             media.move_spectra(&mut surfaces.spectra);
         }
-        Ok(General { surfaces: Some(surfaces), media, radiators, sky })
+        Ok(General { surfaces: Some(surfaces), media, scattering, radiators, sky })
     }
 }
 

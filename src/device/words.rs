@@ -167,10 +167,20 @@ constants! {
     }
     /// Words before the first volume, and of each, with the bits of its first (`shaders/parts/media/volume.wgsl`).
     VOLUMES {
-        VOLUMES_HEAD = 4;
+        VOLUMES_HEAD = 5;
         VOLUME_WORDS = 24;
         VOLUME_GRID = 1;
         VOLUME_EMITS = 2;
+        VOLUME_SCATTERS = 4;
+        /// How far paths go in it is decided by what it takes of them, not by what it scatters.
+        VOLUME_BY_EXTINCTION = 8;
+    }
+    /// Words of a kind of matter that scatters, before those of each technique; its phase functions.
+    SCATTERERS {
+        SCATTERER_WORDS = 7;
+        PHASE_HENYEY_GREENSTEIN = 0;
+        PHASE_RAYLEIGH = 1;
+        PHASE_TABLE = 2;
     }
     /// What lies behind a primitive: the number of a volume + 1, and whether it is nothing but a boundary.
     BOUNDARIES {

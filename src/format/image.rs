@@ -21,7 +21,8 @@ pub struct Image {
     pub format: Format,
     /// Width and height in pixels.
     pub size: [u32; 2],
-    /// In the order of the file: R, G, B, A or Y, A in a PNG; in an EXR that of its header, which is by name.
+    /// In the order of the file: R, G, B, A or Y, A in a PNG; in an EXR that of its header, which is by name; of an array R, G, B
+    /// where there are three, Y where there is one, else numbers from 0.
     pub planes: Vec<Plane>,
     /// What its colours are.
     pub colours: Colours,
@@ -155,6 +156,8 @@ impl Image {
 pub enum Format {
     Png,
     Exr,
+    /// Numbers that were never a file.
+    Memory,
 }
 
 /// 16,384 x 16,384: far more than a texture has.

@@ -125,6 +125,8 @@ pub enum Format {
     Stl,
     /// glTF 2.0, as text (.gltf) or binary (.glb); [`super::gltf`] reads it.
     Gltf,
+    /// None: vertices and faces in memory.
+    Memory,
 }
 
 impl Format {
@@ -163,6 +165,10 @@ pub fn parse(format: Format, bytes: &[u8], path: &Path) -> Result<Mesh, Box<Prob
         Format::Obj => obj::parse(bytes, path),
         Format::Ply => ply::parse(bytes, path),
         Format::Stl => stl::parse(bytes, path),
+        Format::Memory => {
+            let message = "is no file".to_owned();
+            Err(Box::new(Problem { file: path.to_owned(), message, ..Problem::default() }))
+        }
         Format::Gltf => {
             let file = super::gltf::parse(bytes, path)?;
             file.mesh(None).map_err(|message| file.problem(message))

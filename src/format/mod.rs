@@ -12,6 +12,7 @@ pub mod mesh;
 pub mod modtran;
 pub mod noise;
 pub mod obj;
+pub mod phase;
 pub mod plot;
 pub mod ply;
 pub mod png;

@@ -17,7 +17,7 @@ pub struct Volume {
 }
 
 /// Voxels that one volume may have: 1 GiB of f32, and far below what indices of u32 reach.
-const MAX_VOXELS: u64 = 1 << 28;
+pub const MAX_VOXELS: u64 = 1 << 28;
 
 /// Reads the array in the folder `path`. Errors are of the array as a whole.
 pub fn read(path: &Path) -> Result<Volume, Box<Problem>> {

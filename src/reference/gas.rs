@@ -1,9 +1,9 @@
-//! Gases along a segment: for each channel, cell by cell, what they emit towards the start and what they let through.
+//! Matter along a segment: for each channel, cell by cell, what it emits towards the start, what it lets through, and where it scatters.
 
 use glam::{DAffine3, DVec3};
 
 use super::bsdf::SpectralValues;
-use crate::scene::{Field, Medium, Scene, SpectrumId};
+use crate::scene::{Component, Field, Interior, Medium, Phase, Scene, SpectrumId};
 use crate::spectral::planck;
 
 /// A straight way through one medium, in the order in which a path goes.
@@ -17,19 +17,31 @@ pub struct Piece<'a> {
     /// Indices of refraction of the bodies around, and the one that all channels are bent by where it is not their own: in
     /// matter of index n a source is n² B, as radiance there is n² of that in a vacuum.
     pub indices: Vec<(SpectrumId, Option<f64>)>,
+    /// The interiors that it is in, the innermost last.
+    pub around: Vec<Interior>,
 }
 
 /// Part of a piece in which nothing changes.
-struct Cell {
+pub struct Cell {
     /// Metres.
     length: f64,
     kelvin: Option<f64>,
-    density: f64,
+    /// Of each kind of matter.
+    densities: Vec<f64>,
 }
 
 /// The spectra of all media.
 pub fn spectra(scene: &Scene) -> Vec<SpectrumId> {
-    scene.media.iter().flat_map(|m| &m.absorbers).flat_map(|a| &a.columns).map(|column| column.1).collect()
+    let of_scattering = |component: &Component| {
+        let scattering = component.scattering.as_ref();
+        let asymmetry = match scattering.map(|scattering| &scattering.phase) {
+            Some(Phase::HenyeyGreenstein(g)) => Some(*g),
+            _ => None,
+        };
+        scattering.map(|scattering| scattering.coefficient).into_iter().chain(asymmetry)
+    };
+    let components = || scene.media.iter().flat_map(|medium| &medium.components);
+    scene.media.iter().flat_map(|medium| medium.absorption()).chain(components().flat_map(of_scattering)).collect()
 }
 
 impl Piece<'_> {
@@ -44,21 +56,25 @@ impl Piece<'_> {
     ) {
         for cell in self.cells() {
             for k in alive.clone() {
-                let depth = cell.length * cell.density * self.absorption(spectra, k, cell.kelvin);
+                let absorbed = self.absorption(spectra, k, &cell);
+                let lost = absorbed + self.scattering(spectra, k, &cell);
+                let depth = cell.length * lost;
                 if let (Some(radiance), Some(kelvin)) = (&mut radiance, cell.kelvin) {
                     let index =
                         |&(eta, mean): &(SpectrumId, Option<f64>)| mean.unwrap_or_else(|| spectra.value(eta, k));
                     let squares: f64 = self.indices.iter().map(|i| index(i).powi(2)).product();
                     let source = squares * planck::radiance(spectra.wavelength(k), kelvin);
-                    radiance[k] += throughput[k] * source * -(-depth).exp_m1();
+                    let share = if lost > 0.0 { absorbed / lost } else { 0.0 };
+                    radiance[k] += throughput[k] * source * share * -(-depth).exp_m1();
                 }
                 throughput[k] *= (-depth).exp();
             }
         }
     }
 
-    /// m⁻¹ at density 1.
-    fn absorption(&self, spectra: &SpectralValues, k: usize, kelvin: Option<f64>) -> f64 {
+    /// m⁻¹.
+    fn absorption(&self, spectra: &SpectralValues, k: usize, cell: &Cell) -> f64 {
+        let kelvin = cell.kelvin;
         let term = |absorber: &crate::scene::Absorber| {
             let columns = &absorber.columns;
             let value = |column: usize| spectra.value(columns[column].1, k);
@@ -78,7 +94,53 @@ impl Piece<'_> {
             };
             absorber.strength * table
         };
-        self.medium.absorbers.iter().map(term).sum()
+        let of = |(component, density): (&Component, &f64)| density * component.absorbers.iter().map(term).sum::<f64>();
+        self.medium.components.iter().zip(&cell.densities).map(of).sum()
+    }
+
+    /// m⁻¹.
+    fn scattering(&self, spectra: &SpectralValues, k: usize, cell: &Cell) -> f64 {
+        self.strengths(spectra, k, cell).map(|(strength, _)| strength).sum()
+    }
+
+    /// What each kind of matter that scatters does, m⁻¹, and where to.
+    pub fn strengths<'s>(
+        &'s self,
+        spectra: &'s SpectralValues,
+        k: usize,
+        cell: &'s Cell,
+    ) -> impl Iterator<Item = (f64, &'s Phase)> {
+        let of = move |(component, density): (&'s Component, &'s f64)| {
+            let scattering = component.scattering.as_ref()?;
+            Some((density * spectra.value(scattering.coefficient, k), &scattering.phase))
+        };
+        self.medium.components.iter().zip(&cell.densities).filter_map(of)
+    }
+
+    /// Goes on through the piece until the depth of scattering that is `left` in channel `k` is used up, and takes from
+    /// `throughput` what is absorbed on the way: where that is, and what is there.
+    pub fn fly(
+        &self,
+        spectra: &SpectralValues,
+        k: usize,
+        left: &mut f64,
+        throughput: &mut f64,
+    ) -> Option<(DVec3, Cell)> {
+        let direction = (self.to - self.from).normalize_or_zero();
+        let mut passed = 0.0;
+        for cell in self.cells() {
+            let scattering = self.scattering(spectra, k, &cell);
+            let absorption = self.absorption(spectra, k, &cell);
+            if scattering * cell.length > *left {
+                let way = *left / scattering;
+                *throughput *= (-absorption * way).exp();
+                return Some((self.from + (passed + way) * direction, cell));
+            }
+            *left -= scattering * cell.length;
+            *throughput *= (-absorption * cell.length).exp();
+            passed += cell.length;
+        }
+        None
     }
 
     fn cells(&self) -> Vec<Cell> {
@@ -112,6 +174,7 @@ impl Piece<'_> {
             Field::Constant(value) => *value,
             Field::Grid(grid) => f64::from(grid.values[voxel.expect("a medium with a grid has voxels")]),
         };
-        Cell { length, kelvin: self.medium.temperature.as_ref().map(value), density: value(&self.medium.density) }
+        let densities = self.medium.components.iter().map(|component| value(&component.density)).collect();
+        Cell { length, kelvin: self.medium.temperature.as_ref().map(value), densities }
     }
 }

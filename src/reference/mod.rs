@@ -6,9 +6,11 @@
 
 mod bsdf;
 mod camera;
+mod flight;
 mod gas;
 mod lights;
 mod path;
+mod phase;
 mod primitive;
 mod rng;
 mod shading;
@@ -149,6 +151,7 @@ mod tests {
                 sampler: Sampler::Independent,
                 wavelengths: Wavelengths::Uniform,
                 wavelengths_per_channel: 1,
+                techniques: None,
                 evaluation: Evaluation::All,
                 evaluator: Evaluator::Auto,
                 epoch: 64,

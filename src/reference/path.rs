@@ -8,6 +8,7 @@ use glam::{DAffine3, DVec3};
 
 use super::bsdf::{Bsdf, SpectralValues, Vertex};
 use super::camera;
+use super::flight::Flight;
 use super::gas::{self, Piece};
 use super::lights::{LightPoint, Lights, Target, disk_solid_angle, emits, sample_disk, spot_share};
 use super::primitive::{Ray, SurfacePoint};
@@ -20,7 +21,7 @@ use crate::scene::{Bsdf as Description, Environment, Interior, Light, Projection
 
 /// What tracing needs of a scene, prepared once and shared by all threads.
 pub struct Tracer<'a> {
-    scene: &'a Scene,
+    pub(super) scene: &'a Scene,
     world: World,
     /// The environment, where it is a map.
     sky: Option<Sky<'a>>,
@@ -35,37 +36,39 @@ pub struct Tracer<'a> {
     around_camera: Vec<Interior>,
     /// Whether some surface lets rays pass.
     masked: bool,
+    /// Whether some matter scatters: then every channel has paths of its own.
+    scatters: bool,
 }
 
 /// The K-channel state of the path under way; reused from path to path.
 pub struct Path<'a> {
-    spectra: SpectralValues<'a>,
+    pub(super) spectra: SpectralValues<'a>,
     /// Product of what the surfaces did so far.
-    throughput: Vec<f64>,
+    pub(super) throughput: Vec<f64>,
     /// The channels that have not stopped: all, or the one that ideal dispersive refraction left.
-    alive: Range<usize>,
+    pub(super) alive: Range<usize>,
     /// Radiance gathered so far, W m⁻² sr⁻¹ nm⁻¹.
     pub radiance: Vec<f64>,
     /// What one vertex does to each channel.
     factor: Vec<f64>,
     /// Radiance of what is aimed at or met, or what takes its place.
-    emitted: Vec<f64>,
+    pub(super) emitted: Vec<f64>,
     /// The interiors that the path is in, the innermost last.
-    interiors: Vec<Interior>,
+    pub(super) interiors: Vec<Interior>,
 }
 
 /// A way to some light, chosen at a vertex.
-struct Aim {
-    direction: DVec3,
+pub(super) struct Aim {
+    pub(super) direction: DVec3,
     /// Where the light is; `None` at infinity.
     target: Option<DVec3>,
     /// Density by solid angle of the choice; `None` for lights without extent, which are never met.
-    density: Option<f64>,
-    emitted: Emitted,
+    pub(super) density: Option<f64>,
+    pub(super) emitted: Emitted,
 }
 
 /// Radiance in all channels; of lights without extent, irradiance over the probability of their choice.
-enum Emitted {
+pub(super) enum Emitted {
     Spectrum {
         spectrum: SpectrumId,
         scale: f64,
@@ -140,8 +143,10 @@ impl<'a> Tracer<'a> {
         let mut gas_spectra = gas::spectra(scene);
         gas_spectra.extend(glass.values().map(|(eta, _)| *eta));
         let masked = scene.materials.iter().any(|material| material.opacity.is_some());
+        let scatters = scene.media.iter().any(|medium| medium.scatters());
         let around_camera = Vec::new();
-        let mut tracer = Tracer { scene, world, sky, lights, materials, gas_spectra, glass, around_camera, masked };
+        let mut tracer =
+            Tracer { scene, world, sky, lights, materials, gas_spectra, glass, around_camera, masked, scatters };
         tracer.around_camera = tracer.interiors_around(scene.camera.position);
         tracer
     }
@@ -151,8 +156,20 @@ impl<'a> Tracer<'a> {
     /// Emission is found in two ways, by aiming at lights and by meeting them, which are combined by the balance
     /// heuristic (Veach 1997, section 9.2.2). The uniform environment is only met.
     pub fn trace(&self, pixel: [u32; 2], rng: &mut Rng, path: &mut Path) {
-        let integrator = &self.scene.integrator;
         path.begin(rng.uniform());
+        if !self.scatters {
+            return self.trace_channels(pixel, rng, path);
+        }
+        // Where matter scatters, decisions are those of one wavelength.
+        for k in 0..path.throughput.len() {
+            path.alive = k..k + 1;
+            self.trace_channels(pixel, rng, path);
+        }
+    }
+
+    /// One path of the channels that are alive.
+    fn trace_channels(&self, pixel: [u32; 2], rng: &mut Rng, path: &mut Path) {
+        let integrator = &self.scene.integrator;
         let mut ray = camera::ray(&self.scene.camera, &self.scene.film, pixel, rng);
         // Density by solid angle with which the ray was chosen; none where lights could not have been aimed at instead:
         // for camera rays, mirrors and ideal refraction.
@@ -166,20 +183,35 @@ impl<'a> Tracer<'a> {
         for event in 0..=integrator.max_bounces {
             let mut pieces = Vec::new();
             let hit = self.follow(&ray, &mut path.interiors, &mut pieces, rng);
+            let before = path.throughput[path.alive.start];
             let Path { spectra, throughput, alive, radiance, .. } = &mut *path;
-            pieces.iter().for_each(|piece| piece.pass(spectra, alive.clone(), throughput, Some(radiance)));
-            let Some(hit) = hit else {
-                self.gather_from_afar(ray.direction, ray_density, path);
-                return;
-            };
-            self.gather_emission(&ray, &hit, ray_density, path);
+            // What arrives from infinity has been measured at the scene.
+            let counts = |piece: &&Piece| hit.is_some() || !piece.outer;
+            let counting = pieces.iter().filter(counts);
+            counting.for_each(|piece| piece.pass(spectra, alive.clone(), throughput, Some(radiance)));
+            match &hit {
+                None => self.gather_from_afar(ray.direction, ray_density, path),
+                Some(hit) => self.gather_emission(&ray, hit, ray_density, path),
+            }
             if event == integrator.max_bounces {
                 return;
             }
+            if self.scatters {
+                path.throughput[path.alive.start] = before;
+                match self.scatter(&pieces, ray.direction, event, rng, path) {
+                    Flight::Scattered { next, density } => {
+                        (ray, ray_density) = (next, Some(density));
+                        continue;
+                    }
+                    Flight::Ended => return,
+                    Flight::Passed => {}
+                }
+            }
+            let Some(hit) = hit else { return };
 
             let object = &self.scene.objects[self.world.primitives[hit.primitive].object];
             let bsdf = &self.materials[object.material.expect("paths pass null boundaries")];
-            let aim = self.aim(&hit, rng);
+            let aim = self.aim(hit.point.position, rng);
             path.spectra.fill(bsdf.spectra());
             if let Some(aim) = &aim {
                 self.look_up(&aim.emitted, path);
@@ -198,7 +230,7 @@ impl<'a> Tracer<'a> {
             let Path { spectra, throughput, alive, radiance, factor, emitted, interiors } = &mut *path;
             let Some(scattering) = bsdf.at(Vertex { o, inside, spectra, alive: alive.clone() }) else { return };
             let kept = aim.filter(|aim| shading.keeps_side(geometric, &frame, aim.direction));
-            let pieces = kept.as_ref().and_then(|aim| self.way_to(&hit, inside, aim, interiors, rng));
+            let pieces = kept.as_ref().and_then(|aim| self.way_from_surface(&hit, inside, aim, interiors, rng));
             if let Some((aim, pieces)) = kept.zip(pieces) {
                 pieces.iter().for_each(|piece| piece.pass(spectra, alive.clone(), emitted, None));
                 let scattered = scattering.evaluate(frame.transpose() * aim.direction, factor);
@@ -290,7 +322,7 @@ impl<'a> Tracer<'a> {
     }
 
     /// Sets `path.emitted`.
-    fn look_up(&self, emitted: &Emitted, path: &mut Path) {
+    pub(super) fn look_up(&self, emitted: &Emitted, path: &mut Path) {
         match emitted {
             Emitted::Surface { primitive, point, towards } => {
                 if !self.emit(*primitive, point, *towards, path) {
@@ -330,21 +362,21 @@ impl<'a> Tracer<'a> {
     }
 
     /// Chooses a light and a way to it; `None` where it sends nothing there.
-    fn aim(&self, hit: &Hit, rng: &mut Rng) -> Option<Aim> {
+    pub(super) fn aim(&self, from: DVec3, rng: &mut Rng) -> Option<Aim> {
         match self.lights.sample(&self.world, rng)? {
-            Target::Surface(light) => self.aim_at_surface(hit, &light),
+            Target::Surface(light) => self.aim_at_surface(from, &light),
             Target::Light(light) => {
                 let probability = self.lights.probability(light);
                 match self.scene.lights[light] {
                     Light::Point { position, intensity } => {
-                        let towards = position - hit.point.position;
+                        let towards = position - from;
                         let distance2 = towards.length_squared();
                         let emitted = Emitted::Spectrum { spectrum: intensity, scale: 1.0 / (distance2 * probability) };
                         let direction = towards.try_normalize()?;
                         Some(Aim { direction, target: Some(position), density: None, emitted })
                     }
                     Light::Spot { position, direction: axis, intensity, cone } => {
-                        let towards = position - hit.point.position;
+                        let towards = position - from;
                         let direction = towards.try_normalize()?;
                         let share = spot_share(&cone, axis.angle_between(-direction));
                         let scale = share / (towards.length_squared() * probability);
@@ -372,8 +404,8 @@ impl<'a> Tracer<'a> {
         }
     }
 
-    fn aim_at_surface(&self, hit: &Hit, light: &LightPoint) -> Option<Aim> {
-        let towards = light.point.position - hit.point.position;
+    fn aim_at_surface(&self, from: DVec3, light: &LightPoint) -> Option<Aim> {
+        let towards = light.point.position - from;
         let distance = towards.length();
         if distance == 0.0 {
             return None;
@@ -391,8 +423,8 @@ impl<'a> Tracer<'a> {
         })
     }
 
-    /// The ways through media from a vertex to what is aimed at, if nothing but null boundaries stands between.
-    fn way_to(
+    /// The ways through media from a surface to what is aimed at, if nothing but null boundaries stands between.
+    fn way_from_surface(
         &self,
         hit: &Hit,
         inside: bool,
@@ -401,18 +433,28 @@ impl<'a> Tracer<'a> {
         rng: &mut Rng,
     ) -> Option<Vec<Piece<'_>>> {
         let origin = self.world.leave(hit.primitive, &hit.point, aim.direction);
+        let mut interiors = interiors.to_vec();
+        let goes_inside = hit.point.normal.dot(aim.direction) < 0.0;
+        if goes_inside != inside {
+            let object = &self.scene.objects[self.world.primitives[hit.primitive].object];
+            cross(&mut interiors, object.interior, goes_inside);
+        }
+        self.way_to(origin, interiors, aim, rng)
+    }
+
+    pub(super) fn way_to(
+        &self,
+        origin: DVec3,
+        mut interiors: Vec<Interior>,
+        aim: &Aim,
+        rng: &mut Rng,
+    ) -> Option<Vec<Piece<'_>>> {
         if self.scene.media.is_empty() && !self.masked {
             let clear = match aim.target {
                 Some(target) => !self.world.occluded(origin, target),
                 None => self.world.closest_hit(&Ray { origin, direction: aim.direction }).is_none(),
             };
             return clear.then(Vec::new);
-        }
-        let mut interiors = interiors.to_vec();
-        let goes_inside = hit.point.normal.dot(aim.direction) < 0.0;
-        if goes_inside != inside {
-            let object = &self.scene.objects[self.world.primitives[hit.primitive].object];
-            cross(&mut interiors, object.interior, goes_inside);
         }
         // From just off the surface to the very target: a parallel line would meet a light seen obliquely too early.
         let direction = aim.target.map_or(aim.direction, |target| (target - origin).normalize());
@@ -438,8 +480,7 @@ impl<'a> Tracer<'a> {
     }
 
     /// The first surface with a material along `ray`, at its distance from the start; null boundaries on the way change
-    /// what is around. `pieces`: the ways through media, but outside all interiors none that leads to infinity: what
-    /// arrives from there has been measured at the scene.
+    /// what is around. `pieces`: the ways through media.
     fn follow<'s>(
         &'s self,
         ray: &Ray,
@@ -449,10 +490,8 @@ impl<'a> Tracer<'a> {
     ) -> Option<Hit> {
         let (mut ray, mut passed) = (*ray, 0.0);
         loop {
-            let Some(mut hit) = self.world.closest_hit(&ray) else {
-                pieces.retain(|piece| !piece.outer);
-                return None;
-            };
+            // To infinity outside all interiors: nobody is scattered there, and what arrives has been measured at the scene.
+            let mut hit = self.world.closest_hit(&ray)?;
             pieces.extend(self.piece(interiors, ray.origin, ray.origin + hit.t * ray.direction));
             let object = &self.scene.objects[self.world.primitives[hit.primitive].object];
             if object.material.is_some() && !self.lets_pass(&hit, rng) {
@@ -491,7 +530,8 @@ impl<'a> Tracer<'a> {
         let medium = innermost.map(|interior| interior.medium).or(self.scene.camera_medium)?;
         let to_grid = innermost.map_or(DAffine3::IDENTITY, |interior| interior.to_grid);
         let indices = interiors.iter().filter_map(|interior| self.glass.get(&interior.body).copied()).collect();
-        Some(Piece { medium: &self.scene.media[medium], to_grid, outer: innermost.is_none(), from, to, indices })
+        let (medium, around) = (&self.scene.media[medium], interiors.to_vec());
+        Some(Piece { medium, to_grid, outer: innermost.is_none(), from, to, indices, around })
     }
 
     /// The interiors around a point: those that a ray from it leaves without having entered, in reverse.

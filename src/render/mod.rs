@@ -4,6 +4,7 @@
 mod fault_tests;
 pub mod interrupt;
 pub mod job;
+mod last_bounce;
 pub mod pilot;
 pub mod plan;
 pub mod pool;

@@ -326,6 +326,18 @@ impl Expected {
     }
 }
 
+/// Sums over the pilot's pixels and `epochs` samples of each, of every channel.
+pub fn channel_sums(worker: &mut Worker, film: &Film, channels: usize, epochs: u32) -> Result<Vec<f64>> {
+    let units = pixels(film);
+    let mut sums = vec![0.0; channels];
+    for epoch in 0..epochs {
+        for pixel in values(worker, &units, FIRST_EPOCH + epoch, 1)?.chunks(channels) {
+            sums.iter_mut().zip(pixel).for_each(|(sum, value)| *sum += f64::from(*value));
+        }
+    }
+    Ok(sums)
+}
+
 /// [unit][channel]: means of `samples` samples of every pixel in `units`.
 fn values(worker: &mut Worker, units: &[UnitRect], epoch: u32, samples: u32) -> Result<Vec<f32>> {
     let mut values = Vec::new();

@@ -14,6 +14,7 @@ use crate::gpu::adapter::Gpu;
 use crate::preview::{Control, DeviceStatus, Status};
 use crate::render::interrupt::Interrupt;
 use crate::render::job::{Job, SURE_EPOCHS};
+use crate::render::last_bounce::LastBounce;
 use crate::render::pool::{Merged, Pool, Report, Tally};
 use crate::render::queue::Queue;
 use crate::render::watch::{Heard, Reports, Requests};
@@ -37,6 +38,8 @@ pub enum Event<'a> {
     /// Whoever watches has made the render rest, or go on.
     Rests(bool),
     Warning(String),
+    /// What is good to know.
+    Note(String),
 }
 
 /// What a render did.
@@ -86,6 +89,18 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
         pilot::decide(&job.scene, prepared, there, &mut gpus, job.memory, interrupt, &mut |what| {
             observe(Event::Warning(what))
         })?;
+    let first = Arc::new(gpus.remove(0));
+    let last_bounce = LastBounce::measure(&job.scene, &prepared, &first, job.memory, interrupt);
+    gpus.insert(0, Arc::into_inner(first).ok_or_else(|| Error::Internal("a device was kept that was lent".into()))?);
+    match last_bounce {
+        Ok(None) => {}
+        Ok(Some(last)) if last.is_much() => observe(Event::Warning(last.to_string()))?,
+        Ok(Some(last)) => observe(Event::Note(last.to_string()))?,
+        Err(error) if error.may_be_of_one_device() => {
+            observe(Event::Warning(format!("what the last bounce brings was not measured: {error}")))?;
+        }
+        Err(error) => return Err(error),
+    }
     if prepared.accel.degenerate > 0 {
         let what =
             format!("{} triangles without area in f32 were left out: no ray can meet them", prepared.accel.degenerate);

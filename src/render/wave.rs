@@ -116,7 +116,7 @@ impl WavePlan {
             record_size: prepared.record_bytes(),
             spectral_state_size: prepared.spectral_state_bytes(),
             sample_by_sample: prepared.evaluator.takes_one_sample(),
-            roulette: prepared.features.roulette,
+            roulette: prepared.features.roulette || prepared.scattering.is_some(),
             thinned: prepared.thinning.is_some(),
             limits,
             scene_bytes: facts::scene_bytes(&on_device, buffer::allocated),

@@ -97,10 +97,7 @@ fn sources(scene: &Scene) -> Vec<Source> {
             super::Field::Constant(kelvin) => *kelvin,
             super::Field::Grid(grid) => grid.values.iter().copied().fold(0.0, f32::max).into(),
         };
-        let absorbs = |[a, b]: [f64; 2]| {
-            let columns = medium.absorbers.iter().flat_map(|absorber| &absorber.columns);
-            columns.into_iter().any(|(_, id)| scene.spectra[*id].curve.mean(a, b) > 0.0)
-        };
+        let absorbs = |[a, b]: [f64; 2]| medium.absorption().any(|id| scene.spectra[id].curve.mean(a, b) > 0.0);
         let shines = glow(kelvin).into_iter().zip(channels).map(|(glows, bounds)| glows && absorbs(*bounds)).collect();
         sources.push(Source { name: format!("the heat of medium \"{}\"", medium.name), shines });
     }

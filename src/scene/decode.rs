@@ -2,9 +2,11 @@
 //! `None`, so that decoding carries on with the next item.
 
 use std::ops::RangeInclusive;
+use std::path::PathBuf;
 
 use glam::DVec3;
 
+use super::arrays::Data;
 use super::context::Context;
 use super::keys::Section;
 use super::tree::{Entry, Node, Origin, Value};
@@ -110,6 +112,22 @@ impl<'a> Item<'a> {
         match &self.node.value {
             Value::String(s) => Some(s),
             _ => self.wrong_kind("a string"),
+        }
+    }
+
+    /// What stands in the place of a file's name: the numbers that the file would hold.
+    pub fn data(&self) -> Option<&'a Data> {
+        match &self.node.value {
+            Value::Data(data) => Some(data),
+            _ => None,
+        }
+    }
+
+    /// The file that the value names, as it is written, and its path; or what numbers in memory are called.
+    pub fn source(&self) -> Option<(&'a str, PathBuf)> {
+        match self.data() {
+            Some(data) => Some((data.name(), PathBuf::from(data.name()))),
+            None => self.text().map(|name| (name, self.cx.path(name))),
         }
     }
 

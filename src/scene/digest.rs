@@ -7,10 +7,10 @@ use glam::DVec3;
 use sha2::{Digest, Sha256};
 
 use super::{
-    Absorber, Attributes, Bsdf, Camera, Cone, Emission, Environment, EnvironmentMap, Evaluation, Field, Film, Filter,
-    Grid, Integrator, Interior, Light, Material, Medium, Mesh, Object, Placement, Profile, Projection, Reflectance,
-    Sampler, Scene, Shape, Sides, Spectrum, Temperature, Texels, Texture, TextureFilter, TextureKind, Wavelengths,
-    Weight,
+    Absorber, Attributes, Bsdf, Camera, Component, Cone, Emission, Environment, EnvironmentMap, Evaluation, Field,
+    Film, Filter, Grid, Integrator, Interior, Light, Material, Medium, Mesh, Object, Phase, PhaseTable, Placement,
+    Profile, Projection, Reflectance, Sampler, Scattering, Scene, Shape, Sides, Spectrum, Temperature, Texels, Texture,
+    TextureFilter, TextureKind, Wavelengths, Weight,
 };
 use crate::spectral::{Channels, Curve, Outside};
 
@@ -161,6 +161,7 @@ impl Hash {
             sampler,
             wavelengths,
             wavelengths_per_channel,
+            techniques,
             evaluation,
             evaluator,
             epoch,
@@ -180,6 +181,10 @@ impl Hash {
         if *wavelengths_per_channel > 1 {
             self.text("wavelengths per channel");
             self.counts([wavelengths_per_channel]);
+        }
+        if let Some(techniques) = techniques {
+            self.text("techniques");
+            self.counts([techniques]);
         }
         if *evaluation != Evaluation::Auto {
             self.text("evaluation");
@@ -389,16 +394,52 @@ impl Hash {
     }
 
     fn medium(&mut self, medium: &Medium) {
-        let Medium { name: _, absorbers, temperature, density } = medium;
-        self.list(absorbers, |hash, Absorber { strength, columns }| {
-            hash.number(*strength);
-            hash.list(columns, |hash, (kelvin, spectrum)| {
-                hash.number(*kelvin);
-                hash.count(*spectrum);
+        let Medium { name: _, components, temperature } = medium;
+        for (i, component) in components.iter().enumerate() {
+            let Component { absorbers, scattering, density } = component;
+            // Nothing of what most media are not, so that they keep their digests.
+            if i > 0 {
+                self.text("component");
+            }
+            self.list(absorbers, |hash, Absorber { strength, columns }| {
+                hash.number(*strength);
+                hash.list(columns, |hash, (kelvin, spectrum)| {
+                    hash.number(*kelvin);
+                    hash.count(*spectrum);
+                });
             });
-        });
-        self.option(temperature.as_ref(), Hash::field);
-        self.field(density);
+            if let Some(Scattering { coefficient, phase }) = scattering {
+                self.text("scattering");
+                self.count(*coefficient);
+                self.phase(phase);
+            }
+            if i == 0 {
+                self.option(temperature.as_ref(), Hash::field);
+            }
+            self.field(density);
+        }
+    }
+
+    fn phase(&mut self, phase: &Phase) {
+        match phase {
+            Phase::HenyeyGreenstein(g) => {
+                self.tag(0);
+                self.count(*g);
+            }
+            Phase::Rayleigh { depolarisation } => {
+                self.tag(1);
+                self.number(*depolarisation);
+            }
+            Phase::Table(table) => {
+                let PhaseTable { degrees, nm, values } = &**table;
+                self.tag(2);
+                self.count(nm.len());
+                self.numbers(nm);
+                self.count(degrees.len());
+                self.numbers(degrees);
+                self.numbers(values.iter().flatten());
+            }
+        }
     }
 
     fn field(&mut self, field: &Field) {

@@ -16,7 +16,7 @@ use super::medium::Media;
 use super::object::Objects;
 use super::overrides;
 use super::spectrum::Spectra;
-use super::tree::{Entry, Origin};
+use super::tree::{Entry, Origin, Value};
 use super::{Evaluation, Evaluator, Integrator, Sampler, Scene, Wavelengths};
 use crate::error::{Error, Problem, Result};
 
@@ -24,6 +24,8 @@ use crate::error::{Error, Problem, Result};
 /// the most that every driver runs.
 const MAX_BOUNCES: u32 = 16_383;
 const MAX_EPOCH: u32 = 1024;
+/// Of spectral MIS: the state of a path has a number for each.
+const MOST_TECHNIQUES: u32 = 16;
 const MOST_WAVELENGTHS: u32 = 16;
 
 /// Reads the scene in `file`. `overrides` are the `--set` arguments: a dotted key and the text of a TOML value; a bare
@@ -32,8 +34,25 @@ const MOST_WAVELENGTHS: u32 = 16;
 /// # Errors
 /// [`Error::Input`] with every independent mistake in the scene, its spectra and its meshes.
 pub fn load(file: &Path, overrides: &[(String, String)]) -> Result<Scene> {
+    parse(&text_of(file)?, file, overrides)
+}
+
+/// The text of the scene in `file`, and its tree, of which only the syntax has been checked.
+///
+/// # Errors
+/// [`Error::Input`] with every mistake of syntax.
+pub fn read(file: &Path) -> Result<(String, Vec<Entry>)> {
+    let text = text_of(file)?;
+    let cx = Context::new(file, without_mark(&text), &[]);
+    match cx.document() {
+        Some(root) => Ok((text, root)),
+        None => Err(Error::Input(cx.finish().0)),
+    }
+}
+
+fn text_of(file: &Path) -> Result<String> {
     let bytes = std::fs::read(file).map_err(|e| Error::input(file, format!("cannot be read: {e}")))?;
-    let text = String::from_utf8(bytes).map_err(|e| {
+    String::from_utf8(bytes).map_err(|e| {
         let line = e.as_bytes()[..e.utf8_error().valid_up_to()].iter().filter(|b| **b == b'\n').count() + 1;
         Error::Input(vec![Problem {
             file: file.to_owned(),
@@ -42,16 +61,24 @@ pub fn load(file: &Path, overrides: &[(String, String)]) -> Result<Scene> {
             help: Some("save the scene as UTF-8".to_owned()),
             ..Problem::default()
         }])
-    })?;
-    parse(&text, file, overrides)
+    })
+}
+
+/// Without the mark that some editors put first, which is no part of the scene.
+pub(super) fn without_mark(text: &str) -> &str {
+    text.strip_prefix('\u{feff}').unwrap_or(text)
 }
 
 /// [`load`] on the text of a scene; `file` only locates relative paths and messages.
 pub fn parse(text: &str, file: &Path, overrides: &[(String, String)]) -> Result<Scene> {
-    // A mark some editors put first; it is no part of the scene.
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let cx = Context::new(file, text, overrides);
-    let Some(mut root) = cx.document() else { return Err(Error::Input(cx.finish().0)) };
+    let cx = Context::new(file, without_mark(text), overrides);
+    let Some(root) = cx.document() else { return Err(Error::Input(cx.finish().0)) };
+    resolve(cx, root, overrides)
+}
+
+/// The scene that a tree describes.
+pub(super) fn resolve(cx: Context<'_>, mut root: Vec<Entry>, overrides: &[(String, String)]) -> Result<Scene> {
+    let file = cx.file;
     overrides::apply(&cx, &mut root, overrides);
     let scene = decode(&cx, &root);
     let (problems, warnings) = cx.finish();
@@ -135,6 +162,7 @@ impl Default for Integrator {
             sampler: Sampler::Sobol,
             wavelengths: Wavelengths::Emission,
             wavelengths_per_channel: 1,
+            techniques: None,
             evaluation: Evaluation::Auto,
             evaluator: Evaluator::Auto,
             epoch: 64,
@@ -173,6 +201,11 @@ fn decode_integrator(item: &Item) -> Option<Integrator> {
     };
     let wavelengths_per_channel =
         power_of_two("wavelengths_per_channel", MOST_WAVELENGTHS, default.wavelengths_per_channel);
+    let techniques = match fields.get("techniques") {
+        Some(item) if matches!(&item.node.value, Value::String(word) if word == "auto") => Some(None),
+        Some(item) => item.whole(1..=MOST_TECHNIQUES).map(Some),
+        None => Some(default.techniques),
+    };
     let evaluation = match fields.get("evaluation") {
         Some(item) => item.choice(&Evaluation::ALL.map(|evaluation| (evaluation.name(), evaluation))),
         None => Some(default.evaluation),
@@ -188,6 +221,7 @@ fn decode_integrator(item: &Item) -> Option<Integrator> {
         sampler: sampler?,
         wavelengths: wavelengths?,
         wavelengths_per_channel: wavelengths_per_channel?,
+        techniques: techniques?,
         evaluation: evaluation?,
         evaluator: evaluator?,
         epoch: epoch?,

@@ -1,15 +1,17 @@
-//! `[media]`: gases that absorb and emit.
+//! `[media]`: matter that absorbs, scatters and emits.
 
 use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use super::arrays::Data;
 use super::decode::{Fields, Item, did_you_mean, list};
 use super::keys;
 use super::material::kelvin;
+use super::phase::{Pattern, pattern};
 use super::spectrum::{Handle, Quantity, Spectra, report_in_file};
 use super::tree::Value;
-use super::{Absorber, Field, Grid, Medium, MediumId};
+use super::{Absorber, Component, Field, Grid, Medium, MediumId, Scattering};
 use crate::format::noise::{self, Range};
 use crate::format::unit::{self, Measure};
 use crate::format::volume::{self, Volume};
@@ -17,12 +19,21 @@ use crate::format::volume::{self, Volume};
 /// Strength, and columns of a temperature and a spectrum each.
 type Term = (f64, Vec<(f64, Handle)>);
 
+/// Voxels of a medium whose grids of several shapes are divided until they have one.
+const MOST_VOXELS: u64 = 1 << 27;
+
 /// A medium as the file defines it.
 struct Declared {
-    absorbers: Vec<Term>,
+    components: Vec<Kind>,
     temperature: Option<Field>,
-    density: Field,
     taken: Option<MediumId>,
+}
+
+/// A kind of matter as the file defines it.
+struct Kind {
+    absorbers: Vec<Term>,
+    scattering: Option<(Handle, Pattern)>,
+    density: Field,
 }
 
 /// The media of the file, and those in use.
@@ -54,26 +65,30 @@ impl<'a> Media<'a> {
         };
         let declared = declared.as_mut()?;
         if declared.taken.is_none() {
-            let absorbers = (declared.absorbers.iter())
-                .map(|(strength, columns)| {
-                    let columns = columns.iter().map(|(kelvin, handle)| (*kelvin, spectra.take(*handle))).collect();
-                    Absorber { strength: *strength, columns }
-                })
-                .collect();
-            let (temperature, density) = (declared.temperature.clone(), declared.density.clone());
-            self.scene.push(Medium { name: name.to_owned(), absorbers, temperature, density });
+            let components = declared.components.iter().map(|kind| kind.take(spectra)).collect();
+            let temperature = declared.temperature.clone();
+            self.scene.push(Medium { name: name.to_owned(), components, temperature });
             declared.taken = Some(self.scene.len() - 1);
         }
         declared.taken
     }
 
-    /// The medium that `item` names, to fill all space: it has no grids, for want of a box.
+    /// The medium that `item` names, to fill all space: it has no grids, for want of a box, and does not scatter, for want of an
+    /// end.
     pub fn take_outer(&mut self, item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<MediumId> {
         let id = self.take(item, spectra)?;
+        let name = &self.scene[id].name;
         if self.scene[id].grid_size().is_some() {
             item.error_help(
-                format!("\"{}\" has a grid, which fills the box of an object, not all space", self.scene[id].name),
+                format!("\"{name}\" has a grid, which fills the box of an object, not all space"),
                 "use numbers, or give the medium to an object as its `interior`",
+            );
+            return None;
+        }
+        if self.scene[id].scatters() {
+            item.error_help(
+                format!("\"{name}\" scatters, which matter without an end cannot: paths would never leave it"),
+                "give the matter a shape: name it as the `interior` of an object around the scene, e.g. a cube or a sphere",
             );
             return None;
         }
@@ -85,50 +100,174 @@ impl<'a> Media<'a> {
     }
 }
 
+impl Kind {
+    fn take(&self, spectra: &mut Spectra) -> Component {
+        let absorbers = self.absorbers.iter().map(|(strength, columns)| {
+            let columns = columns.iter().map(|(kelvin, handle)| (*kelvin, spectra.take(*handle))).collect();
+            Absorber { strength: *strength, columns }
+        });
+        let absorbers = absorbers.collect();
+        let scattering = self.scattering.as_ref().map(|(coefficient, pattern)| Scattering {
+            coefficient: spectra.take(*coefficient),
+            phase: pattern.take(spectra),
+        });
+        Component { absorbers, scattering, density: self.density.clone() }
+    }
+}
+
 fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>, grids: &mut Grids) -> Option<Declared> {
     let fields = item.table(&keys::MEDIUM)?;
-    let later = |key: &&str| fields.has(key);
-    let refused = keys::MEDIUM.later.iter().any(later);
-    let given = fields.exactly_one("absorption");
-    let temperature = field(&fields, "temperature", grids, kelvin, Describes::Temperature);
-    let density = field(&fields, "density", grids, Item::not_negative, Describes::Density);
+    let mut temperature = field(&fields, "temperature", grids, kelvin, Describes::Temperature)?;
+    let density = field(&fields, "density", grids, Item::not_negative, Describes::Density)?;
+    let density = density.unwrap_or(Field::Constant(1.0));
+    let mut components = match fields.get("components") {
+        None => vec![kind(&fields, density, spectra, ", or several `components`")?],
+        Some(item) => several(&fields, &item, &density, spectra, grids)?,
+    };
+    let fields_of_all = temperature.iter_mut().chain(components.iter_mut().map(|kind| &mut kind.density));
+    one_shape(&fields, fields_of_all.collect())?;
+    let absorbers: Vec<&Term> = components.iter().flat_map(|kind| &kind.absorbers).collect();
+    check_temperatures(&fields, temperature.as_ref(), &absorbers)?;
+    Some(Declared { components, temperature, taken: None })
+}
+
+/// The keys of a kind of matter, which a medium may have itself or in `components`.
+const OF_A_KIND: [&str; 5] = ["absorption", "species", "scattering", "phase", "pressure"];
+
+fn several<'a>(
+    fields: &Fields<'a>,
+    item: &Item<'a>,
+    density: &Field,
+    spectra: &mut Spectra<'a>,
+    grids: &mut Grids,
+) -> Option<Vec<Kind>> {
+    if let Some(key) = OF_A_KIND.into_iter().find(|key| fields.has(key)) {
+        fields.get(key)?.error_help("cannot stand beside `components`", "move it into one of them");
+        return None;
+    }
+    let items = item.array()?;
+    if items.is_empty() {
+        item.error_help("has no components", "write e.g. [[media.NAME.components]] with a scattering");
+        return None;
+    }
+    let one = |item: &Item<'a>| {
+        let fields = item.table(&keys::COMPONENT)?;
+        let own = field(&fields, "density", grids, Item::not_negative, Describes::Density)?;
+        kind(&fields, own.unwrap_or_else(|| density.clone()), spectra, "")
+    };
+    // All of them, so that all mistakes are told at once.
+    items.iter().map(one).collect::<Vec<_>>().into_iter().collect()
+}
+
+/// `instead`: what else a table may have that has none of these keys.
+fn kind<'a>(fields: &Fields<'a>, density: Field, spectra: &mut Spectra<'a>, instead: &str) -> Option<Kind> {
+    let (absorption, gases, scattering) = (fields.get("absorption"), fields.get("species"), fields.get("scattering"));
+    if absorption.is_none() && gases.is_none() && scattering.is_none() {
+        fields.error_help(
+            "has neither an absorption nor a scattering",
+            format!("add absorption, species or scattering{instead}"),
+        );
+        return None;
+    }
+    if let (Some(_), Some(gases)) = (&absorption, &gases) {
+        gases.error_help("cannot stand beside `absorption`", "keep one of them, or make two `components`");
+        return None;
+    }
     let pressure = match fields.get("pressure") {
-        Some(item) if fields.has("absorption") => {
+        Some(item) if gases.is_none() => {
             item.error_help("goes with `species` only", "remove it; `density` scales an absorption");
             None
         }
         Some(item) => item.not_negative(),
         None => Some(1.0),
     };
-    let absorbers = given.and_then(|given| {
-        if given.path.ends_with(".absorption") {
-            let handle = spectra.resolve(&given, Quantity::Absorption)?;
-            return Some(vec![(1.0, vec![(0.0, handle)])]);
-        }
-        species(&given, spectra)
-    });
-    let (temperature, density, pressure, mut absorbers) = (temperature?, density?, pressure?, absorbers?);
-    let density = density.unwrap_or(Field::Constant(1.0));
-    absorbers.iter_mut().for_each(|(strength, _)| *strength *= pressure);
-    if let (Some(Field::Grid(a)), Field::Grid(b)) = (&temperature, &density)
-        && a.size != b.size
-    {
-        let size = |[x, y, z]: [u32; 3]| format!("[{z}, {y}, {x}]");
-        let message = format!(
-            "the grids of a medium must have one shape, but temperature has {} and density {}",
-            size(a.size),
-            size(b.size)
-        );
-        fields.error_help(message, "resample one of them");
+    let phase = fields.get("phase");
+    if let (None, Some(phase)) = (&scattering, &phase) {
+        phase.error_help("goes with `scattering` only", "add scattering, per metre, or remove it");
         return None;
     }
-    check_temperatures(&fields, temperature.as_ref(), &absorbers)?;
-    (!refused).then_some(Declared { absorbers, temperature, density, taken: None })
+    let scattering = match scattering {
+        None => Some(None),
+        Some(item) => {
+            let coefficient = spectra.resolve(&item, Quantity::Scattering);
+            let pattern = pattern(phase.as_ref(), spectra);
+            coefficient.zip(pattern).map(Some)
+        }
+    };
+    let absorbers = match (absorption, gases) {
+        (Some(item), _) => spectra.resolve(&item, Quantity::Absorption).map(|handle| vec![(1.0, vec![(0.0, handle)])]),
+        (None, Some(item)) => species(&item, spectra),
+        (None, None) => Some(Vec::new()),
+    };
+    let (scattering, pressure, mut absorbers) = (scattering?, pressure?, absorbers?);
+    absorbers.iter_mut().for_each(|(strength, _)| *strength *= pressure);
+    Some(Kind { absorbers, scattering, density })
+}
+
+/// Divides voxels until all grids of a medium have one shape. Each voxel has one value throughout, so that nothing changes.
+fn one_shape(fields: &Fields, mut all: Vec<&mut Field>) -> Option<()> {
+    let sizes: Vec<[u32; 3]> = (all.iter())
+        .filter_map(|field| match field {
+            Field::Constant(_) => None,
+            Field::Grid(grid) => Some(grid.size),
+        })
+        .collect();
+    let Some(&first) = sizes.first() else { return Some(()) };
+    if sizes.iter().all(|size| *size == first) {
+        return Some(());
+    }
+    let common: [u64; 3] =
+        std::array::from_fn(|axis| sizes.iter().fold(1, |all, size| least_common_multiple(all, u64::from(size[axis]))));
+    let voxels = common.iter().try_fold(1u64, |all, side| all.checked_mul(*side)).filter(|all| *all <= MOST_VOXELS);
+    if voxels.is_none() {
+        let shape = |[x, y, z]: [u32; 3]| format!("[{z}, {y}, {x}]");
+        let mut shapes: Vec<String> = sizes.into_iter().map(shape).collect();
+        shapes.dedup();
+        fields.error_help(
+            format!(
+                "has grids of shapes {}, which have no common division of {MOST_VOXELS} voxels or fewer",
+                list(shapes.iter().map(String::as_str))
+            ),
+            "resample them to one shape, or to multiples of one another",
+        );
+        return None;
+    }
+    let size = common.map(|side| side as u32);
+    for field in &mut all {
+        if let Field::Grid(grid) = field
+            && grid.size != size
+        {
+            **field = Field::Grid(Arc::new(divided(grid, size)));
+        }
+    }
+    Some(())
+}
+
+fn divided(grid: &Grid, size: [u32; 3]) -> Grid {
+    let each: [u32; 3] = std::array::from_fn(|axis| size[axis] / grid.size[axis]);
+    let [nx, ny, _] = grid.size.map(|n| n as usize);
+    let mut values = Vec::with_capacity(size.iter().map(|n| *n as usize).product());
+    for z in 0..size[2] {
+        for y in 0..size[1] {
+            let row = ((z / each[2]) as usize * ny + (y / each[1]) as usize) * nx;
+            values.extend((0..size[0]).map(|x| grid.values[row + (x / each[0]) as usize]));
+        }
+    }
+    Grid { size, values }
+}
+
+fn least_common_multiple(a: u64, b: u64) -> u64 {
+    let (mut x, mut y) = (a, b);
+    while y != 0 {
+        (x, y) = (y, x % y);
+    }
+    // Saturating: what is too large is refused.
+    (a / x).saturating_mul(b)
 }
 
 /// What tables over temperature say about the medium's: one is needed to choose a column, and where it lies beyond them,
 /// the last column is held, which is said.
-fn check_temperatures(fields: &Fields, temperature: Option<&Field>, absorbers: &[Term]) -> Option<()> {
+fn check_temperatures(fields: &Fields, temperature: Option<&Field>, absorbers: &[&Term]) -> Option<()> {
     for (i, (_, columns)) in absorbers.iter().enumerate().filter(|(_, (_, columns))| columns.len() > 1) {
         let (first, last) = (columns[0].0, columns[columns.len() - 1].0);
         let [low, high] = match temperature {
@@ -224,11 +363,11 @@ struct Grids(HashMap<(PathBuf, Describes), Option<Arc<Grid>>>);
 
 impl Grids {
     fn read(&mut self, item: &Item, describes: Describes) -> Option<Arc<Grid>> {
-        let key = (item.cx.path(item.text()?), describes);
+        let key = (item.source()?.1, describes);
         if let Some(known) = self.0.get(&key) {
             return known.clone();
         }
-        let grid = match volume::read(&key.0) {
+        let grid = match item.data().map_or_else(|| volume::read(&key.0), Data::volume) {
             Ok(volume) => checked(item, volume, describes).map(Arc::new),
             Err(problem) => {
                 report_in_file(item, *problem);
@@ -243,7 +382,7 @@ impl Grids {
 /// A volume in Spectile's units, without noise; what is missing or impossible is an error.
 fn checked(item: &Item, volume: Volume, describes: Describes) -> Option<Grid> {
     let Volume { size, mut values, unit } = volume;
-    let name = item.text()?;
+    let (name, _) = item.source()?;
     let place = |i: usize| {
         let [nx, ny, _] = size.map(|n| n as usize);
         format!("[{}, {}, {}]", i / (nx * ny), i / nx % ny, i % nx)

@@ -1,6 +1,7 @@
 //! A resolved, validated scene: what `scene.toml`, its meshes and its spectra say, in metres and nanometres,
 //! f64, world space. Knows no GPU and no paths.
 
+pub mod arrays;
 mod blend;
 mod camera;
 mod channels;
@@ -9,6 +10,7 @@ mod context;
 mod coverage;
 mod decode;
 mod digest;
+mod draft;
 mod environment;
 mod file;
 pub mod keys;
@@ -17,6 +19,7 @@ mod material;
 mod medium;
 mod object;
 mod overrides;
+mod phase;
 mod sensor;
 mod shape;
 mod spectrum;
@@ -24,7 +27,7 @@ mod sun;
 mod texture;
 mod transform;
 mod translucent;
-mod tree;
+pub mod tree;
 mod words;
 
 use std::path::PathBuf;
@@ -33,8 +36,12 @@ use std::sync::Arc;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
-pub use file::{load, parse};
+pub use decode::join as dotted_key;
+pub use draft::Draft;
+pub use file::{load, parse, read};
 pub use light::{Cone, Light, Profile};
+
+pub use crate::format::phase::PhaseTable;
 pub use sensor::{Detector, Optics, SensorModel, load_sensor, parse_sensor};
 pub use spectrum::{Quantity, irradiance};
 
@@ -149,6 +156,10 @@ pub struct Integrator {
     pub wavelengths: Wavelengths,
     /// At how many wavelengths of each channel a path is evaluated, a power of two up to 16.
     pub wavelengths_per_channel: u32,
+    /// How many techniques decide where light goes that matter scatters (docs/METHOD.md, Techniques), 1 to 16; `None`: as many as
+    /// its channels differ.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub techniques: Option<u32>,
     /// Which of a scene's paths are evaluated.
     pub evaluation: Evaluation,
     pub evaluator: Evaluator,
@@ -409,16 +420,45 @@ pub struct Interior {
     pub to_grid: DAffine3,
 }
 
-/// A gas that absorbs and emits. Its absorption coefficient in m⁻¹ is density · Σ strength · table(λ, T); where it has a
-/// temperature it emits as much as it absorbs, times Planck's radiance.
+/// Matter that absorbs, scatters and emits: one or several kinds of it in the same place. Where it has a temperature it emits as
+/// much as it absorbs, times Planck's radiance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Medium {
     pub name: String,
-    pub absorbers: Vec<Absorber>,
+    pub components: Vec<Component>,
     /// K, not negative.
     pub temperature: Option<Field>,
+}
+
+/// A kind of matter. Its absorption coefficient in m⁻¹ is density · Σ strength · table(λ, T), its scattering coefficient
+/// density · `scattering.coefficient`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Component {
+    pub absorbers: Vec<Absorber>,
+    pub scattering: Option<Scattering>,
     /// Relative, not negative.
     pub density: Field,
+}
+
+/// How a kind of matter scatters light.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scattering {
+    /// m⁻¹ at density 1.
+    pub coefficient: SpectrumId,
+    pub phase: Phase,
+}
+
+/// Where scattered light goes: the phase function P of the angle θ by which it turns, whose mean over the sphere is 1; what is
+/// scattered into a direction is σs P / 4π.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Phase {
+    /// (1 - g²) / (1 + g² - 2 g cosθ)^(3/2) (Henyey and Greenstein 1941), g the mean cosine, in (-1, 1).
+    HenyeyGreenstein(SpectrumId),
+    /// 3 / (4 (1 + 2γ)) (1 + 3γ + (1 - γ) cos²θ) with γ = ρ / (2 - ρ), ρ the depolarisation factor in \[0, ½\] (Chandrasekhar
+    /// 1960, §17); of radiance alone, without its polarisation.
+    Rayleigh { depolarisation: f64 },
+    /// Of particles, from a table.
+    Table(Arc<PhaseTable>),
 }
 
 /// A term of a medium's absorption.
@@ -438,7 +478,8 @@ pub enum Field {
     Grid(Arc<Grid>),
 }
 
-/// Voxels with a constant value each, x fastest. All grids of one medium have one shape.
+/// Voxels with a constant value each, x fastest. All grids of one medium have one shape: where its file gives several, they are
+/// divided until they have.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grid {
     /// Voxels along x, y and z.
@@ -449,10 +490,31 @@ pub struct Grid {
 impl Medium {
     /// Voxels along x, y and z, where any quantity has a grid.
     pub fn grid_size(&self) -> Option<[u32; 3]> {
-        [self.temperature.as_ref(), Some(&self.density)].into_iter().flatten().find_map(|field| match field {
+        let densities = self.components.iter().map(|component| &component.density);
+        self.temperature.as_ref().into_iter().chain(densities).find_map(|field| match field {
             Field::Constant(_) => None,
             Field::Grid(grid) => Some(grid.size),
         })
+    }
+
+    pub fn scatters(&self) -> bool {
+        self.components.iter().any(|component| component.scattering.is_some())
+    }
+
+    /// All spectra of its absorption.
+    pub fn absorption(&self) -> impl Iterator<Item = SpectrumId> {
+        let absorbers = self.components.iter().flat_map(|component| &component.absorbers);
+        absorbers.flat_map(|absorber| absorber.columns.iter().map(|column| column.1))
+    }
+}
+
+impl Field {
+    /// The value in voxel `i`; without a grid the same everywhere.
+    pub fn at(&self, i: usize) -> f64 {
+        match self {
+            Field::Constant(value) => *value,
+            Field::Grid(grid) => f64::from(grid.values[i]),
+        }
     }
 }
 

@@ -212,11 +212,15 @@ impl<'s, 'a> Objects<'s, 'a> {
         group: Option<&Item<'a>>,
         node: Option<&Item<'a>>,
     ) -> Option<(Format, Rc<Mesh>)> {
-        let path = item.cx.path(item.text()?);
+        let (_, path) = item.source()?;
         let loaded = match self.meshes.get(&path) {
             Some(known) => known.clone(),
             None => {
-                let loaded = match load(&path) {
+                let loaded = match item.data() {
+                    Some(data) => data.mesh().map(|mesh| Loaded::Mesh(Format::Memory, Rc::new(mesh))),
+                    None => load(&path),
+                };
+                let loaded = match loaded {
                     Ok(loaded) => Some(loaded),
                     Err(problem) => {
                         report_in_file(item, *problem);
@@ -331,10 +335,14 @@ impl<'s, 'a> Objects<'s, 'a> {
                 Place::File => "it has".to_owned(),
                 place => format!("the triangles from {place} on have"),
             };
-            let word = if format == Format::Obj { " (vt)" } else { "" };
+            let word = match format {
+                Format::Obj => " (vt)",
+                Format::Memory => " (`uv`)",
+                _ => "",
+            };
             let message = format!("{what}, but {from} no texture coordinates{word}");
             shape.cx.push(Problem {
-                file: shape.cx.path(shape.text().unwrap_or_default()),
+                file: shape.source().unwrap_or_default().1,
                 line: part.place.line(),
                 key: Some(shape.path.clone()),
                 message,
@@ -465,7 +473,7 @@ fn pick<'m>(mesh: &'m Mesh, shape: &Item, group: Option<&Item>) -> Option<Vec<&'
 fn word_of_materials(format: Format) -> &'static str {
     match format {
         Format::Obj => "usemtl",
-        Format::Ply | Format::Stl | Format::Gltf => "material",
+        Format::Ply | Format::Stl | Format::Gltf | Format::Memory => "material",
     }
 }
 
@@ -504,6 +512,7 @@ fn warn_about(item: &Item, mesh: &Mesh) {
 fn file_name(item: &Item) -> String {
     match &item.node.value {
         Value::String(path) => path.rsplit(['/', '\\']).next().unwrap_or(path).to_owned(),
+        Value::Data(data) => data.name().to_owned(),
         _ => String::new(),
     }
 }

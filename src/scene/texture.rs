@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use glam::DVec2;
 
+use super::arrays::Data;
 use super::decode::{Fields, Item, list};
 use super::keys;
 use super::spectrum::{self, Quantity, Spectra, report_in_file};
@@ -154,7 +155,7 @@ impl Textures {
             (Use::Lamps(..), None) => Curve::Constant(1.0),
             _ => upsample::emission([means[0], means[1], means[2]]),
         };
-        Some((handle, spectra.add(&format!("the mean of {}", file.text()?), curve)))
+        Some((handle, spectra.add(&format!("the mean of {}", file.source()?.0), curve)))
     }
 
     /// The numbers over a surface that `item`, `{ texture }`, spells.
@@ -218,12 +219,12 @@ impl Textures {
         placement: Placement,
         decode: impl FnOnce(&Image, &str) -> Option<(Vec<f32>, Vec<String>)>,
     ) -> Option<Handle> {
-        let name = file.text()?;
-        let path = file.cx.path(name);
+        let (name, path) = file.source()?;
         let image = match self.files.get(&path) {
             Some(known) => known.clone(),
             None => {
-                let read = image::read(&path).map_err(|problem| report_in_file(file, *problem)).ok().map(Rc::new);
+                let read = file.data().map_or_else(|| image::read(&path), Data::image);
+                let read = read.map_err(|problem| report_in_file(file, *problem)).ok().map(Rc::new);
                 self.files.insert(path.clone(), read.clone());
                 read
             }
@@ -491,6 +492,9 @@ fn pair<'i>(endmembers: &Item, image: &'i Image, name: &str, warnings: &mut Vec<
         let message = format!("names {} spectra, but {name} has {}", items.len(), channels(&image.planes));
         endmembers.error_help(message, "name one for each channel, in this order");
         return None;
+    }
+    if image.format == Format::Memory {
+        return Some(image.planes.iter().collect());
     }
     let names: Vec<Option<&str>> = items
         .iter()

@@ -2,10 +2,13 @@
 //! shown in its place.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 use toml::value::Datetime;
+
+use super::arrays::Data;
 
 /// Where a key or value was written.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,6 +38,8 @@ pub enum Value {
     Datetime(Datetime),
     Array(Vec<Node>),
     Table(Vec<Entry>),
+    /// What no file can hold: numbers in memory, where a file would be named.
+    Data(Arc<Data>),
 }
 
 /// One key of a table, in the order of the file.
@@ -47,6 +52,11 @@ pub struct Entry {
 }
 
 impl Value {
+    /// A date or time as TOML spells it.
+    pub fn datetime(text: &str) -> Option<Value> {
+        text.parse().ok().map(Value::Datetime)
+    }
+
     /// What the value is, as a phrase for messages.
     pub fn kind(&self) -> &'static str {
         match self {
@@ -57,6 +67,7 @@ impl Value {
             Value::Datetime(_) => "a date",
             Value::Array(_) => "an array",
             Value::Table(_) => "a table",
+            Value::Data(_) => "an array of numbers in memory",
         }
     }
 }

@@ -18,4 +18,4 @@ pub mod warp;
 
 pub use channels::{Channels, Response, hull};
 pub use curve::{Curve, Outside};
-pub use data::{SOLAR, columns};
+pub use data::{D65, SOLAR, columns};

@@ -11,7 +11,7 @@ use proptest::test_runner::TestRunner;
 use spectile::error::Problem;
 use spectile::format::mesh::{self, Format};
 use spectile::format::text::{self, Column, SpectrumTable};
-use spectile::format::{image, maps, refractive, response, volume};
+use spectile::format::{image, maps, phase, refractive, response, volume};
 use tempfile::{TempDir, tempdir};
 
 use crate::binary::repository;
@@ -23,6 +23,7 @@ enum Reader {
     Index,
     Responses,
     Columns,
+    Phase,
     Map,
     Volume,
     Picture,
@@ -191,6 +192,7 @@ fn valid_files() -> Vec<Valid> {
         one("a.csv", Reader::Spectrum(Column::Named("a")), TABLE),
         one("a.csv", Reader::Spectrum(Column::Number(3)), TABLE),
         one("a.csv", Reader::Columns, "nm,300,600 K\n400,1,2\n500,1,2\n"),
+        one("mie.csv", Reader::Phase, "degrees,400,0.7 um\n0,90,50\n10,2,3\n90,0.2,0.3\n180,0.5,0.4\n"),
         one("excel.csv", ONLY, utf16),
         one("lamp.spd", ONLY, "400 1 # begins\n500 2\n"),
         one("a.txt", Reader::Index, "wl\tn\n0.4\t1.5\n0.7\t1.4\n\nwl\tk\n0.4\t0\n0.7\t1\n"),
@@ -332,6 +334,12 @@ fn read(reader: Reader, path: &Path) -> Result<(), Box<Problem>> {
         Reader::Responses => {
             let responses = response::read_responses(path)?;
             assert!(responses.named.iter().all(|(_, response)| response.integral() > 0.0));
+        }
+        Reader::Phase => {
+            let table = phase::read(path)?.table;
+            assert!(table.degrees.len() >= 2 && table.degrees.is_sorted() && table.nm.is_sorted());
+            assert!(table.values.iter().all(|column| column.len() == table.degrees.len()));
+            assert!(table.values.iter().flatten().all(|value| value.is_finite() && *value >= 0.0));
         }
         Reader::Columns => text::read_columns(path)?.iter().for_each(|(_, table)| check_table(table)),
         Reader::Map => {

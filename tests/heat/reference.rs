@@ -225,7 +225,7 @@ fn lorentz_equivalent_width() {
         let (line, channels, expected) = lorentz_line(x, published);
         let lamp = slab(0.0, None, |b| b.channels(channels).lamp(disk(DVec3::ZERO, DVec3::Z, 2.0), 1.0, Sides::Front));
         let mut scene = lamp.build();
-        scene.spectra[scene.media[0].absorbers[0].columns[0].1].curve = line;
+        scene.spectra[scene.media[0].components[0].absorbers[0].columns[0].1].curve = line;
         let e = estimates(&render(&scene, &[[0, 0]], 200_000, 320))[0];
         // 1 - mean: the width itself.
         let width = Estimate { mean: 1.0 - e.mean, ..e };

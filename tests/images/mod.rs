@@ -11,6 +11,7 @@ mod media;
 mod opacity;
 mod pictures;
 mod roulette;
+mod scattering;
 mod spots;
 mod textures;
 mod wavelengths;

@@ -149,7 +149,7 @@ fn a_line_in_a_wide_channel() {
         let (line, channels, expected) = heat::lorentz_line(x, published);
         let lamp = |b: Builder| b.lamp(disk(DVec3::ZERO, DVec3::Z, 2.0), 1.0, Sides::Front);
         let mut scene = heat::slab(0.0, None, |b| lamp(b.channels(channels))).build();
-        scene.spectra[scene.media[0].absorbers[0].columns[0].1].curve = line;
+        scene.spectra[scene.media[0].components[0].absorbers[0].columns[0].1].curve = line;
         scene.integrator.sampler = Sampler::Sobol;
         scene.film.width = 16;
         scene.film.height = 16;

@@ -223,17 +223,43 @@ fn programs(names: Names, channels: &Channels) -> Vec<Program> {
             w * (1.0 - thinned) * B + thinned * B
         }),
         program("OP_EXTINCTION", &[record(OP_EXTINCTION | alone, a, W, metres)], move |_, _| w * thinned * B),
-        // Across voxels of absorption 1e-30, for so many metres: the whole way is one optical depth.
+        // Across voxels of absorption 1e-30 and almost no temperature, for so many metres: the whole way is one optical depth.
         program(
             "OP_MARCH",
+            &[record(OP_MARCH, grid, W, 1e30), raw([0.25, 0.5, 0.5, 0.0]), raw([1.75, 0.75, 0.5, 0.0]), one(alone)],
+            move |_, _| (-1e30f64 * 1e-30).exp() * B,
+        ),
+        // On T, and on F.
+        program("OP_AMOUNTS", &[record(OP_AMOUNTS, a | b << 16, metres, 3.0), one(alone)], move |_, _| {
+            (-2.0 * A - 3.0 * B).exp() * B
+        }),
+        program(
+            "OP_AMOUNTS",
             &[
                 record(OP_ONE | MODE_SINGLE, 0, W, 0.0),
-                record(OP_MARCH | MODE_ON_F | gather, grid, 0.0, 1e30),
-                raw([0.25, 0.5, 0.5, 0.0]),
-                raw([1.75, 0.75, 0.5, 0.0]),
+                record(OP_AMOUNTS | MODE_ON_F | gather, a | b << 16, metres, 3.0),
+                one(alone),
             ],
-            move |_, _| w * (-1e30f64 * 1e-30).exp() * B,
+            move |_, _| w * (-2.0 * A - 3.0 * B).exp() * B + B,
         ),
+        program(
+            "OP_SAVE",
+            &[
+                record(OP_SPECTRUM | MODE_SINGLE | MODE_ADVANCE, a, 1.0, 0.0),
+                record(OP_SAVE, 0, 0.0, 0.0),
+                record(OP_AMOUNTS, a | b << 16, metres, 3.0),
+                record(OP_RESTORE, 0, 0.0, 0.0),
+                one(alone),
+            ],
+            move |_, _| A * B,
+        ),
+        program("OP_RESTORE", &[record(OP_RESTORE, 0, 0.0, 0.0), one(alone)], |_, _| 0.0),
+        // 0.375 is 1 - the cosine.
+        program("OP_HENYEY_GREENSTEIN", &[record(OP_HENYEY_GREENSTEIN | alone, a | b << 16, W, 0.375)], move |_, _| {
+            w * A * (1.0 - B * B) / (1.0 + B * B - 2.0 * B * 0.625).powf(1.5) * B
+        }),
+        // The scene's table is the same in all directions; a place between its columns is one.
+        program("OP_PHASE_TABLE", &[record(OP_PHASE_TABLE | alone, a, W, 40.25)], move |_, _| w * B),
         program("OP_PLANCK", &[record(OP_PLANCK | alone, 0, W, 5000.0)], move |_, nm| {
             w * planck::radiance(nm, 5000.0) * B
         }),

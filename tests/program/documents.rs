@@ -39,7 +39,7 @@ fn files(folder: &Path, endings: &[&str]) -> Vec<PathBuf> {
 /// The project's own pages.
 fn pages() -> Vec<PathBuf> {
     let mut pages = vec![root().join("README.md"), root().join("ARCHITECTURE.md")];
-    for folder in ["docs", "scenes", "tests", "benches", "examples"] {
+    for folder in ["docs", "scenes", "tests", "benches", "examples", "python"] {
         pages.extend(files(&root().join(folder), &[".md"]));
     }
     pages
@@ -83,7 +83,7 @@ fn links_lead_somewhere() {
 #[test]
 fn what_comments_point_at_is_there() {
     let (mut wrong, mut seen) = (Vec::new(), BTreeSet::new());
-    for folder in ["src", "shaders", "tests", "benches", "examples", "scripts"] {
+    for folder in ["src", "shaders", "tests", "benches", "examples", "scripts", "python"] {
         for file in files(&root().join(folder), &[".rs", ".wgsl", ".py", ".sh", ".js"]) {
             if file.ends_with(file!()) {
                 continue;

@@ -79,6 +79,7 @@ fn the_document_names_every_event_and_field() {
         render(&[&["c.zarr"], &wide[..]].concat()),
         render(&["a.zarr"]),
         render(&["d.zarr", "--set", "film.width=0"]),
+        vec!["render", "fog.toml", "--json", "-o", "fog.zarr", "--spp", "1"],
         vec!["plan", "scene.toml", "--parts", "--json"],
         vec!["devices", "--json"],
         vec!["info", "a.zarr", "--json"],
@@ -91,6 +92,9 @@ fn the_document_names_every_event_and_field() {
         vec!["sensor", "a.zarr", "--responses", "s.csv", "-o", "s.zarr", "--json"],
         vec!["info", "nothing.zarr", "--json"],
     ];
+    let fog = "[media.fog]\nscattering = 0.01\n[[objects]]\nsphere = { center = [0, 0, 0], radius = 9 }\ninterior = \"fog\"\n";
+    let scene = std::fs::read_to_string(place.path().join("scene.toml")).expect("a scene");
+    std::fs::write(place.path().join("fog.toml"), format!("{scene}\n{fog}")).expect("written");
     // A band that is narrower than a channel, and one beyond them all.
     let responses = "nm,narrow,infrared\n450,1,0\n460,1,0\n470,0,0\n800,0,1\n900,0,1\n";
     std::fs::write(place.path().join("s.csv"), responses).expect("written");

@@ -62,9 +62,9 @@ fn absorption_resolves() {
     let names: Vec<&str> = scene.media.iter().map(|m| m.name.as_str()).collect();
     assert_eq!((names, scene.camera_medium), (vec!["gas", "air"], Some(1)));
     let [gas, air] = &scene.media[..] else { panic!() };
-    assert_eq!((&gas.temperature, &gas.density), (&Some(Field::Constant(288.5)), &Field::Constant(0.5)));
-    assert_eq!((&air.temperature, &air.density), (&None, &Field::Constant(1.0)));
-    let [absorber] = &gas.absorbers[..] else { panic!() };
+    assert_eq!((&gas.temperature, &gas.components[0].density), (&Some(Field::Constant(288.5)), &Field::Constant(0.5)));
+    assert_eq!((&air.temperature, &air.components[0].density), (&None, &Field::Constant(1.0)));
+    let [absorber] = &gas.components[0].absorbers[..] else { panic!() };
     assert_eq!((absorber.strength, absorber.columns.len()), (1.0, 1));
     let expected = Curve::Linear { nm: vec![400.0, 700.0], value: vec![1.0, 3.0], outside: Outside::Zero };
     assert_eq!(scene.spectra[absorber.columns[0].1].curve, expected);
@@ -88,7 +88,8 @@ fn cross_sections_of_a_species_are_absorptions_at_its_temperatures() {
         "wavenumber (cm-1),273.15 K (cm2/molecule),546.3 K [cm2/molecule]\n14000,1e-21,2e-21\n26000,3e-21,4e-21\n";
     let media = "[media.gas]\nspecies = [{ table = \"gas.csv\", fraction = 1.0 }]\ntemperature = 300";
     let scene = good(&filled(BALL, media), &[("gas.csv", table)], &[]);
-    for ((kelvin, spectrum), expected) in scene.media[0].absorbers[0].columns.iter().zip([2.686_780_111, 2.686_780_111])
+    for ((kelvin, spectrum), expected) in
+        scene.media[0].components[0].absorbers[0].columns.iter().zip([2.686_780_111, 2.686_780_111])
     {
         let found = scene.spectra[*spectrum].curve.eval(1e7 / 14_000.0);
         assert!((found / expected - 1.0).abs() < 1e-9, "{kelvin} K: {found}");
@@ -106,9 +107,9 @@ fn species_resolve_with_what_they_do_not_cover() {
     let media = "[media.gas]\nspecies = [{ table = \"gas.csv\", fraction = 0.25 }, { table = \"gas.csv\", fraction = 0.5 }]\npressure = 2.0\ntemperature = 650";
     let scene = good(&filled(BALL, media), &[("gas.csv", GAS)], &[]);
     let gas = &scene.media[0];
-    let strengths: Vec<f64> = gas.absorbers.iter().map(|a| a.strength).collect();
+    let strengths: Vec<f64> = gas.components[0].absorbers.iter().map(|a| a.strength).collect();
     assert_eq!(strengths, [0.5, 1.0]);
-    for absorber in &gas.absorbers {
+    for absorber in &gas.components[0].absorbers {
         let kelvin: Vec<f64> = absorber.columns.iter().map(|c| c.0).collect();
         assert_eq!(kelvin, [300.0, 600.0]);
         let curve = &scene.spectra[absorber.columns[1].1].curve;
@@ -142,7 +143,7 @@ fn grids_resolve() {
     let Some(Field::Grid(t)) = &gas.temperature else { panic!() };
     let expected: Vec<f32> = (0..24).map(|i| 300.0 + i as f32).collect();
     assert_eq!((t.size, &t.values), ([4, 3, 2], &expected));
-    let Field::Grid(d) = &gas.density else { panic!() };
+    let Field::Grid(d) = &gas.components[0].density else { panic!() };
     assert_eq!(d.values, [3.0; 24]);
     let to_grid = scene.objects[1].interior.unwrap().to_grid;
     // Scaled by 2, a quarter turn about z, then moved.
@@ -171,10 +172,19 @@ fn wrong_media() {
     let box_of = |object: &str| filled(object, "[media.gas]\nabsorption = 1");
     #[rustfmt::skip]
     let cases: &[(&str, String, &str, &[&str])] = &[
-        ("scattering", gas("absorption = 1\nscattering = 1 #!"), "media.gas.scattering", &["`media.gas.scattering` is not supported yet"]),
-        ("phase", gas("absorption = 1\nphase_g = 0.5 #!"), "media.gas.phase_g", &["not supported yet"]),
-        ("no absorption", gas("temperature = 300").replace("gas]", "gas] #!"), "media.gas", &["has no absorption", "absorption, species"]),
-        ("both", gas("absorption = 1\nspecies = [] #!"), "media.gas.species", &["only one absorption is allowed"]),
+        ("nothing", gas("temperature = 300").replace("gas]", "gas] #!"), "media.gas", &["neither an absorption nor a scattering", "or several `components`"]),
+        ("both", gas("absorption = 1\nspecies = [] #!"), "media.gas.species", &["cannot stand beside `absorption`"]),
+        ("phase alone", gas("absorption = 1\nphase = { hg = 0.5 } #!"), "media.gas.phase", &["goes with `scattering` only"]),
+        ("two phases", gas("scattering = 1\nphase = { hg = 0.5, rayleigh = 0.1 } #!"), "media.gas.phase.rayleigh", &["only one phase function"]),
+        ("forward", gas("scattering = 1\nphase = { hg = 1 } #!"), "media.gas.phase.hg", &["an asymmetry g must lie in (-1, 1), but is 1"]),
+        ("depolarised", gas("scattering = 1\nphase = { rayleigh = 0.6 } #!"), "media.gas.phase.rayleigh", &["a depolarisation factor in [0, 0.5]"]),
+        ("negative scattering", gas("scattering = -1 #!"), "media.gas.scattering", &["a scattering coefficient must lie in [0, 1e15], but is -1"]),
+        ("cut phase", gas("scattering = 1\nphase = { table = \"cut.csv\" } #!"), "media.gas.phase.table", &["cut.csv", "from 0 to 180 degrees"]),
+        ("kinds beside keys", gas("absorption = 1 #!\n[[media.gas.components]]\nscattering = 1"), "media.gas.absorption", &["cannot stand beside `components`"]),
+        ("no kinds", gas("components = [] #!"), "media.gas.components", &["has no components"]),
+        ("empty kind", gas("[[media.gas.components]] #!\ndensity = 1"), "media.gas.components.0", &["neither an absorption nor a scattering", "absorption, species or scattering"]),
+        ("old phase", gas("scattering = 1\nphase_g = 0.5 #!"), "media.gas.phase_g", &["unknown key", "phase"]),
+        ("endless fog", filled(BALL, "[media.gas]\nscattering = 1").replace("fov = 60.0", "fov = 60.0\nmedium = \"gas\" #!"), "camera.perspective.medium", &["scatters, which matter without an end cannot", "give the matter a shape"]),
         ("negative", gas("absorption = -1 #!"), "media.gas.absorption", &["an absorption coefficient must lie in [0, 1e15], but is -1"]),
         ("a colour", gas("absorption = { rgb = [1, 1, 1] } #!"), "media.gas.absorption.rgb", &["is a colour"]),
         ("pressure alone", gas("absorption = 1\npressure = 2 #!"), "media.gas.pressure", &["goes with `species` only"]),
@@ -197,8 +207,12 @@ fn wrong_media() {
         ("a lamp", box_of("sphere = { center = [0, 0, 0], radius = 1 }\ninterior = \"gas\"\nemission = \"lamp\" #!"), "objects.1.emission", &["goes with a `material` only"]),
         ("outer", BASE.replace("fov = 60.0", "fov = 60.0\nmedium = \"air\" #!"), "camera.perspective.medium", &["no medium is named \"air\"", "[media.air]"]),
     ];
-    let files =
-        [("gas.csv", GAS), ("named.csv", "nm,hot\n400,1\n500,1\n"), ("twice.csv", "nm,300,300K\n400,1,1\n500,1,1\n")];
+    let files = [
+        ("gas.csv", GAS),
+        ("cut.csv", "degrees,500\n0,1\n90,1\n"),
+        ("named.csv", "nm,hot\n400,1\n500,1\n"),
+        ("twice.csv", "nm,300,300K\n400,1,1\n500,1,1\n"),
+    ];
     for (name, text, key, words) in cases {
         check_wrong(text, &files, name, key, words);
     }
@@ -208,7 +222,6 @@ fn wrong_media() {
 fn wrong_grids() {
     #[rustfmt::skip]
     let cases: &[(&str, &str, &[&str])] = &[
-        ("temperature = { grid = \"t.zarr\" }\ndensity = { grid = \"other.zarr\" }", "media.gas", &["one shape", "temperature has [2, 3, 4] and density [2, 3, 5]"]),
         ("density = { grid = \"flat.zarr\" }", "media.gas.density.grid", &["flat.zarr has 2 dimensions", "[z, y, x]"]),
         ("density = { grid = \"negative.zarr\" }", "media.gas.density.grid", &["densities, not negative, but is -2 at [1, 1, 1]"]),
         ("density = { grid = \"yes.zarr\" }", "media.gas.density.grid", &["must hold real numbers"]),

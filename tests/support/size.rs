@@ -10,3 +10,8 @@ pub fn is_full() -> bool {
 pub fn first<T>(n: usize, cases: impl IntoIterator<Item = T>) -> impl Iterator<Item = T> {
     cases.into_iter().take(if is_full() { usize::MAX } else { n })
 }
+
+/// A number of its own for `--full`.
+pub fn either<T>(small: T, full: T) -> T {
+    if is_full() { full } else { small }
+}

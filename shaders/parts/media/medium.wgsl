@@ -42,6 +42,9 @@ struct Way {
     volume: array<u32, MOST_STRETCHES>,
     start: array<f32, MOST_STRETCHES>,
     to: array<f32, MOST_STRETCHES>,
+#if SCATTERS
+    around: array<vec2<u32>, MOST_STRETCHES>,
+#endif
 }
 
 // Notes the stretch up to `to` in the innermost volume. False where there are too many.
@@ -64,6 +67,9 @@ fn add_stretch(way: ptr<function, Way>, around: vec2<u32>, start: f32, to: f32) 
     (*way).volume[(*way).count] = number - 1u;
     (*way).start[(*way).count] = start;
     (*way).to[(*way).count] = to;
+#if SCATTERS
+    (*way).around[(*way).count] = around;
+#endif
     (*way).count += 1u;
     return true;
 }
@@ -79,13 +85,17 @@ struct Walked {
 // Follows `ray` up to the first surface with a material, nearer than `limit`; `around` and `way` note what it goes through.
 fn walk(ray: Ray, limit: f32, around: ptr<function, vec2<u32>>, way: ptr<function, Way>, overflow: ptr<function, bool>) -> Walked {
     var walked = Walked(Hit(limit, NONE, 0.0, 0.0), ray, 0.0);
+    // Where the stretch begins: at the boundary itself, not where the rest of the ray starts.
+    var begins = 0.0;
     for (var n = 0u; n < MOST_CROSSINGS; n += 1u) {
         let left = select(limit - walked.passed, INFINITE, limit == INFINITE);
         walked.hit = traverse(walked.ray, left, false, overflow);
         let met = walked.hit.primitive != NONE;
-        if (!add_stretch(way, *around, walked.passed, select(limit, walked.passed + walked.hit.distance, met))) {
+        let ends = select(limit, walked.passed + walked.hit.distance, met);
+        if (!add_stretch(way, *around, begins, ends)) {
             *overflow = true;
         }
+        begins = ends;
 #if OPACITY
         if (!met || *overflow || ((boundaries[walked.hit.primitive] & NULL_BOUNDARY) == 0u && !lets_pass(walked.ray, walked.hit))) {
             return walked;
@@ -101,9 +111,13 @@ fn walk(ray: Ray, limit: f32, around: ptr<function, vec2<u32>>, way: ptr<functio
         if (number != 0u && !cross_boundary(around, number, entering)) {
             *overflow = true;
         }
-        walked.ray.origin = offset_origin(surface.position, select(surface.normal, -surface.normal, entering));
-        // To where the rest starts, a little beyond the boundary: what is left must not lead past its end.
-        walked.passed = dot(walked.ray.origin - ray.origin, ray.direction) / dot(ray.direction, ray.direction);
+        // On the same line, where that is as far beyond the boundary as paths start off surfaces: a parallel one would be of another
+        // length. Along a boundary not for ever.
+        let beyond = select(surface.normal, -surface.normal, entering);
+        let depth = dot(offset_origin(surface.position, beyond) - walked.ray.origin, beyond);
+        let speed = max(dot(ray.direction, beyond), 1.0e-3 * length(ray.direction));
+        walked.passed += max(depth / speed, walked.hit.distance);
+        walked.ray.origin = ray.origin + walked.passed * ray.direction;
     }
     *overflow = true;
     return walked;
@@ -126,13 +140,17 @@ fn append_way(list: ptr<function, RecordList>, way: ptr<function, Way>, ray: Ray
         let metres = (to - start) * speed;
 #if GRIDS
         if ((volumes[first] & VOLUME_GRID) != 0u) {
-            let glows = mode == 0u && (volumes[first] & VOLUME_EMITS) != 0u;
-            append(list, OP_MARCH | mode, volume, select(0.0, scale, glows), metres);
-            append_raw(list, vec4<f32>(to_voxels(first, ray.origin + start * ray.direction), 0.0));
-            append_raw(list, vec4<f32>(to_voxels(first, ray.origin + to * ray.direction), 0.0));
-            if (glows) {
-                (*list).used = (*list).count;
+            let from_voxels = to_voxels(first, ray.origin + start * ray.direction);
+            let end_voxels = to_voxels(first, ray.origin + to * ray.direction);
+            if (mode != 0u || (volumes[first] & VOLUME_EMITS) == 0u) {
+                var amounts = amounts_along(first, from_voxels, end_voxels, metres);
+                append_amounts(list, first, &amounts, mode);
+                continue;
             }
+            append(list, OP_MARCH, volume, scale, metres);
+            append_raw(list, vec4<f32>(from_voxels, 0.0));
+            append_raw(list, vec4<f32>(end_voxels, 0.0));
+            (*list).used = (*list).count;
             continue;
         }
 #endif

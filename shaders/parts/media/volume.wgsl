@@ -1,11 +1,13 @@
 // Media in their places, as `device::parts::media` lays them out: metres per device unit; the volumes around the camera (two words); where a
-// boundary cuts its lens or window, the word of a place there, whose volumes they are, else 0; then VOLUME_WORDS words each, then lists
-// of absorbers.
-//      0 bits            1 absorption        2 source, or NONE   (spectra, without grids)
-//      3, 4 first voxel of temperature, density, or NONE         5, 6 their values where constant
-//      7 … 9 voxels along x, y, z       10 … 21 device units to voxels, rows and offset       22 first word of its absorbers
-//      23 index of refraction there (spectrum), or NONE
-// Absorbers: how many; then of each strength, number of columns, and of each column temperature and spectrum.
+// boundary cuts its lens or window, the word of a place there, whose volumes they are, else 0; the first word of tables of phase
+// functions; then VOLUME_WORDS words each, then lists, then voxels.
+//      0 bits            1 extinction        2 source, or NONE   (spectra, without voxels)
+//      3 first voxel of temperature, or NONE      4 its value where constant      5 index of refraction there (spectrum), or NONE
+//      6 first word of its kinds of matter        7 … 9 voxels along x, y, z      10 … 21 device units to voxels, rows and offset
+//      22 first word of what techniques make of it (parts/scattering)             23 number of amounts that tell its transmittance
+// Kinds of matter, with voxels: how many; then of each first voxel of density, or NONE, its value where constant, scattering (spectrum)
+// or NONE, number of absorbers; and of these strength, number of columns, and of each column temperature and spectrum. Amounts are in
+// that order: of a kind's columns, then of its scattering.
 
 @group(0) @binding(61) var<storage, read> volumes: array<u32>;
 #constants VOLUMES

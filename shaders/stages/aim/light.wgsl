@@ -13,6 +13,11 @@ fn aim_at_light(path: u32, site: Site, v: Vertex, choice: f32, u: vec2<f32>) -> 
     }
     aim.direction = normalize(to_local(v, aim.towards));
     aim.shadow.origin = offset_origin(site.surface.position, select(-site.face, site.face, side > 0.0));
+#if SCATTERS
+    if (site.in_matter) {
+        aim.shadow.origin = site.surface.position;
+    }
+#endif
     aim.shadow.direction = select(aim.end - aim.shadow.origin, aim.towards, aim.limit == INFINITE);
     return aim;
 }

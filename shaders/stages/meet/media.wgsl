@@ -1,5 +1,19 @@
 // Meeting the next surface, and light, through media: every way is noted as records.
 
+#if SCATTERS
+// The way to what was met last, on which the path may be scattered.
+var<private> followed: Way;
+
+fn way_scatters() -> bool {
+    for (var n = 0u; n < followed.count; n += 1u) {
+        if ((volumes[volume_at(followed.volume[n])] & VOLUME_SCATTERS) != 0u) {
+            return true;
+        }
+    }
+    return false;
+}
+#endif
+
 fn meet(path: ptr<function, Path>, list: ptr<function, RecordList>, overflow: ptr<function, bool>) -> Meeting {
     let ray = (*path).ray;
     var nested = (*path).nested;
@@ -13,6 +27,12 @@ fn meet(path: ptr<function, Path>, list: ptr<function, RecordList>, overflow: pt
 #endif
     let walked = walk(ray, INFINITE, &nested, &way, overflow);
     (*path).nested = nested;
+#if SCATTERS
+    followed = way;
+    if (step.bounce < frame.max_bounces && way_scatters()) {
+        append(list, OP_SAVE, 0u, 0.0, 0.0);
+    }
+#endif
     append_way(list, &way, ray, walked.hit.primitive == NONE, 0u, (*path).scale);
     return Meeting(walked.hit, walked.ray, walked.passed + walked.hit.distance);
 }
@@ -26,7 +46,11 @@ fn reaches(aim: Aim, nested: vec2<u32>, site: Site, through: ptr<function, Light
     var way: Way;
     way.count = 0u;
     var around = nested;
+#if SCATTERS
+    let inner = select(boundaries[select(site.hit.primitive, 0u, site.in_matter)] & 0xffu, 0u, site.in_matter);
+#else
     let inner = boundaries[site.hit.primitive] & 0xffu;
+#endif
     if (aim.direction.z < 0.0 && inner != 0u && !cross_boundary(&around, inner, site.from_front)) {
         *overflow = true;
     }
@@ -46,6 +70,11 @@ fn append_light_way(list: ptr<function, RecordList>, through: ptr<function, Ligh
 
 // Enters or leaves the body behind a surface, where the path goes on through it.
 fn pass_surface(path: ptr<function, Path>, site: Site, direction: vec3<f32>, overflow: ptr<function, bool>) {
+#if SCATTERS
+    if (site.in_matter) {
+        return;
+    }
+#endif
     let behind = boundaries[site.hit.primitive] & 0xffu;
     var nested = (*path).nested;
     if (direction.z < 0.0 && behind != 0u && !cross_boundary(&nested, behind, site.from_front)) {

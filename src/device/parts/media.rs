@@ -2,13 +2,16 @@
 
 use glam::{DAffine3, DVec3};
 
-use crate::device::accel::Accel;
+use crate::device::accel::{Accel, bounds};
 use crate::device::part::{Part, Place, Records, SceneBuffer};
+use crate::device::parts::crossings::{meet, place_on};
 use crate::device::parts::origins::{Cut, Origins};
 use crate::device::parts::surfaces::{Needed, wavelength};
 use crate::device::text::{Module, module};
-use crate::device::words::{NONE, NULL_BOUNDARY, Primitive, VOLUME_EMITS, VOLUME_GRID, VOLUME_WORDS, VOLUMES_HEAD};
-use crate::scene::{Bsdf, Field, Interior, MaterialId, Medium, Scene, SpectrumId};
+use crate::device::words::{
+    NONE, NULL_BOUNDARY, Primitive, VOLUME_EMITS, VOLUME_GRID, VOLUME_SCATTERS, VOLUME_WORDS, VOLUMES_HEAD,
+};
+use crate::scene::{Bsdf, Component, Field, Interior, MaterialId, Medium, MediumId, Scene, SpectrumId};
 use crate::spectral::{Curve, planck};
 use crate::{Error, Result};
 
@@ -43,7 +46,7 @@ pub const MEDIA: Part = Part {
     buffers: |scene| {
         let buffers = scene.prepared.media.as_ref().map(|media| {
             [
-                SceneBuffer::new("volumes", &media.volumes, CONTENT, "smaller grids"),
+                SceneBuffer::new("volumes", &media.volumes, "the media of the scene", "smaller grids"),
                 SceneBuffer::new("boundaries", &media.boundaries, "the geometry of the scene", "fewer triangles"),
             ]
         });
@@ -54,12 +57,12 @@ pub const MEDIA: Part = Part {
         let way = scene.media.as_ref().map_or(0, Media::way_records);
         Records { way, vertex: way + 2, path: 0 }
     },
-    state_words: 2,
+    state_words: |_| 2,
     example: Some(|exhibit| exhibit.add_gas()),
 };
 
-const VOLUME: Module = module!("parts/media/volume.wgsl");
-const CONTENT: &str = "the media of the scene";
+pub const VOLUME: Module = module!("parts/media/volume.wgsl");
+const CELLS: Module = module!("parts/media/cells.wgsl");
 
 /// In the place of media, in general scenes.
 pub const VACUUM: Part = Part {
@@ -82,15 +85,19 @@ pub const CAMERA_CUT: Part = Part {
 pub const VOXELS: Part = Part {
     name: "media of voxels",
     used: |scene| scene.media.as_ref().is_some_and(Media::has_grids),
-    effect: |_| "a march through its cells for each stretch and channel".into(),
-    is_planned: true,
-    modules: &[(Place::Evaluate, VOLUME)],
-    defines: |scene, _, defines| {
-        defines.set("GRIDS", true).set("MOST_COLUMNS", scene.media.as_ref().map_or(0, |media| media.most_columns));
+    effect: |_| {
+        "what lies on a way is summed up once; a march through its cells for each channel where it emits".into()
     },
-    buffers: |scene| {
-        let voxels = scene.prepared.media.as_ref().map(|media| &media.voxels);
-        voxels.map(|voxels| SceneBuffer::new("voxels", voxels, CONTENT, "smaller grids")).into_iter().collect()
+    is_planned: true,
+    modules: &[
+        (Place::Generate, CELLS),
+        (Place::Generate, module!("parts/media/amounts.wgsl")),
+        (Place::Evaluate, VOLUME),
+        (Place::Evaluate, CELLS),
+    ],
+    defines: |scene, _, defines| {
+        let Some(media) = &scene.media else { return };
+        defines.set("GRIDS", true).set("MOST_COLUMNS", media.most_columns).constant("MOST_TERMS", media.most_terms);
     },
     example: Some(|exhibit| exhibit.add_voxels()),
     ..Part::NOTHING
@@ -112,7 +119,6 @@ pub const PLANCK: Part = Part {
 /// Everything about media that a device needs. Spectra are positions in `spectra` until [`Media::name_spectra`].
 pub struct Media {
     pub volumes: Vec<u32>,
-    pub voxels: Vec<f32>,
     /// One for each primitive.
     pub boundaries: Vec<u32>,
     pub spectra: Vec<Needed>,
@@ -122,17 +128,36 @@ pub struct Media {
     pub camera_is_cut: bool,
     pub most_absorbers: u32,
     pub most_columns: u32,
-    /// Stretches of one way, and voxels that it may go through.
+    /// Spectra of a volume of voxels whose amounts on a way tell its transmittance.
+    pub most_terms: u32,
+    /// Stretches of one way, voxels that it may go through, and those among them that evaluation marches through.
     pub stretches: u32,
     pub cells: u32,
+    pub marched: u32,
+    /// The volumes that fill it, in order.
+    pub places: Vec<Filled>,
     /// Position of the wavelength among `spectra`, where there are grids.
     pub wavelength: Option<u32>,
     /// Words of `volumes` that are positions in `spectra`.
     spectrum_words: Vec<usize>,
+    /// Voxels that are to stand at the end of `volumes`, and words there that count from the first of them.
+    voxels: Vec<f32>,
+    voxel_words: Vec<usize>,
+}
+
+/// A volume, as far as light that it scatters needs to know.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Filled {
+    pub medium: MediumId,
+    /// Of each kind of matter: where its voxels begin, or [`NONE`], and the value without them.
+    pub densities: Vec<[u32; 2]>,
+    /// Metres from end to end.
+    pub extent: f64,
 }
 
 /// A medium in a place: of one body, or of all space.
 struct Volume<'a> {
+    id: MediumId,
     medium: &'a Medium,
     interior: Option<Interior>,
     /// The index of refraction behind its surface over that before, where that is a dielectric; then the index there, of all
@@ -153,7 +178,12 @@ impl Media {
             let known = volumes.iter().position(|v| v.interior.is_some_and(|i| i.body == interior.body));
             let index = known.unwrap_or_else(|| {
                 let index = object.material.and_then(|material| index(scene, material));
-                volumes.push(Volume { medium: &scene.media[interior.medium], interior: Some(interior), index });
+                volumes.push(Volume {
+                    id: interior.medium,
+                    medium: &scene.media[interior.medium],
+                    interior: Some(interior),
+                    index,
+                });
                 volumes.len() - 1
             });
             *number = index as u32 + 1;
@@ -161,7 +191,7 @@ impl Media {
         let mut outer = NONE;
         if let Some(medium) = scene.camera_medium {
             outer = volumes.len() as u32;
-            volumes.push(Volume { medium: &scene.media[medium], interior: None, index: None });
+            volumes.push(Volume { id: medium, medium: &scene.media[medium], interior: None, index: None });
         }
         if volumes.len() > MOST_VOLUMES {
             let message = format!("{} interiors with media, at most {MOST_VOLUMES} are supported", volumes.len());
@@ -173,17 +203,21 @@ impl Media {
         };
         let mut media = Media {
             volumes: vec![0; HEAD],
-            voxels: Vec::new(),
             boundaries: accel.objects.iter().map(boundary).collect(),
             spectra: Vec::new(),
             outer,
             camera_is_cut: false,
             most_absorbers: 0,
             most_columns: 0,
+            most_terms: 1,
             stretches: (2 * volumes.len() as u32 + 1).clamp(4, MOST_STRETCHES),
             cells: 0,
+            marched: 0,
+            places: Vec::new(),
             wavelength: None,
             spectrum_words: Vec::new(),
+            voxels: Vec::new(),
+            voxel_words: Vec::new(),
         };
         media.volumes.resize(HEAD + WORDS * volumes.len(), 0);
         media.volumes[0] = (1.0 / accel.space.scale as f32).to_bits();
@@ -192,7 +226,8 @@ impl Media {
             .collect();
         for (index, (volume, within)) in volumes.iter_mut().zip(within).enumerate() {
             volume.index = within;
-            media.fill(scene, accel, index, volume);
+            let densities = media.fill(scene, accel, index, volume);
+            media.places.push(Filled { medium: volume.id, densities, extent: extent(scene, accel, volume) });
         }
         media.place_camera(scene, accel)?;
         Ok(Some(media))
@@ -202,9 +237,19 @@ impl Media {
         self.wavelength.is_some()
     }
 
-    /// Records of one way: a stretch takes three where it has a grid.
+    /// Records of one way: of a stretch through voxels three where they emit, and one for each pair of amounts.
     pub fn way_records(&self) -> u32 {
-        self.stretches * if self.has_grids() { 3 } else { 1 }
+        let marched = if self.marched > 0 { 3 } else { 1 };
+        self.stretches * self.most_terms.div_ceil(2).max(marched)
+    }
+
+    /// Puts voxels behind everything else in `volumes`, which is whole then.
+    pub fn finish(&mut self) {
+        let first = self.volumes.len() as u32;
+        for word in std::mem::take(&mut self.voxel_words) {
+            self.volumes[word] += first;
+        }
+        self.volumes.extend(std::mem::take(&mut self.voxels).into_iter().map(f32::to_bits));
     }
 
     /// Moves its spectra to the end of `all`; positions are then those there.
@@ -222,43 +267,70 @@ impl Media {
         self.wavelength = self.wavelength.map(|position| id(position as usize));
     }
 
-    fn fill(&mut self, scene: &Scene, accel: &Accel, index: usize, volume: &Volume) {
+    /// Gives the densities of its kinds of matter.
+    fn fill(&mut self, scene: &Scene, accel: &Accel, index: usize, volume: &Volume) -> Vec<[u32; 2]> {
         let first = HEAD + WORDS * index;
         let medium = volume.medium;
-        let constant = |field: &Field| match field {
-            Field::Constant(value) => Some(*value),
-            Field::Grid(_) => None,
-        };
         let mut words = [0u32; WORDS];
-        words[2] = NONE;
+        (words[2], words[3], words[5]) = (NONE, NONE, NONE);
         words[0] = if medium.temperature.is_some() { VOLUME_EMITS } else { 0 };
-        let Some(size) = medium.grid_size() else {
-            let kelvin = medium.temperature.as_ref().and_then(constant);
-            let density = constant(&medium.density).unwrap_or(1.0);
-            let (curves, factors) = terms(medium, kelvin, density);
-            let tables: Vec<&Curve> = curves.iter().map(|&s| &scene.spectra[s].curve).collect();
-            let sum = |v: &[f64]| v.iter().zip(&factors).map(|(v, f)| v * f).sum::<f64>();
-            let absorption = Curve::derived(&tables, &scene.channels, sum);
-            words[1] = self.spectrum(first + 1, format!("medium \"{}\"", medium.name), absorption, true);
-            if let Some(kelvin) = kelvin.filter(|kelvin| *kelvin > 0.0) {
-                let source = source(scene, kelvin, volume.index.as_ref());
-                words[2] = self.spectrum(first + 2, format!("black body at {kelvin} K"), source, false);
+        words[0] |= if medium.scatters() { VOLUME_SCATTERS } else { 0 };
+        words[23] = 1;
+        let densities: Vec<[u32; 2]> = match medium.grid_size() {
+            None => {
+                self.fill_evenly(scene, first, volume, &mut words);
+                medium.components.iter().map(|component| self.field(Some(&component.density))).collect()
             }
-            self.volumes[first..first + WORDS].copy_from_slice(&words);
-            return;
+            Some(size) => self.fill_voxels(scene, accel, first, volume, size, &mut words),
         };
+        self.volumes[first..first + WORDS].copy_from_slice(&words);
+        densities
+    }
+
+    /// Of a medium that is the same everywhere: what it takes of a way, and what it emits for that.
+    fn fill_evenly(&mut self, scene: &Scene, first: usize, volume: &Volume, words: &mut [u32; WORDS]) {
+        let medium = volume.medium;
+        let kelvin = medium.temperature.as_ref().map(|field| field.at(0));
+        let (absorbing, factors) = absorption(medium, kelvin, |component| component.density.at(0));
+        let (scattering, strengths) = scattering(medium, |component| component.density.at(0));
+        let curves: Vec<&Curve> =
+            absorbing.iter().chain(&scattering).map(|&spectrum| &scene.spectra[spectrum].curve).collect();
+        let count = absorbing.len();
+        let sum = |v: &[f64], by: &[f64]| v.iter().zip(by).map(|(v, f)| v * f).sum::<f64>();
+        let lost = |v: &[f64]| sum(v, &factors) + sum(&v[count..], &strengths);
+        let extinction = Curve::derived(&curves, &scene.channels, lost);
+        words[1] = self.spectrum(first + 1, format!("medium \"{}\"", medium.name), extinction, true);
+        let Some(kelvin) = kelvin.filter(|kelvin| *kelvin > 0.0) else { return };
+        let mut source = source(scene, kelvin, volume.index.as_ref());
+        if !scattering.is_empty() {
+            // What is emitted is absorption times Planck's law, while a way loses what is scattered too.
+            let all: Vec<&Curve> = curves.into_iter().chain([&source]).collect();
+            let share = |_: f64, v: &[f64]| {
+                let (absorbed, lost) = (sum(v, &factors), lost(&v[..v.len() - 1]));
+                if lost > 0.0 { v[v.len() - 1] * absorbed / lost } else { 0.0 }
+            };
+            source = Curve::derived_by_stretch(&all, &scene.channels, share);
+        }
+        let name = format!("\"{}\" at {kelvin} K", medium.name);
+        words[2] = self.spectrum(first + 2, name, source, false);
+    }
+
+    fn fill_voxels(
+        &mut self,
+        scene: &Scene,
+        accel: &Accel,
+        first: usize,
+        volume: &Volume,
+        size: [u32; 3],
+        words: &mut [u32; WORDS],
+    ) -> Vec<[u32; 2]> {
+        let medium = volume.medium;
         words[0] |= VOLUME_GRID;
-        let mut grid = |field: Option<&Field>| match field {
-            Some(Field::Grid(grid)) => {
-                self.voxels.extend_from_slice(&grid.values);
-                ((self.voxels.len() - grid.values.len()) as u32, 0.0)
-            }
-            Some(Field::Constant(value)) => (NONE, *value),
-            None => (NONE, 0.0),
-        };
-        let (temperature, density) = (grid(medium.temperature.as_ref()), grid(Some(&medium.density)));
-        (words[3], words[5]) = (temperature.0, (temperature.1 as f32).to_bits());
-        (words[4], words[6]) = (density.0, (density.1 as f32).to_bits());
+        [words[3], words[4]] = self.field(medium.temperature.as_ref());
+        self.note_voxels(first + 3, words[3]);
+        if let Some(index) = &volume.index {
+            words[5] = self.spectrum(first + 5, format!("index in \"{}\"", medium.name), index.clone(), false);
+        }
         words[7..10].copy_from_slice(&size);
         let interior = volume.interior.expect("grids fill interiors");
         let from_device = DAffine3::from_translation(accel.space.center)
@@ -269,41 +341,99 @@ impl Media {
             let bits = value.as_vec3().to_array().map(f32::to_bits);
             words[10 + 3 * i..13 + 3 * i].copy_from_slice(&bits);
         }
-        words[23] = NONE;
-        if let Some(index) = &volume.index {
-            words[23] = self.spectrum(first + 23, format!("index in \"{}\"", medium.name), index.clone(), false);
+        words[6] = self.volumes.len() as u32;
+        let densities: Vec<[u32; 2]> =
+            medium.components.iter().map(|component| self.field(Some(&component.density))).collect();
+        words[23] = self.components(scene, medium, &densities);
+        self.most_terms = self.most_terms.max(words[23]);
+        let cells = size.iter().sum::<u32>() + 3;
+        self.cells += cells;
+        if medium.temperature.is_some() {
+            self.marched += cells;
         }
-        words[22] = self.volumes.len() as u32;
-        self.volumes[first..first + WORDS].copy_from_slice(&words);
-        self.volumes.push(medium.absorbers.len() as u32);
-        for absorber in &medium.absorbers {
-            self.volumes.extend([(absorber.strength as f32).to_bits(), absorber.columns.len() as u32]);
-            for &(kelvin, spectrum) in &absorber.columns {
-                self.volumes.push((kelvin as f32).to_bits());
-                let word = self.volumes.len();
-                let curve = scene.spectra[spectrum].curve.clone();
-                let position = self.spectrum(word, scene.spectra[spectrum].name.clone(), curve, true);
-                self.volumes.push(position);
-            }
-            self.most_columns = self.most_columns.max(absorber.columns.len() as u32);
-        }
-        self.most_absorbers = self.most_absorbers.max(medium.absorbers.len() as u32);
-        self.cells += size.iter().sum::<u32>() + 3;
         if self.wavelength.is_none() {
             self.wavelength = Some(self.spectra.len() as u32);
             self.spectra.push(wavelength(scene));
         }
+        densities
     }
 
-    /// Notes a spectrum for word `word` and gives its position. `pointwise`: wherever it is small it is as exact as elsewhere.
-    fn spectrum(&mut self, word: usize, name: String, curve: Curve, pointwise: bool) -> u32 {
-        self.spectrum_words.push(word);
-        let needed = if pointwise { Needed::Pointwise(name, curve) } else { Needed::Derived(name, curve) };
+    /// Lists the kinds of matter of a medium of voxels, and gives their number of terms.
+    fn components(&mut self, scene: &Scene, medium: &Medium, densities: &[[u32; 2]]) -> u32 {
+        self.volumes.push(medium.components.len() as u32);
+        let (mut terms, mut absorbers) = (0, 0);
+        for (component, density) in medium.components.iter().zip(densities) {
+            self.note_voxels(self.volumes.len(), density[0]);
+            self.volumes.extend(density);
+            self.volumes.push(NONE);
+            if let Some(scattering) = &component.scattering {
+                let word = self.volumes.len() - 1;
+                self.volumes[word] = self.scene_spectrum(scene, word, scattering.coefficient);
+                terms += 1;
+            }
+            self.volumes.push(component.absorbers.len() as u32);
+            for absorber in &component.absorbers {
+                self.volumes.extend([(absorber.strength as f32).to_bits(), absorber.columns.len() as u32]);
+                for &(kelvin, spectrum) in &absorber.columns {
+                    self.volumes.push((kelvin as f32).to_bits());
+                    let position = self.scene_spectrum(scene, self.volumes.len(), spectrum);
+                    self.volumes.push(position);
+                }
+                self.most_columns = self.most_columns.max(absorber.columns.len() as u32);
+                terms += absorber.columns.len() as u32;
+            }
+            absorbers += 1 + component.absorbers.len() as u32;
+        }
+        self.most_absorbers = self.most_absorbers.max(absorbers);
+        terms
+    }
+
+    /// Notes that word `word`, where it is not [`NONE`], counts voxels.
+    fn note_voxels(&mut self, word: usize, value: u32) {
+        if value != NONE {
+            self.voxel_words.push(word);
+        }
+    }
+
+    /// Where the voxels of a field begin among all, or [`NONE`]; and its value without them.
+    fn field(&mut self, field: Option<&Field>) -> [u32; 2] {
+        match field {
+            Some(Field::Grid(grid)) => {
+                self.voxels.extend_from_slice(&grid.values);
+                [(self.voxels.len() - grid.values.len()) as u32, 0]
+            }
+            Some(Field::Constant(value)) => [NONE, (*value as f32).to_bits()],
+            None => [NONE, 0],
+        }
+    }
+
+    fn scene_spectrum(&mut self, scene: &Scene, word: usize, spectrum: SpectrumId) -> u32 {
+        let (name, curve) = (scene.spectra[spectrum].name.clone(), scene.spectra[spectrum].curve.clone());
+        self.spectrum(word, name, curve, true)
+    }
+
+    /// What a spectrum is on the device, by its position.
+    pub fn need(&mut self, needed: Needed) -> u32 {
         let known = self.spectra.iter().position(|s| *s == needed);
         known.unwrap_or_else(|| {
             self.spectra.push(needed);
             self.spectra.len() - 1
         }) as u32
+    }
+
+    /// Appends words; `spectra`: those of them that are positions among spectra, `voxels`: those that count voxels or are [`NONE`].
+    pub fn append(&mut self, words: &[u32], spectra: &[usize], voxels: &[usize]) -> u32 {
+        let first = self.volumes.len();
+        self.volumes.extend_from_slice(words);
+        self.spectrum_words.extend(spectra.iter().map(|word| first + word));
+        voxels.iter().for_each(|&word| self.note_voxels(first + word, words[word]));
+        first as u32
+    }
+
+    /// Notes a spectrum for word `word` and gives its position. `pointwise`: wherever it is small it is as exact as elsewhere.
+    fn spectrum(&mut self, word: usize, name: String, curve: Curve, pointwise: bool) -> u32 {
+        self.spectrum_words.push(word);
+        self.need(if pointwise { Needed::Pointwise(name, curve) } else { Needed::Derived(name, curve) })
     }
 
     /// Notes the volumes around the camera, the innermost in the low byte; where boundaries cut its lens or window, those around a
@@ -391,17 +521,6 @@ fn product_of_indices(scene: &Scene, volumes: &[Volume], around: &[u32]) -> Opti
     }
 }
 
-/// A point on a primitive.
-fn place_on(p: &Primitive) -> DVec3 {
-    let [a, b, c] = [p.a, p.b, p.c].map(|v| DVec3::from(v.map(f64::from)));
-    match p.tag >> 24 {
-        1 => a + b.x * DVec3::Z,
-        2 => a,
-        3 => 0.5 * (a + b) + c.x * (b - a).any_orthogonal_vector().normalize(),
-        _ => (a + b + c) / 3.0,
-    }
-}
-
 /// n² B(λ, T).
 fn source(scene: &Scene, kelvin: f64, index: Option<&Curve>) -> Curve {
     let Some(index) = index else { return Curve::Blackbody { kelvin, scale: 1.0 } };
@@ -411,10 +530,25 @@ fn source(scene: &Scene, kelvin: f64, index: Option<&Curve>) -> Curve {
     Curve::derived_by_stretch(&[index], &scene.channels, |nm, v| planck::radiance(nm, kelvin) * v[0] * v[0])
 }
 
-/// Spectra and factors whose sum is the absorption of a homogeneous medium, m⁻¹.
-pub fn terms(medium: &Medium, kelvin: Option<f64>, density: f64) -> (Vec<SpectrumId>, Vec<f64>) {
+/// How far a volume reaches, in metres: of all space, as far as the scene.
+fn extent(scene: &Scene, accel: &Accel, volume: &Volume) -> f64 {
+    let Some(interior) = volume.interior else { return 2.0 * accel.space.radius / accel.space.scale };
+    let of_body = scene.objects.iter().filter(|o| o.interior.is_some_and(|i| i.body == interior.body));
+    bounds(of_body.map(|object| &object.shape)).map_or(0.0, |[low, high]| (high - low).length())
+}
+
+/// Spectra and factors whose sum is the absorption of a medium, m⁻¹, at a temperature and the density of each kind of matter.
+pub fn absorption(
+    medium: &Medium,
+    kelvin: Option<f64>,
+    mut density: impl FnMut(&Component) -> f64,
+) -> (Vec<SpectrumId>, Vec<f64>) {
     let mut all = Vec::new();
-    for absorber in &medium.absorbers {
+    let absorbers = medium.components.iter().flat_map(|component| {
+        let density = density(component);
+        component.absorbers.iter().map(move |absorber| (absorber, density))
+    });
+    for (absorber, density) in absorbers {
         let (columns, strength) = (&absorber.columns, absorber.strength * density);
         let above = kelvin.map_or(0, |kelvin| columns.partition_point(|column| column.0 < kelvin));
         let high = above.min(columns.len() - 1);
@@ -430,56 +564,8 @@ pub fn terms(medium: &Medium, kelvin: Option<f64>, density: f64) -> (Vec<Spectru
     all.into_iter().unzip()
 }
 
-/// Tells `crossing` where a ray meets a primitive, and whether it leaves what is behind it.
-fn meet(p: &Primitive, origin: DVec3, direction: DVec3, crossing: &mut impl FnMut(f64, bool)) {
-    let [a, b, c] = [p.a, p.b, p.c].map(|v| DVec3::from(v.map(f64::from)));
-    let mut found = |t: f64, normal: DVec3| {
-        if t > 0.0 {
-            crossing(t, normal.dot(direction) > 0.0);
-        }
-    };
-    let f = origin - a;
-    match p.tag >> 24 {
-        1 => {
-            let (half, rest) = (f.dot(direction), f.length_squared() - b.x * b.x);
-            let square = half * half - rest;
-            if square > 0.0 {
-                for t in [-half - square.sqrt(), -half + square.sqrt()] {
-                    found(t, f + t * direction);
-                }
-            }
-        }
-        2 => {
-            let t = -f.dot(b) / direction.dot(b);
-            if (f + t * direction).length() <= c.x {
-                found(t, b);
-            }
-        }
-        3 => {
-            let axis = (b - a).normalize();
-            let across = |v: DVec3| v - v.dot(axis) * axis;
-            let (g, d) = (across(f), across(direction));
-            let (half, dd) = (g.dot(d), d.length_squared());
-            let square = half * half - dd * (g.length_squared() - c.x * c.x);
-            if square > 0.0 && dd > 0.0 {
-                for t in [(-half - square.sqrt()) / dd, (-half + square.sqrt()) / dd] {
-                    if (0.0..=(b - a).length()).contains(&(f + t * direction).dot(axis)) {
-                        found(t, g + t * d);
-                    }
-                }
-            }
-        }
-        _ => {
-            // Möller and Trumbore 1997.
-            let (e1, e2) = (b - a, c - a);
-            let h = direction.cross(e2);
-            let determinant = e1.dot(h);
-            let u = f.dot(h) / determinant;
-            let q = f.cross(e1);
-            let v = direction.dot(q) / determinant;
-            if determinant != 0.0 && u >= 0.0 && v >= 0.0 && u + v <= 1.0 {
-                found(e2.dot(q) / determinant, e1.cross(e2));
-            }
-        }
-    }
+/// The same of its scattering.
+pub fn scattering(medium: &Medium, density: impl Fn(&Component) -> f64) -> (Vec<SpectrumId>, Vec<f64>) {
+    let of = |component: &Component| Some((component.scattering.as_ref()?.coefficient, density(component)));
+    medium.components.iter().filter_map(of).unzip()
 }

@@ -3,6 +3,7 @@
 
 pub mod attributes;
 pub mod camera;
+pub mod crossings;
 pub mod geometry;
 pub mod heat;
 pub mod lights;
@@ -11,6 +12,7 @@ pub mod opacity;
 pub mod origins;
 pub mod paths;
 pub mod radiators;
+pub mod scattering;
 pub mod sky;
 pub mod spectra;
 pub mod surfaces;

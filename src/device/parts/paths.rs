@@ -11,7 +11,7 @@ pub const ROULETTE: Part = Part {
     is_planned: true,
     modules: &[(Place::Stage, module!("stages/go_on/roulette.wgsl"))],
     lines: &[("GO_ON", "choice.goes_on = choice.goes_on && survives(&path, u_choice.y, site.material.survival);")],
-    defines: |_, _, defines| _ = defines.set("ROULETTE", true),
+    defines: |_, _, defines| _ = defines.set("ROULETTE", true).set("SCALED", true),
     ..Part::NOTHING
 };
 

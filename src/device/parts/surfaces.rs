@@ -195,7 +195,7 @@ pub const DISPERSION: Part = Part {
         defines.set("DISPERSION", true).set("OP_ONLY", true);
         defines.set("OP_ROUGH_TRANSMIT", spread).set("RAW_RECORDS", spread);
     },
-    state_words: 1,
+    state_words: |_| 1,
     example: Some(|exhibit| exhibit.add_glass()),
     ..Part::NOTHING
 };

@@ -69,8 +69,10 @@ fn full() -> Scene {
 
     let grid = Field::Grid(Arc::new(Grid { size: [2, 1, 1], values: vec![280.5, 300.25] }));
     let absorbers = vec![Absorber { strength: 0.04, columns: vec![(200.0, 1), (300.0, 2)] }];
-    let medium =
-        |temperature, density| Medium { name: "air".into(), absorbers: absorbers.clone(), temperature, density };
+    let medium = |temperature, density| {
+        let component = Component { absorbers: absorbers.clone(), scattering: None, density };
+        Medium { name: "air".into(), components: vec![component], temperature }
+    };
     let media = vec![medium(None, Field::Constant(1.25)), medium(Some(Field::Constant(290.0)), grid)];
     let to_map = DMat3::from_rotation_y(0.25);
     let texels = Texels::Rgb { rgb: vec![0.5, 1.5, 2.5].into(), daylight: 1 };
@@ -91,6 +93,7 @@ fn full() -> Scene {
             sampler: Sampler::Sobol,
             wavelengths: Wavelengths::Uniform,
             wavelengths_per_channel: 1,
+            techniques: None,
             evaluation: Evaluation::Auto,
             evaluator: Evaluator::Auto,
             epoch: 64,
@@ -148,6 +151,7 @@ fn digests_are_those_of_earlier_versions() {
                     sampler: Sampler::Independent,
                     wavelengths: Wavelengths::Emission,
                     wavelengths_per_channel: 1,
+                    techniques: None,
                     evaluation: Evaluation::Auto,
                     evaluator: Evaluator::Pt,
                     epoch: 128,

@@ -284,6 +284,8 @@ pub static SECTIONS: &[&Section] = &[
     &SUN,
     &ENVIRONMENT,
     &MEDIUM,
+    &COMPONENT,
+    &PHASE,
     &SPECIES,
     &GRID,
 ];

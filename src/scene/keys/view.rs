@@ -21,7 +21,7 @@ pub static SCENE: Section = Section {
             .tables(&[&OBJECT]),
         Key::optional("lights", ListOfTables, "none", "Light that comes from no surface.").tables(&[&LIGHT]),
         Key::optional("environment", Table, "black", "Light from all around.").tables(&[&ENVIRONMENT]),
-        Key::optional("media", NamedTables, "none", "Gases that absorb and emit.").tables(&[&MEDIUM]),
+        Key::optional("media", NamedTables, "none", "Matter that absorbs, scatters and emits.").tables(&[&MEDIUM]),
     ],
     later: &[],
     at: "",
@@ -446,6 +446,17 @@ pub static INTEGRATOR: Section = Section {
         )
         .range("[1, 16], a power of two"),
         Key::default(
+            "techniques",
+            Whole,
+            "\"auto\"",
+            "By how many channels paths decide where light goes that matter scatters, one of them drawn for each path: the means are \
+             the same, and channels that differ much among one another make less noise with more \
+             ([METHOD.md](METHOD.md#techniques)). `auto`: one more than how often the largest optical depth of all channels halves to \
+             the smallest. With 1 the mean over channels decides.",
+        )
+        .or("`\"auto\"`")
+        .range("[1, 16]"),
+        Key::default(
             "evaluation",
             Choice(&["auto", "all", "roulette"]),
             "\"auto\"",
@@ -480,6 +491,7 @@ russian_roulette_start = 4
 sampler = "independent"
 wavelengths = "uniform"
 wavelengths_per_channel = 4
+techniques = 4
 evaluation = "roulette"
 evaluator = "dpept-spectral"
 epoch = 16

@@ -32,10 +32,15 @@ pub enum Quantity {
     Extinction,
     /// Of a gas: m⁻¹ (and per atmosphere of a species), not negative; zero beyond its table, with a warning.
     Absorption,
+    /// Of matter that scatters: m⁻¹, not negative; held beyond its table, with a warning.
+    Scattering,
+    /// The mean cosine g by which light is turned where it is scattered: dimensionless, in (-1, 1); held beyond its table, with a
+    /// warning.
+    Asymmetry,
 }
 
 impl Quantity {
-    pub const ALL: [Quantity; 9] = [
+    pub const ALL: [Quantity; 11] = [
         Quantity::Reflectance,
         Quantity::Emissivity,
         Quantity::Radiance,
@@ -45,6 +50,8 @@ impl Quantity {
         Quantity::CoatIndex,
         Quantity::Extinction,
         Quantity::Absorption,
+        Quantity::Scattering,
+        Quantity::Asymmetry,
     ];
 
     /// Whether it is light itself rather than what becomes of light.
@@ -52,7 +59,7 @@ impl Quantity {
         matches!(self, Quantity::Radiance | Quantity::Intensity | Quantity::Irradiance)
     }
 
-    /// Whether it is an emissivity, an index of refraction or an absorption, which no temperature and no colour makes.
+    /// Whether it is an emissivity, an index of refraction or something of matter, which no temperature and no colour makes.
     pub fn is_index(self) -> bool {
         self != Quantity::Reflectance && !self.is_light()
     }
@@ -72,12 +79,13 @@ impl Quantity {
             Quantity::Radiance => "W m⁻² sr⁻¹ nm⁻¹",
             Quantity::Intensity => "W sr⁻¹ nm⁻¹",
             Quantity::Irradiance => "W m⁻² nm⁻¹",
-            Quantity::Absorption => "m⁻¹",
+            Quantity::Absorption | Quantity::Scattering => "m⁻¹",
             Quantity::Reflectance
             | Quantity::Emissivity
             | Quantity::Index
             | Quantity::CoatIndex
-            | Quantity::Extinction => "",
+            | Quantity::Extinction
+            | Quantity::Asymmetry => "",
         }
     }
 
@@ -101,6 +109,8 @@ impl Quantity {
             Quantity::CoatIndex => "the index of refraction of a coat",
             Quantity::Extinction => "an extinction coefficient k",
             Quantity::Absorption => "an absorption coefficient",
+            Quantity::Scattering => "a scattering coefficient",
+            Quantity::Asymmetry => "an asymmetry g",
         }
     }
 
@@ -111,7 +121,8 @@ impl Quantity {
             Quantity::Index => value > 0.0 && value <= DENSEST,
             Quantity::CoatIndex => (1.0..=DENSEST).contains(&value),
             Quantity::Extinction => (0.0..=DENSEST).contains(&value),
-            Quantity::Absorption => (0.0..=MOST_ABSORBING).contains(&value),
+            Quantity::Absorption | Quantity::Scattering => (0.0..=MOST_ABSORBING).contains(&value),
+            Quantity::Asymmetry => value > -1.0 && value < 1.0,
         }
     }
 
@@ -120,7 +131,7 @@ impl Quantity {
         match self {
             Quantity::Reflectance | Quantity::Emissivity => Some(Range::Share),
             Quantity::Extinction => Some(Range::Extinction),
-            Quantity::Index | Quantity::CoatIndex => None,
+            Quantity::Index | Quantity::CoatIndex | Quantity::Asymmetry => None,
             _ => Some(Range::NotNegative),
         }
     }
@@ -131,7 +142,7 @@ impl Quantity {
             Quantity::Radiance => Kind::Radiance,
             Quantity::Intensity => Kind::Intensity,
             Quantity::Irradiance => Kind::Irradiance,
-            Quantity::Absorption => Kind::Absorption,
+            Quantity::Absorption | Quantity::Scattering => Kind::Absorption,
             _ => Kind::Number,
         }
     }
@@ -144,7 +155,8 @@ impl Quantity {
             Quantity::Index => "(0, 1000]",
             Quantity::CoatIndex => "[1, 1000]",
             Quantity::Extinction => "[0, 1000]",
-            Quantity::Absorption => "[0, 1e15]",
+            Quantity::Absorption | Quantity::Scattering => "[0, 1e15]",
+            Quantity::Asymmetry => "(-1, 1)",
         }
     }
 

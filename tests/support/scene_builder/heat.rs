@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DVec2, DVec3};
 use spectile::scene::{
-    Absorber, Camera, Field, Filter, Grid, Interior, Medium, Mesh, Object, Projection, Scene, Shape, Sides, Temperature,
+    Absorber, Camera, Component, Field, Filter, Grid, Interior, Medium, Mesh, Object, Phase, Projection, Scattering,
+    Scene, Shape, Sides, Temperature,
 };
 use spectile::spectral::{Channels, Curve, Outside, planck as law};
 
@@ -29,7 +30,31 @@ impl Builder {
         let spectrum = self.spectrum(absorption);
         let absorbers = vec![Absorber { strength: 1.0, columns: vec![(0.0, spectrum)] }];
         let name = format!("medium {}", self.0.media.len());
-        self.0.media.push(Medium { name, absorbers, temperature, density });
+        let components = vec![Component { absorbers, scattering: None, density }];
+        self.0.media.push(Medium { name, components, temperature });
+        self
+    }
+
+    /// The last kind of matter of the last medium scatters, m⁻¹ at density 1.
+    pub fn scattering(mut self, coefficient: impl IntoCurve, phase: Phase) -> Self {
+        let coefficient = self.spectrum(coefficient);
+        let medium = self.0.media.last_mut().expect("a medium");
+        let component = medium.components.last_mut().expect("a kind of matter");
+        component.scattering = Some(Scattering { coefficient, phase });
+        self
+    }
+
+    /// Henyey and Greenstein's phase function for [`Builder::scattering`].
+    pub fn henyey_greenstein(&mut self, g: impl IntoCurve) -> Phase {
+        Phase::HenyeyGreenstein(self.spectrum(g))
+    }
+
+    /// Another kind of matter in the last medium.
+    pub fn beside(mut self, absorption: impl IntoCurve, density: Field) -> Self {
+        let spectrum = self.spectrum(absorption);
+        let absorbers = vec![Absorber { strength: 1.0, columns: vec![(0.0, spectrum)] }];
+        let medium = self.0.media.last_mut().expect("a medium");
+        medium.components.push(Component { absorbers, scattering: None, density });
         self
     }
 

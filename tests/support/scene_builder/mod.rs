@@ -29,6 +29,7 @@ impl Builder {
                 sampler: Sampler::Independent,
                 wavelengths: Wavelengths::Emission,
                 wavelengths_per_channel: 1,
+                techniques: None,
                 evaluation: Evaluation::All,
                 evaluator: Evaluator::Auto,
                 epoch: 64,

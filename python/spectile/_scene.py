@@ -1,0 +1,288 @@
+"""Scenes as nested mappings, and what of Python stands in them for spectra, meshes, textures and grids."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from . import _spectile, _work
+from ._errors import SceneError, mistake
+
+# Pairs of numbers stand there as they are; anywhere else an array of pairs is a spectrum.
+_PAIRS = ("samples", "intervals")
+# Where a file would be named that holds a picture or voxels.
+_NUMBERS = ("texture", "grid")
+# Where the name of a file stands and nothing else does.
+_FILES = ("mesh", "file", "map", "table", "responses", "nk")
+# Tables of items under names of the user's own, which mean nothing by themselves.
+_NAMED = ("materials", "spectra", "media")
+# Far beyond any scene.
+_DEEPEST = 60
+# Nanometres in one unit of a wavelength.
+_NM = {"nm": 1.0, "nanometer": 1.0, "um": 1e3, "µm": 1e3, "μm": 1e3, "micrometer": 1e3, "micron": 1e3, "m": 1e9, "angstrom": 0.1}
+
+
+class Scene(dict[str, Any]):
+    """A scene as nested dicts and lists, edited like the TOML that a scene file is.
+
+    `Scene(mapping, folder=…)` makes one; `load` reads one from a file. Paths in it are relative to `folder`, that of the file or else
+    the working directory at the time. Mappings and lists are copied, arrays are not.
+
+    Wherever the scene has a spectrum, these may stand too: an array [n, 2] of wavelength in nm and value, a pair of arrays of one
+    dimension (wavelengths, values), an xarray.DataArray over `wavelength`, a pandas.Series over its index, or a
+    `SpectralDistribution` of colour-science. In the place of a file's name: `mesh` takes a mapping of `vertices` [vertex, 3],
+    `faces` [face, 3] counted from 0, and `uv` and `normals` by vertex or by corner [face, 3, …]; `texture` takes an array [y, x] or
+    [y, x, channel], rows from the top, linear numbers; `grid` takes an array [z, y, x].
+
+    >>> scene = Scene({"film": {"width": 64, "height": 48}})
+    >>> scene["film"]["width"] = 32
+    >>> scene
+    Scene({'film': {'width': 32, 'height': 48}})
+    """
+
+    def __init__(self, mapping: Mapping[str, Any] = {}, *, folder: str | os.PathLike[str] | None = None) -> None:
+        super().__init__({key: _copied(value, (str(key),)) for key, value in mapping.items()})
+        # Nothing is read from there: it says where relative paths begin, and what messages call the scene.
+        self.file: str = os.path.join(os.path.abspath("." if folder is None else os.fspath(folder)), "<scene>")
+        self._text: str = ""
+        if isinstance(mapping, Scene) and folder is None:
+            self.file, self._text = mapping.file, mapping._text
+
+    @property
+    def folder(self) -> str:
+        """Where relative paths in the scene begin."""
+        return os.path.dirname(self.file)
+
+    def copy(self) -> Scene:
+        """A scene of its own: what is changed in it does not change this one."""
+        return Scene(self)
+
+    def __copy__(self) -> Scene:
+        return Scene(self)
+
+    def __or__(self, other: Mapping[str, Any]) -> Scene:  # type: ignore[override]
+        scene = Scene(self)
+        scene.update({key: _copied(value, (str(key),)) for key, value in other.items()})
+        return scene
+
+    def __repr__(self) -> str:
+        return f"Scene({super().__repr__()})"
+
+    def check(self, overrides: Mapping[str, Any] | None = None) -> dict[str, Any]:
+        """Reads all that the scene names and checks it, without rendering.
+
+        `overrides` are as in `render`. Gives `digest`, the hex SHA-256 of all that decides the values of a cube, `warnings`, `size`
+        (width and height in pixels) and `bounds_nm`, the two ends of each channel.
+
+        Raises `SceneError` with every independent mistake.
+
+        >>> import numpy
+        >>> scene = Scene({
+        ...     "camera": {"orthographic": {"position": [0, 0, 1], "look_at": [0, 0, 0], "up": [0, 1, 0], "width": 2}},
+        ...     "film": {"width": 4, "height": 2},
+        ...     "channels": {"intervals": numpy.array([[400, 500], [500, 700]])},  # [channel, 2], nm
+        ...     "environment": {"radiance": numpy.array([[400, 0.0], [700, 0.3]])},  # [n, 2]: nm, W m-2 sr-1 nm-1
+        ... })
+        >>> facts = scene.check()
+        >>> facts["size"], facts["bounds_nm"], len(facts["digest"])
+        ([4, 2], [[400.0, 500.0], [500.0, 700.0]], 64)
+        """
+        return self._draft().check(_overrides(overrides))
+
+    @property
+    def digest(self) -> str:
+        """Hex SHA-256 of the scene with all that it reads: two scenes that have one make the same cube with the same seed."""
+        return str(self.check()["digest"])
+
+    def _draft(self) -> _spectile.Draft:
+        plain = _Reader(self.file).mapping(self, ())
+        return _spectile.Draft(self.file, self._text, plain)
+
+
+def load(file: str | os.PathLike[str]) -> Scene:
+    """The scene in a TOML file (docs/scene.md), to be rendered or edited.
+
+    Only the syntax is checked here; what the scene says is, when it is rendered or by `Scene.check`. Values that stay as they are in
+    the file are named with their line in errors.
+
+    Raises `SceneError` where the file cannot be read or is not TOML.
+    """
+    path = os.fspath(file)
+    text, tree = _spectile.read_scene(path)
+    scene = Scene(tree)
+    scene.file, scene._text = os.path.abspath(path), text
+    return scene
+
+
+def taken(scene: Scene | Mapping[str, Any] | str | os.PathLike[str]) -> Scene:
+    """The scene that a mapping is, or a file holds."""
+    if isinstance(scene, Scene):
+        return scene
+    return Scene(scene) if isinstance(scene, Mapping) else load(scene)
+
+
+def _overrides(overrides: Mapping[str, Any] | None) -> list[tuple[str, str]]:
+    return [(key, _work.toml(value)) for key, value in (overrides or {}).items()]
+
+
+def _copied(value: Any, path: tuple[str, ...]) -> Any:
+    if not isinstance(value, (Mapping, list)):
+        return value
+    _not_too_deep("scene", path)
+    if isinstance(value, Mapping):
+        return {key: _copied(inner, (*path, str(key))) for key, inner in value.items()}
+    return [_copied(item, (*path, str(i))) for i, item in enumerate(value)]
+
+
+def _not_too_deep(file: str, path: tuple[str, ...]) -> None:
+    if len(path) > _DEEPEST:
+        raise mistake(file, _spelt(path[:4]) + " …", "is nested too deeply", "a mapping or list cannot contain itself")
+
+
+def _spelt(path: tuple[str, ...]) -> str:
+    """The dotted key; parts that TOML would quote are quoted."""
+    return ".".join(part if re.fullmatch(r"[A-Za-z0-9_-]+", part) else _work.toml(part) for part in path)
+
+
+def is_array(value: Any) -> bool:
+    """Whether it is one of numpy, or can become one, and has dimensions."""
+    return getattr(value, "ndim", 0) > 0 and hasattr(value, "__array__")
+
+
+class _Reader:
+    """Makes of a scene what the library takes: dicts, lists, scalars, and numbers where a file would be."""
+
+    def __init__(self, file: str) -> None:
+        self.file = file
+        # What is held twice is copied once.
+        self.known: dict[tuple[int, ...], Any] = {}
+
+    def mistake(self, path: tuple[str, ...], message: str, help: str) -> SceneError:
+        return mistake(self.file, _spelt(path), message, help)
+
+    def mapping(self, mapping: Mapping[str, Any], path: tuple[str, ...]) -> dict[str, Any]:
+        return {key: self.value(value, (*path, str(key))) for key, value in mapping.items()}
+
+    def value(self, value: Any, path: tuple[str, ...]) -> Any:
+        if isinstance(value, (str, bool, int, float)):
+            return value
+        _not_too_deep(self.file, path)
+        key = "" if len(path) == 2 and path[0] in _NAMED else path[-1]
+        if isinstance(value, Mapping):
+            return self.mesh(value, path) if key == "mesh" else self.mapping(value, path)
+        if hasattr(value, "magnitude") and hasattr(value, "units"):
+            message = f"has a unit of its own, {value.units}, which is not converted here"
+            raise self.mistake(path, message, "give `.magnitude` in the unit that docs/scene.md names")
+        if key in _NUMBERS and is_array(value):
+            return self.numbers(value, path)
+        if key in _FILES and is_array(value):
+            help = "a mesh is a mapping of vertices and faces" if key == "mesh" else "give the name of a file"
+            raise self.mistake(path, "must not be an array", help)
+        samples = None if key in _PAIRS else self.samples(value, path)
+        if samples is not None:
+            return {"samples": samples}
+        if is_array(value):
+            return self.array(value, path, "iuf").tolist()
+        if hasattr(value, "item") and getattr(value, "ndim", None) == 0:
+            return value.item()
+        if isinstance(value, (list, tuple)):
+            return [self.value(item, (*path, str(i))) for i, item in enumerate(value)]
+        return os.fspath(value) if isinstance(value, os.PathLike) else value
+
+    def array(self, value: Any, path: tuple[str, ...], kinds: str) -> Any:
+        """As numpy's, of one of some kinds of number."""
+        import numpy
+
+        if numpy.ma.is_masked(value):
+            raise self.mistake(path, "has masked values, of which nothing is known", "fill them, as with .filled(…)")
+        array = numpy.asarray(value)
+        if array.dtype.kind not in kinds:
+            wanted = {"iu": "whole numbers", "f": "floating-point numbers"}.get(kinds, "numbers")
+            raise self.mistake(path, f"must hold {wanted}, but is of type {array.dtype}", "convert it first")
+        return array
+
+    def samples(self, value: Any, path: tuple[str, ...]) -> list[list[float]] | None:
+        """[nm, value] of what is a spectrum by itself; None where nothing says that it is."""
+        if hasattr(value, "wavelengths") and hasattr(value, "values"):
+            nm, values = value.wavelengths, value.values  # colour-science
+        elif "wavelength" in getattr(value, "coords", ()):
+            unit = str(value.coords["wavelength"].attrs.get("units", "nm")).strip()
+            if unit not in _NM:
+                raise self.mistake(path, f"has wavelengths in `{unit}`", f"convert them to one of {', '.join(_NM)}")
+            if value.dims != ("wavelength",):
+                message = f"has the dimensions {', '.join(map(str, value.dims)) or 'none'}, but a spectrum has `wavelength` alone"
+                raise self.mistake(path, message, "choose one, as with .isel(x=0, y=0)")
+            nm, values = value.coords["wavelength"].values * _NM[unit], value.values
+        elif hasattr(value, "index") and hasattr(value, "to_numpy") and not callable(value.index):
+            if value.ndim != 1:
+                raise self.mistake(path, "must not be a table", "choose one column of it")
+            nm, values = value.index.to_numpy(), value.to_numpy()  # pandas
+        elif isinstance(value, tuple) and len(value) == 2 and all(is_array(part) for part in value):
+            nm, values = value
+        elif is_array(value) and value.ndim == 2 and value.shape[1] == 2:
+            pairs = self.array(value, path, "iuf")
+            nm, values = pairs[:, 0], pairs[:, 1]
+        else:
+            return None
+        nm, values = self.array(nm, path, "iuf"), self.array(values, path, "iuf")
+        if nm.ndim != 1 or nm.shape != values.shape:
+            message = f"has wavelengths of the shape {list(nm.shape)} and values of {list(values.shape)}"
+            raise self.mistake(path, message, "a spectrum has one value for each wavelength")
+        return [[float(x), float(y)] for x, y in zip(nm.tolist(), values.tolist(), strict=True)]
+
+    def once(self, parts: tuple[Any, ...], make: Callable[[], Any]) -> Any:
+        key = tuple(id(part) for part in parts)
+        if key not in self.known:
+            # The parts are kept, so that nothing else gets their ids.
+            self.known[key] = (make(), parts)
+        return self.known[key][0]
+
+    def numbers(self, value: Any, path: tuple[str, ...]) -> Any:
+        import numpy
+
+        def make() -> Any:
+            ordered, kinds = value, "iuf" if path[-1] == "grid" else "f"
+            if kinds == "f" and getattr(value.dtype, "kind", "") in "iub":
+                message = f"holds whole numbers ({value.dtype}), which does not say what 1 is"
+                raise self.mistake(path, message, "give linear floating-point numbers, as with array / 255 where they are shares")
+            axes = ("z", "y", "x") if path[-1] == "grid" else ("y", "x")
+            if set(axes) <= set(getattr(value, "dims", ())):
+                ordered = value.transpose(*axes, ...)
+            with numpy.errstate(over="ignore"):
+                # What is too large becomes infinite, and is refused as that.
+                array = numpy.require(self.array(ordered, path, kinds), numpy.float32, "A")
+            shape = " x ".join(str(n) for n in array.shape)
+            return _spectile.numbers(f"{_spelt(path)} (array {shape})", array)
+
+        return self.once((value,), make)
+
+    def mesh(self, value: Mapping[str, Any], path: tuple[str, ...]) -> Any:
+        import numpy
+
+        known = ("vertices", "faces", "uv", "normals")
+        for key in value:
+            if key not in known:
+                raise self.mistake((*path, str(key)), f"unknown key `{key}`", f"known keys: {', '.join(known)}")
+        for key in known[:2]:
+            if value.get(key) is None:
+                message = f"`{key}` is missing"
+                raise self.mistake((*path, key), message, "a mesh has vertices [vertex, 3] and faces [face, 3]")
+
+        def make() -> Any:
+            def floats(key: str) -> Any:
+                return numpy.require(self.array(value[key], (*path, key), "iuf"), numpy.float64, "A")
+
+            faces = self.array(value["faces"], (*path, "faces"), "iu")
+            wrong = faces[(faces < 0) | (faces > 0xFFFF_FFFF)]
+            if wrong.size:
+                raise self.mistake((*path, "faces"), f"names vertex {wrong[0]}", "vertices are counted from 0")
+            parts = {key: floats(key) for key in ("uv", "normals") if value.get(key) is not None}
+            name = f"{_spelt(path)} ({len(faces)} faces)"
+            try:
+                return _spectile.mesh(name, floats("vertices"), numpy.require(faces, numpy.uint32, "A"), **parts)
+            except ValueError as error:
+                raise self.mistake(path, str(error), "see spectile.Scene for the shapes") from None
+
+        return self.once(tuple(value.get(key) for key in known), make)

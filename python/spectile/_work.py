@@ -1,0 +1,118 @@
+"""Commands of Spectile as calls."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+import warnings
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from . import _spectile
+from ._errors import SpectileWarning
+
+Listener = Callable[[dict[str, Any]], None]
+
+
+def run(
+    arguments: list[str], *, draft: Any = None, listener: Listener | None = None, task: Any = None, stacklevel: int = 3
+) -> dict[str, Any]:
+    """Runs `spectile ARGUMENTS --json` and gives its last event, `done`; `listener` gets all others.
+
+    Warnings become warnings of Python, once the work has ended: one that is made an error must not end a render.
+    """
+    last: dict[str, Any] = {}
+    said: list[str] = []
+
+    def hear(event: dict[str, Any]) -> None:
+        if event["event"] == "warning":
+            said.append(event["message"])
+        elif event["event"] == "done":
+            last.update(event)
+        elif listener is not None:
+            listener(event)
+
+    try:
+        (task or _spectile.Task()).run(arguments, draft, hear)
+    except BaseException:
+        # Where warnings are errors, what went wrong is still the one to raise.
+        with contextlib.suppress(SpectileWarning):
+            _warn(said, stacklevel + 1)
+        raise
+    finally:
+        _give_back()
+    _warn(said, stacklevel + 1)
+    return last
+
+
+def _warn(said: list[str], stacklevel: int) -> None:
+    for message in dict.fromkeys(said):
+        warnings.warn(message, SpectileWarning, stacklevel=stacklevel)
+
+
+def _give_back() -> None:
+    """Gives memory that is free back to the system. glibc keeps it for as many threads as ever asked for some at a time: after renders that is
+    tens of megabytes, which would look like a leak."""
+    if sys.platform == "linux":
+        import ctypes
+
+        # Other libraries of C have nothing of the kind.
+        trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+        if trim is not None:
+            trim(0)
+
+
+def option(name: str, value: Any) -> list[str]:
+    """`--name=value`, or nothing where there is no value."""
+    if value is None or value is False:
+        return []
+    return [f"--{name}"] if value is True else [f"--{name}={value}"]
+
+
+def seconds(value: Any) -> str | None:
+    """A number of seconds, a timedelta, or text such as "10m"."""
+    if value is None or isinstance(value, str):
+        return value
+    return repr(float(value.total_seconds() if hasattr(value, "total_seconds") else value))
+
+
+def chosen(devices: Any) -> str:
+    """ "all", a number of devices, or their positions."""
+    if isinstance(devices, (str, int)) and not isinstance(devices, bool):
+        return str(devices)
+    return ",".join(str(int(position)) for position in devices) + ","
+
+
+def pair(size: Any) -> str | None:
+    """(width, height) or text such as "640x480"."""
+    if size is None or isinstance(size, str):
+        return size
+    width, height = size
+    return f"{int(width)}x{int(height)}"
+
+
+def toml(value: Any) -> str:
+    """The value as TOML spells it."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if hasattr(value, "tolist"):
+        return toml(value.tolist())
+    if isinstance(value, (int, float)):
+        return repr(value)
+    if isinstance(value, (str, os.PathLike)):
+        return _quoted(os.fspath(value))
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{_quoted(str(key))} = {toml(inner)}" for key, inner in value.items()) + " }"
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(toml(item) for item in value) + "]"
+    if hasattr(value, "isoformat"):
+        return str(value.isoformat())
+    raise TypeError(f"an override is a string, number, boolean, date, list or mapping, not {type(value).__name__}")
+
+
+def _quoted(text: str) -> str:
+    """A basic string of TOML."""
+    special = {'"': '\\"', "\\": "\\\\"}
+    written = (special.get(c) or (f"\\u{ord(c):04x}" if ord(c) < 32 or ord(c) == 127 else c) for c in text)
+    return f'"{"".join(written)}"'

@@ -1,0 +1,288 @@
+"""Arrays where a scene file would have tables or files: the same scenes, to the digest."""
+
+import numpy
+import pytest
+import xarray
+from conftest import ball
+
+import spectile as sp
+
+PAINT = numpy.array([[380, 0.05], [500, 0.1], [600, 0.7], [780, 0.8]])
+
+
+@pytest.mark.parametrize(
+    "paint",
+    [
+        PAINT,
+        PAINT.astype(object).astype(float)[::1].copy(order="F"),
+        (PAINT[:, 0], PAINT[:, 1]),
+        {"samples": PAINT},
+        {"samples": [tuple(row) for row in PAINT]},
+        xarray.DataArray(PAINT[:, 1], coords={"wavelength": PAINT[:, 0]}, dims="wavelength"),
+        xarray.DataArray(
+            PAINT[:, 1], coords={"wavelength": ("wavelength", PAINT[:, 0] / 1000, {"units": "um"})}, dims="wavelength"
+        ),
+    ],
+    ids=["array", "fortran", "pair", "samples", "tuples", "xarray", "micrometres"],
+)
+def test_spectra_in_every_way_are_one_scene(paint):
+    scene = ball()
+    scene["spectra"]["paint"] = paint
+    in_place = ball()
+    in_place["materials"]["ball"]["diffuse"]["reflectance"] = paint
+    if isinstance(paint, xarray.DataArray) and "units" in paint.wavelength.attrs:
+        # 0.38 um is 380 nm but for the last bit.
+        assert scene.check() | {"digest": ""} == ball().check() | {"digest": ""}
+    else:
+        assert scene.digest == in_place.digest == ball().digest
+
+
+def test_series_of_pandas_are_spectra():
+    pandas = pytest.importorskip("pandas")
+    scene = ball()
+    scene["spectra"]["paint"] = pandas.Series(PAINT[:, 1], index=PAINT[:, 0])
+    assert scene.digest == ball().digest
+
+
+def test_numbers_of_numpy_are_numbers():
+    scene = ball(film={"width": numpy.int32(16), "height": numpy.uint8(16)})
+    scene["camera"]["perspective"]["position"] = numpy.array([0, -4, 1.5], numpy.float32)
+    scene["camera"]["perspective"]["fov"] = numpy.float32(40)
+    assert scene.digest == ball().digest
+    scene["channels"] = {"intervals": numpy.array([[400, 500], [500, 700]])}
+    assert scene.check()["bounds_nm"] == [[400.0, 500.0], [500.0, 700.0]]
+
+
+# Readers of OBJ files number vertices as faces name them for the first time: so does this.
+TETRAHEDRON = {
+    "vertices": numpy.array([[0, 0, 0], [0, 1, 0], [1, 0, 0], [0, 0, 1]], float),
+    "faces": numpy.array([[0, 1, 2], [0, 2, 3], [2, 1, 3], [0, 3, 1]]),
+}
+
+
+def obj(mesh, path):
+    """The same mesh as a file."""
+    corner = lambda i, j: "/".join(
+        str(v) for v in (mesh["faces"][i][j] + 1, 3 * i + j + 1 if "uv" in mesh else "", 3 * i + j + 1 if "normals" in mesh else "")
+    )
+    at = lambda key, i, j: mesh[key][i][j] if mesh[key].ndim == 3 else mesh[key][mesh["faces"][i][j]]
+    lines = ["v " + " ".join(map(repr, vertex)) for vertex in mesh["vertices"].tolist()]
+    for key, word in (("uv", "vt"), ("normals", "vn")):
+        if key in mesh:
+            lines += [f"{word} " + " ".join(map(repr, at(key, i, j).tolist())) for i in range(len(mesh["faces"])) for j in range(3)]
+    lines += ["f " + " ".join(corner(i, j) for j in range(3)) for i in range(len(mesh["faces"]))]
+    path.write_text("\n".join(lines) + "\n")
+    return str(path)
+
+
+@pytest.mark.parametrize("extra", ["", "uv", "uv by corner", "normals"])
+def test_meshes_are_those_of_files(tmp_path, extra):
+    mesh, numbers = dict(TETRAHEDRON), numpy.random.default_rng(1)
+    texture = numpy.linspace(0, 1, 2 * 4 * 3, dtype=numpy.float32).reshape(2, 4, 3)
+    if extra.startswith("uv"):
+        mesh["uv"] = numbers.random((4, 3, 2) if "corner" in extra else (4, 2))
+    if extra == "normals":
+        mesh["normals"] = mesh["vertices"] - 0.25
+    scene = ball()
+    scene["objects"].append({"mesh": mesh, "material": "ball"})
+    if extra.startswith("uv"):
+        scene["materials"]["ball"] = {"diffuse": {"reflectance": {"texture": texture}}}
+        scene["objects"][1]["material"] = "floor"
+    digest = scene.check()["digest"]
+    scene["objects"][-1]["mesh"] = obj(mesh, tmp_path / "mesh.obj")
+    assert scene.check()["digest"] == digest
+    moved = {**mesh, "vertices": mesh["vertices"] * 1.5}
+    scene["objects"][-1]["mesh"] = moved
+    assert scene.check()["digest"] != digest
+
+
+def test_textures_and_grids_are_those_of_files(tmp_path):
+    import OpenEXR
+
+    numbers = numpy.random.default_rng(2)
+    picture = numbers.random((5, 7, 3), dtype=numpy.float32)
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    OpenEXR.File(header, {"RGB": picture}).write(str(tmp_path / "picture.exr"))
+    OpenEXR.File(header, {"Y": picture[:, :, 0].copy()}).write(str(tmp_path / "weight.exr"))
+    grid = numbers.random((2, 3, 4)) * 1000
+    xarray.DataArray(grid.astype("f4"), dims=("z", "y", "x"), name="t").to_dataset().to_zarr(
+        tmp_path / "t.zarr", zarr_format=3, consolidated=False
+    )
+
+    def scene(colour, weight, temperature):
+        return ball(
+            materials={
+                "floor": {"diffuse": {"reflectance": {"texture": colour}}},
+                "ball": {"blend": {"a": "floor", "b": "lamp", "weight": {"texture": weight, "filter": "nearest"}}},
+                "lamp": {"black": {}},
+            },
+            media={"gas": {"absorption": 0.1, "temperature": {"grid": temperature}}},
+            objects=[*ball()["objects"], {"cube": {"min": [1, 1, 1], "max": [2, 2, 2]}, "interior": "gas"}],
+        )
+
+    files = scene(str(tmp_path / "picture.exr"), str(tmp_path / "weight.exr"), str(tmp_path / "t.zarr/t"))
+    weight = picture[::-1, ::-1][::-1, ::-1, 0]  # strides, and no channel
+    arrays = scene(picture, weight, grid)
+    assert arrays.digest == files.digest
+    assert scene(picture.astype(float), weight[:, :, None], grid).digest == files.digest
+    assert scene(picture * numpy.float32(0.5), weight, grid).digest != files.digest
+
+
+def test_axes_by_name_are_put_in_order():
+    picture = numpy.linspace(0, 1, 2 * 4 * 3, dtype=numpy.float32).reshape(2, 4, 3)
+    named = xarray.DataArray(picture, dims=("y", "x", "channel"))
+
+    def digest(texture):
+        return ball(materials={**ball()["materials"], "floor": {"diffuse": {"reflectance": {"texture": texture}}}}).digest
+
+    assert digest(named.transpose("channel", "x", "y")) == digest(named) == digest(picture) == digest(picture.astype(">f8"))
+    packed = numpy.zeros((2, 4, 3), numpy.dtype([("pad", "u1"), ("value", "f4")]))
+    packed["value"] = picture
+    assert digest(packed["value"]) == digest(picture)
+
+
+def test_mixtures_take_channels_in_order(tmp_path):
+    shares = numpy.full((2, 2, 2), 0.5, numpy.float32)
+    scene = ball()
+    scene["materials"]["floor"]["diffuse"]["reflectance"] = {"texture": shares, "endmembers": ["paint", 0.25]}
+    assert scene.check()["warnings"] == []
+
+
+@pytest.mark.parametrize(
+    "change, key, words",
+    [
+        (lambda s: s["spectra"].update(paint=PAINT[::-1]), "spectra.paint.samples.1", "ascend"),
+        (lambda s: s["spectra"].update(paint=(PAINT[:, 0], PAINT[:3, 1])), "spectra.paint", "one value for each wavelength"),
+        (lambda s: s["spectra"].update(paint=PAINT.astype(complex)), "spectra.paint", "must hold numbers"),
+        (
+            lambda s: s["spectra"].update(
+                paint=xarray.DataArray(PAINT, dims=("wavelength", "y"), coords={"wavelength": PAINT[:, 0]})
+            ),
+            "spectra.paint",
+            "choose one",
+        ),
+        (
+            lambda s: s["spectra"].update(
+                paint=xarray.DataArray([1.0], dims="wavelength", coords={"wavelength": ("wavelength", [1.0], {"units": "eV"})})
+            ),
+            "spectra.paint",
+            "eV",
+        ),
+        (lambda s: s["objects"][0].update(mesh=numpy.zeros((3, 3))), "objects.0.mesh", "must not be an array"),
+        (lambda s: s["objects"].append({"mesh": {"vertices": PAINT}, "material": "ball"}), "objects.3.mesh.faces", "missing"),
+        (
+            lambda s: s["objects"].append({"mesh": {**TETRAHEDRON, "normal": 1}, "material": "ball"}),
+            "objects.3.mesh.normal",
+            "unknown key",
+        ),
+        (
+            lambda s: s["objects"].append({"mesh": {**TETRAHEDRON, "faces": TETRAHEDRON["faces"] + 1}, "material": "ball"}),
+            "objects.3.mesh",
+            "counted from 0",
+        ),
+        (
+            lambda s: s["objects"].append({"mesh": {**TETRAHEDRON, "faces": TETRAHEDRON["faces"] - 1}, "material": "ball"}),
+            "objects.3.mesh.faces",
+            "counted from 0",
+        ),
+        (
+            lambda s: s["objects"].append({"mesh": {**TETRAHEDRON, "faces": TETRAHEDRON["faces"] * 1.0}, "material": "ball"}),
+            "objects.3.mesh.faces",
+            "whole numbers",
+        ),
+        (
+            lambda s: s["objects"].append(
+                {"mesh": {**TETRAHEDRON, "vertices": TETRAHEDRON["vertices"] * numpy.nan}, "material": "ball"}
+            ),
+            "objects.3.mesh",
+            "not finite",
+        ),
+        (
+            lambda s: s["objects"].append({"mesh": {**TETRAHEDRON, "uv": numpy.zeros((3, 2))}, "material": "ball"}),
+            "objects.3.mesh",
+            "`uv` has 3",
+        ),
+        (
+            lambda s: s["objects"].append({"mesh": {**TETRAHEDRON, "uv": numpy.zeros((4, 3))}, "material": "ball"}),
+            "objects.3.mesh",
+            "shape",
+        ),
+        (
+            lambda s: s["objects"].append({"mesh": {**TETRAHEDRON, "faces": numpy.zeros((0, 3), int)}, "material": "ball"}),
+            "objects.3.mesh",
+            "no faces",
+        ),
+        (
+            lambda s: s["materials"]["floor"]["diffuse"].update(reflectance={"texture": numpy.zeros((2, 2, 3), numpy.uint8)}),
+            "materials.floor.diffuse.reflectance.texture",
+            "what 1 is",
+        ),
+        (
+            lambda s: s["materials"]["floor"]["diffuse"].update(reflectance={"texture": numpy.full((2, 2, 3), 1.5)}),
+            "materials.floor.diffuse.reflectance.texture",
+            "1.5",
+        ),
+        (
+            lambda s: s["materials"]["floor"]["diffuse"].update(reflectance={"texture": numpy.full((2, 2, 3), numpy.nan)}),
+            "materials.floor.diffuse.reflectance.texture",
+            "NaN",
+        ),
+        (
+            lambda s: s["materials"]["floor"]["diffuse"].update(reflectance={"texture": numpy.zeros((2, 0, 3))}),
+            "materials.floor.diffuse.reflectance.texture",
+            "no picture",
+        ),
+        (
+            lambda s: s["materials"]["floor"]["diffuse"].update(reflectance={"texture": numpy.zeros((2, 2, 2))}),
+            "materials.floor.diffuse.reflectance.texture",
+            "2 channels",
+        ),
+    ],
+)
+def test_wrong_arrays_are_refused_by_key(change, key, words):
+    scene = ball()
+    change(scene)
+    with pytest.raises(sp.SceneError) as caught:
+        scene.check()
+    assert caught.value.key == key and words in str(caught.value), str(caught.value)
+
+
+def test_what_is_masked_infinite_or_has_a_unit_is_refused():
+    masked = numpy.ma.masked_less(PAINT, 390)
+
+    class Quantity:
+        magnitude, units, ndim = PAINT, "um", 2
+
+    for paint, words in ((masked, "masked"), (Quantity(), "unit of its own")):
+        scene = ball()
+        scene["spectra"]["paint"] = paint
+        with pytest.raises(sp.SceneError, match=words):
+            scene.check()
+    scene = ball()
+    scene["materials"]["floor"]["diffuse"]["reflectance"] = {"texture": numpy.full((2, 2), 1e300)}
+    with pytest.raises(sp.SceneError, match="inf"):
+        scene.check()
+
+
+def test_grids_of_wrong_shape_and_sign():
+    for grid, words in (
+        (numpy.zeros((2, 2)), "dimensions"),
+        (numpy.full((1, 1, 1), -5.0), "not negative"),
+        (numpy.full((1, 1, 1), numpy.inf), "inf"),
+        (numpy.zeros((0, 1, 1)), "voxels"),
+    ):
+        scene = ball(media={"gas": {"absorption": 0.1, "density": {"grid": grid}}})
+        scene["objects"].append({"cube": {"min": [1, 1, 1], "max": [2, 2, 2]}, "interior": "gas"})
+        with pytest.raises(sp.SceneError, match=words) as caught:
+            scene.check()
+        assert caught.value.key == "media.gas.density.grid"
+
+
+def test_arrays_resume_as_files_do(tmp_path):
+    scene = ball()
+    scene["objects"].append({"mesh": dict(TETRAHEDRON), "material": "ball"})
+    sp.render(scene, tmp_path / "cube.zarr", spp=2)
+    assert int(sp.render(scene, tmp_path / "cube.zarr", spp=4, resume=True).samples.max()) == 4
+    scene["objects"][-1]["mesh"]["vertices"] = TETRAHEDRON["vertices"] * 2
+    with pytest.raises(sp.SpectileError, match="scene"):
+        sp.render(scene, tmp_path / "cube.zarr", spp=8, resume=True)

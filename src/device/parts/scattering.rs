@@ -1,0 +1,512 @@
+//! Media that scatter, as devices get them: the techniques by which paths decide where they go in them (docs/METHOD.md, Techniques), what each
+//! takes of a way, and the phase functions.
+
+use crate::device::part::{Part, Place, Records};
+use crate::device::parts::media::{self, Filled, Media};
+use crate::device::parts::surfaces::Needed;
+use crate::device::text::module;
+use crate::device::words::{
+    NONE, PHASE_HENYEY_GREENSTEIN, PHASE_RAYLEIGH, PHASE_TABLE, VOLUME_BY_EXTINCTION, VOLUME_WORDS, VOLUMES_HEAD,
+};
+use crate::scene::{Component, Field, Medium, Phase, PhaseTable, Scene, SpectrumId};
+use crate::spectral::{Curve, Outside};
+
+pub const SCATTERING: Part = Part {
+    name: "media that scatter",
+    used: |scene| scene.scattering.is_some(),
+    effect: |scene| scene.scattering.as_ref().map_or_else(String::new, Scattering::words),
+    is_planned: true,
+    modules: &[
+        (Place::Generate, module!("parts/scattering/directions.wgsl")),
+        (Place::Stage, module!("stages/flight.wgsl")),
+        (Place::Stage, module!("stages/matter.wgsl")),
+    ],
+    defines: |scene, _, defines| {
+        let Some(scattering) = &scene.scattering else { return };
+        defines.set("SCATTERS", true).constant("TECHNIQUES", scattering.techniques);
+        defines.set("SCALED", true);
+    },
+    // Of a way that is gone on from somewhere within: its throughput put aside and taken back, and what lies before that place. At
+    // a collision each kind of matter takes two, for the light and for the path.
+    records: |scene| {
+        let way = scene.media.as_ref().map_or(0, Media::way_records);
+        let scatterers = scene.scattering.as_ref().map_or(0, |scattering| scattering.most_scatterers);
+        Records { way: way + 2, vertex: 4 * scatterers, path: 0 }
+    },
+    example: Some(|exhibit| exhibit.add_cloud()),
+    ..Part::NOTHING
+};
+
+pub const TECHNIQUES: Part = Part {
+    name: "several techniques",
+    used: |scene| scene.scattering.as_ref().is_some_and(|scattering| scattering.techniques > 1),
+    effect: |scene| {
+        let techniques = scene.scattering.as_ref().map_or(0, |scattering| scattering.techniques);
+        format!("{} bytes a path, and the density of each at every collision", 16 * techniques.div_ceil(4))
+    },
+    is_planned: true,
+    defines: |_, _, defines| _ = defines.set("RATIOS", true),
+    state_words: |scene| scene.scattering.as_ref().map_or(0, |scattering| 4 * scattering.techniques.div_ceil(4)),
+    ..Part::NOTHING
+};
+
+pub const TABLES: Part = Part {
+    name: "tables of phase functions",
+    used: |scene| scene.scattering.as_ref().is_some_and(|scattering| scattering.has_tables),
+    effect: |_| "directions are chosen by the table itself".into(),
+    is_planned: true,
+    modules: &[
+        (Place::Generate, module!("parts/scattering/phase_tables.wgsl")),
+        (Place::Generate, module!("parts/scattering/table_directions.wgsl")),
+        (Place::Evaluate, media::VOLUME),
+        (Place::Evaluate, module!("parts/scattering/phase_tables.wgsl")),
+    ],
+    defines: |_, _, defines| _ = defines.set("PHASE_TABLES", true),
+    example: Some(|exhibit| exhibit.add_droplets()),
+    ..Part::NOTHING
+};
+
+const WORDS: usize = VOLUME_WORDS as usize;
+
+/// Techniques of a scene at most.
+const MOST_TECHNIQUES: usize = 16;
+/// Optical depths below this are as this: nothing is scattered noticeably.
+const LEAST_DEPTH: f64 = 0.1;
+/// Ratios of optical depths below this need one technique.
+const SMALL_RATIO: f64 = 1.3;
+/// Of a technique's own phase function in that by which it chooses; the rest is the mean over channels.
+const OWN_SHARE: f64 = 0.9;
+/// Degrees between rows of tables on the device, at most: between them sines are linear to 2.4e-6.
+const ROW_DEGREES: f64 = 0.25;
+
+/// What media that scatter need on a device, beside the words that it adds to their volumes.
+pub struct Scattering {
+    pub techniques: u32,
+    pub has_tables: bool,
+    pub most_scatterers: u32,
+    /// Names of media in which paths go as far as their extinction says.
+    by_extinction: Vec<String>,
+}
+
+impl Scattering {
+    /// `None` where nothing scatters. Adds to the words and spectra of `media`.
+    pub fn new(scene: &Scene, media: &mut Media) -> Option<Scattering> {
+        if !media.places.iter().any(|place| scene.media[place.medium].scatters()) {
+            return None;
+        }
+        let coefficients: Vec<Coefficients> =
+            scene.media.iter().map(|medium| Coefficients::of(scene, medium)).collect();
+        let deciding = Deciding::of(scene, &media.places, &coefficients);
+        let mut scattering = Scattering {
+            techniques: deciding.count() as u32,
+            has_tables: false,
+            most_scatterers: 0,
+            by_extinction: Vec::new(),
+        };
+        let mut tables = Tables::default();
+        for (i, place) in media.places.clone().into_iter().enumerate() {
+            let (medium, of) = (&scene.media[place.medium], &coefficients[place.medium]);
+            let first = VOLUMES_HEAD as usize + WORDS * i;
+            let mut words = of.walked(medium, &deciding);
+            let (mut spectra, mut voxels) = (Vec::new(), Vec::new());
+            let scatterers = medium.components.iter().filter(|component| component.scattering.is_some()).count() as u32;
+            words.push(scatterers);
+            scattering.most_scatterers = scattering.most_scatterers.max(scatterers);
+            for (c, component) in medium.components.iter().enumerate() {
+                voxels.extend(component.scattering.as_ref().map(|_| words.len()));
+                of.scatterer(
+                    scene,
+                    media,
+                    &deciding,
+                    &mut tables,
+                    (c, component, place.densities[c]),
+                    &mut words,
+                    &mut spectra,
+                );
+            }
+            media.volumes[first + 22] = media.append(&words, &spectra, &voxels);
+            if of.by_extinction {
+                media.volumes[first] |= VOLUME_BY_EXTINCTION;
+                if !scattering.by_extinction.contains(&medium.name) {
+                    scattering.by_extinction.push(medium.name.clone());
+                }
+            }
+        }
+        scattering.has_tables = !tables.0.is_empty();
+        let words = tables.words(scene, &deciding, media.volumes.len() as u32);
+        media.volumes[4] = media.append(&words, &[], &[]);
+        Some(scattering)
+    }
+
+    fn words(&self) -> String {
+        let mut words = format!("{} techniques", self.techniques);
+        if self.techniques == 1 {
+            words = "one technique".into();
+        }
+        if !self.by_extinction.is_empty() {
+            words += &format!(", by extinction in {}", self.by_extinction.join(", "));
+        }
+        words + "; directions at each collision"
+    }
+}
+
+/// Of a medium: coefficients in each channel at density 1, and densities as they are on the whole.
+struct Coefficients {
+    /// Of each kind of matter.
+    components: Vec<ComponentCoefficients>,
+    /// Whether more is absorbed than scattered in all channels, so that paths would go deep for nothing.
+    by_extinction: bool,
+}
+
+struct ComponentCoefficients {
+    /// m⁻¹ in each channel, of each column of each absorber, at strength and density 1; their strengths.
+    columns: Vec<(f64, Vec<f64>)>,
+    /// m⁻¹ in each channel; empty where nothing is scattered.
+    scattering: Vec<f64>,
+    /// g in each channel, of Henyey and Greenstein's phase function.
+    asymmetry: Vec<f64>,
+    density: f64,
+    /// Its absorption in each channel at the medium's mean temperature, at density 1.
+    absorption: Vec<f64>,
+}
+
+fn means(scene: &Scene, spectrum: SpectrumId) -> Vec<f64> {
+    let curve = &scene.spectra[spectrum].curve;
+    scene.channels.bounds.iter().map(|b| curve.mean(b[0], b[1])).collect()
+}
+
+/// On the whole.
+fn mean(field: &Field) -> f64 {
+    match field {
+        Field::Constant(value) => *value,
+        Field::Grid(grid) => grid.values.iter().map(|v| f64::from(*v)).sum::<f64>() / grid.values.len() as f64,
+    }
+}
+
+fn mean_of(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+impl Coefficients {
+    fn of(scene: &Scene, medium: &Medium) -> Coefficients {
+        let kelvin = medium.temperature.as_ref().map(mean);
+        let count = scene.channels.len();
+        let component = |component: &Component| {
+            let columns = component
+                .absorbers
+                .iter()
+                .flat_map(|absorber| absorber.columns.iter().map(|column| (absorber.strength, means(scene, column.1))));
+            let alone = Medium { name: String::new(), components: vec![component.clone()], temperature: None };
+            let (spectra, factors) = media::absorption(&alone, kelvin, |_| 1.0);
+            let mut absorption = vec![0.0; count];
+            for (spectrum, factor) in spectra.into_iter().zip(factors) {
+                absorption.iter_mut().zip(means(scene, spectrum)).for_each(|(sum, value)| *sum += factor * value);
+            }
+            let scattering = component.scattering.as_ref();
+            let asymmetry = match scattering.map(|scattering| &scattering.phase) {
+                Some(Phase::HenyeyGreenstein(g)) => means(scene, *g),
+                _ => Vec::new(),
+            };
+            ComponentCoefficients {
+                columns: columns.collect(),
+                scattering: scattering.map_or_else(Vec::new, |scattering| means(scene, scattering.coefficient)),
+                asymmetry,
+                density: mean(&component.density),
+                absorption,
+            }
+        };
+        let components: Vec<ComponentCoefficients> = medium.components.iter().map(component).collect();
+        let total = |of: fn(&ComponentCoefficients, usize) -> f64, k: usize| -> f64 {
+            components.iter().map(|component| component.density * of(component, k)).sum()
+        };
+        let by_extinction = medium.scatters()
+            && (0..count).all(|k| total(ComponentCoefficients::scattered, k) < total(|c, k| c.absorption[k], k));
+        Coefficients { components, by_extinction }
+    }
+
+    /// What decides how far paths go, of one kind of matter in channel `k`, at its mean density.
+    fn deciding(&self, component: &ComponentCoefficients, k: usize) -> f64 {
+        let absorbed = if self.by_extinction { component.absorption[k] } else { 0.0 };
+        component.density * (component.scattered(k) + absorbed)
+    }
+
+    /// Words of a volume: for each amount on a way, what every technique makes of it for how far paths go; then what every technique, and the
+    /// channel that absorbs least, loses of it.
+    fn walked(&self, medium: &Medium, deciding: &Deciding) -> Vec<u32> {
+        let mut terms: Vec<(Vec<f64>, Vec<f64>, f64)> = Vec::new();
+        for component in &self.components {
+            for (_, column) in &component.columns {
+                let values = deciding.values(column);
+                let least = column.iter().copied().fold(f64::INFINITY, f64::min);
+                terms.push(match self.by_extinction {
+                    true => (values, vec![0.0; deciding.count()], 0.0),
+                    false => (vec![0.0; deciding.count()], values, least),
+                });
+            }
+            if !component.scattering.is_empty() {
+                terms.push((deciding.covering(&component.scattering), vec![0.0; deciding.count()], 0.0));
+            }
+        }
+        if medium.grid_size().is_none() {
+            terms = vec![self.along_metres(deciding)];
+        }
+        let numbers =
+            terms.into_iter().flat_map(|(flights, losses, least)| flights.into_iter().chain(losses).chain([least]));
+        numbers.map(|value| (value as f32).to_bits()).collect()
+    }
+
+    /// The one amount of a medium that is the same everywhere: metres.
+    fn along_metres(&self, deciding: &Deciding) -> (Vec<f64>, Vec<f64>, f64) {
+        let (mut flights, mut losses) = (vec![0.0; deciding.count()], vec![0.0; deciding.count()]);
+        let mut least = 0.0;
+        for component in &self.components {
+            let add = |sum: &mut Vec<f64>, values: Vec<f64>| {
+                sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += component.density * value);
+            };
+            let absorbed = if self.by_extinction { &mut flights } else { &mut losses };
+            add(absorbed, deciding.values(&component.absorption));
+            if !self.by_extinction {
+                least += component.density * component.absorption.iter().copied().fold(f64::INFINITY, f64::min);
+            }
+            if !component.scattering.is_empty() {
+                add(&mut flights, deciding.covering(&component.scattering));
+            }
+        }
+        (flights, losses, least)
+    }
+
+    /// Adds the words of a kind of matter, if it scatters, and which of them are spectra.
+    #[expect(clippy::too_many_arguments)]
+    fn scatterer(
+        &self,
+        scene: &Scene,
+        media: &mut Media,
+        deciding: &Deciding,
+        tables: &mut Tables,
+        (number, component, density): (usize, &Component, [u32; 2]),
+        words: &mut Vec<u32>,
+        spectra: &mut Vec<usize>,
+    ) {
+        let Some(scattering) = &component.scattering else { return };
+        let mut spectrum = |words: &mut Vec<u32>, needed: Needed| {
+            spectra.push(words.len());
+            let position = media.need(needed);
+            words.push(position);
+        };
+        words.extend(density);
+        let named = |id: SpectrumId| (scene.spectra[id].name.clone(), scene.spectra[id].curve.clone());
+        let (name, curve) = named(scattering.coefficient);
+        spectrum(words, Needed::Pointwise(name, curve));
+        match &scattering.phase {
+            Phase::HenyeyGreenstein(g) => {
+                words.push(PHASE_HENYEY_GREENSTEIN);
+                let (name, curve) = named(*g);
+                spectrum(words, Needed::Exact(name, curve));
+            }
+            Phase::Rayleigh { depolarisation } => {
+                words.push(PHASE_RAYLEIGH);
+                words.push(((depolarisation / (2.0 - depolarisation)) as f32).to_bits());
+            }
+            Phase::Table(table) => {
+                words.push(PHASE_TABLE);
+                words.push(tables.number(table));
+            }
+        }
+        words.push((self.share(number) as f32).to_bits());
+        match &scattering.phase {
+            Phase::Table(table) => spectrum(words, Needed::Exact("columns of a phase function".into(), axis(table))),
+            _ => words.push(NONE),
+        }
+        let own = &self.components[number];
+        let asymmetry =
+            if own.asymmetry.is_empty() { vec![0.0; deciding.count()] } else { deciding.values(&own.asymmetry) };
+        let values = deciding.covering(&own.scattering).into_iter().chain(asymmetry);
+        words.extend(values.map(|value| (value as f32).to_bits()));
+    }
+
+    /// What a kind of matter counts, per density, where all channels have a say: half of the mean over channels of its share of what is
+    /// scattered, half of the largest, so that it is positive wherever any channel is scattered.
+    fn share(&self, number: usize) -> f64 {
+        let channels = 0..self.components[number].scattering.len();
+        let shares: Vec<f64> = channels
+            .map(|k| {
+                let all: f64 = self.components.iter().map(|component| component.density * component.scattered(k)).sum();
+                if all > 0.0 { self.components[number].scattered(k) / all } else { 0.0 }
+            })
+            .collect();
+        0.5 * mean_of(&shares) + 0.5 * shares.iter().copied().fold(0.0, f64::max)
+    }
+}
+
+impl ComponentCoefficients {
+    fn scattered(&self, k: usize) -> f64 {
+        self.scattering.get(k).copied().unwrap_or(0.0)
+    }
+}
+
+/// The channels whose coefficients drive the decisions of paths, one of them drawn for each path; without any, the mean over all does.
+struct Deciding(Vec<usize>);
+
+impl Deciding {
+    fn of(scene: &Scene, places: &[Filled], coefficients: &[Coefficients]) -> Deciding {
+        let channels = scene.channels.len();
+        let mut points = vec![Vec::new(); channels];
+        let mut ratio: f64 = 1.0;
+        for place in places.iter().filter(|place| scene.media[place.medium].scatters()) {
+            let of = &coefficients[place.medium];
+            let mut spread = |depth: &dyn Fn(usize) -> f64| {
+                let depths: Vec<f64> = (0..channels).map(|k| (depth(k) * place.extent).max(LEAST_DEPTH)).collect();
+                let least = depths.iter().copied().fold(f64::INFINITY, f64::min);
+                ratio = ratio.max(depths.iter().copied().fold(0.0, f64::max) / least);
+                depths
+            };
+            spread(&|k| of.components.iter().map(|component| of.deciding(component, k)).sum());
+            for component in &of.components {
+                let depths = spread(&|k| of.deciding(component, k));
+                points.iter_mut().zip(depths).for_each(|(point, depth)| point.push(depth.ln()));
+                let asymmetries = points.iter_mut().zip(&component.asymmetry);
+                asymmetries.for_each(|(point, g)| point.push(((1.0 + g) / (1.0 - g)).ln()));
+            }
+        }
+        let wanted = match scene.integrator.techniques {
+            Some(count) => count as usize,
+            None if ratio < SMALL_RATIO => 1,
+            None => 1 + ratio.log2().ceil() as usize,
+        };
+        match wanted.min(MOST_TECHNIQUES).min(channels) {
+            0 | 1 => Deciding(Vec::new()),
+            count => Deciding(farthest_apart(&points, count)),
+        }
+    }
+
+    /// T.
+    fn count(&self) -> usize {
+        self.0.len().max(1)
+    }
+
+    /// What each technique takes of a quantity of every channel.
+    fn values(&self, by_channel: &[f64]) -> Vec<f64> {
+        match self.0.is_empty() {
+            true => vec![mean_of(by_channel)],
+            false => self.0.iter().map(|&k| by_channel[k]).collect(),
+        }
+    }
+
+    /// The same of what scatters, so that some technique goes wherever any channel does.
+    fn covering(&self, by_channel: &[f64]) -> Vec<f64> {
+        let mut values = self.values(by_channel);
+        if values.iter().all(|value| *value == 0.0) {
+            values[0] = mean_of(by_channel);
+        }
+        values
+    }
+}
+
+/// `count` of the points, in order of choice: the two farthest apart, then always the one that is farthest from those chosen; of equal
+/// ones the first.
+fn farthest_apart(points: &[Vec<f64>], count: usize) -> Vec<usize> {
+    let distance = |a: usize, b: usize| -> f64 { points[a].iter().zip(&points[b]).map(|(a, b)| (a - b).powi(2)).sum() };
+    let mut best = (f64::NEG_INFINITY, 0, 0);
+    for a in 0..points.len() {
+        for b in a + 1..points.len() {
+            let apart = distance(a, b);
+            if apart > best.0 {
+                best = (apart, a, b);
+            }
+        }
+    }
+    let mut chosen = vec![best.1, best.2];
+    let mut nearest: Vec<f64> = (0..points.len()).map(|i| distance(i, chosen[0]).min(distance(i, chosen[1]))).collect();
+    while chosen.len() < count {
+        let farther = |best: usize, i: usize| if nearest[i] > nearest[best] { i } else { best };
+        let next = (0..points.len()).filter(|i| !chosen.contains(i)).reduce(farther);
+        let Some(next) = next else { break };
+        chosen.push(next);
+        nearest.iter_mut().enumerate().for_each(|(i, least)| *least = least.min(distance(i, next)));
+    }
+    chosen
+}
+
+/// The place of a wavelength among the columns of a table; the outermost hold.
+fn axis(table: &PhaseTable) -> Curve {
+    match table.nm.len() {
+        1 => Curve::Constant(0.0),
+        count => {
+            let value = (0..count).map(|i| i as f64).collect();
+            Curve::Linear { nm: table.nm.clone(), value, outside: Outside::Hold }
+        }
+    }
+}
+
+/// The tables of a scene, each once.
+#[derive(Default)]
+struct Tables(Vec<PhaseTable>);
+
+impl Tables {
+    fn number(&mut self, table: &PhaseTable) -> u32 {
+        let known = self.0.iter().position(|known| known == table);
+        known.unwrap_or_else(|| {
+            self.0.push(table.clone());
+            self.0.len() - 1
+        }) as u32
+    }
+
+    /// The word of each, the first of all being `first`; then of each its numbers of rows and columns, the angles in degrees, the columns,
+    /// and for each technique its phase function and the share of directions up to each row.
+    fn words(&self, scene: &Scene, deciding: &Deciding, first: u32) -> Vec<u32> {
+        let mut words = vec![0; self.0.len()];
+        for (number, table) in self.0.iter().enumerate() {
+            words[number] = first + words.len() as u32;
+            let degrees = rows(&table.degrees);
+            words.extend([degrees.len() as u32, table.nm.len() as u32]);
+            let column = |nm: f64| -> Vec<f64> { degrees.iter().map(|&degrees| table.value(degrees, nm)).collect() };
+            let columns = table.nm.iter().flat_map(|nm| column(*nm));
+            let mut numbers: Vec<f64> = degrees.iter().copied().chain(columns).collect();
+            let centres: Vec<f64> = (0..scene.channels.len()).map(|k| scene.channels.centre(k)).collect();
+            let mut mean = vec![0.0; degrees.len()];
+            for &nm in &centres {
+                mean.iter_mut().zip(column(nm)).for_each(|(mean, value)| *mean += value / centres.len() as f64);
+            }
+            let own = |k: &usize| {
+                column(centres[*k])
+                    .iter()
+                    .zip(&mean)
+                    .map(|(own, mean)| OWN_SHARE * own + (1.0 - OWN_SHARE) * mean)
+                    .collect()
+            };
+            let techniques =
+                if deciding.0.is_empty() { vec![mean.clone()] } else { deciding.0.iter().map(own).collect() };
+            for technique in techniques {
+                let shares = shares(&degrees, &technique);
+                numbers.extend(technique.into_iter().chain(shares));
+            }
+            words.extend(numbers.into_iter().map(|value| (value as f32).to_bits()));
+        }
+        words
+    }
+}
+
+/// Angles with others between them where they are far apart: a function that is linear between some is so between more.
+fn rows(degrees: &[f64]) -> Vec<f64> {
+    let mut all = vec![degrees[0]];
+    for pair in degrees.windows(2) {
+        let parts = ((pair[1] - pair[0]) / ROW_DEGREES).ceil().max(1.0);
+        all.extend((1..=parts as u32).map(|i| pair[0] + (pair[1] - pair[0]) * f64::from(i) / parts));
+    }
+    all
+}
+
+/// The share of directions up to each angle, of a phase function and a sine that are linear between `degrees`.
+fn shares(degrees: &[f64], values: &[f64]) -> Vec<f64> {
+    let sine = |i: usize| degrees[i].to_radians().sin().max(0.0);
+    let mut sums = vec![0.0];
+    for i in 1..degrees.len() {
+        let [p, q] = [values[i - 1], values[i]];
+        let [s, t] = [sine(i - 1), sine(i)];
+        let part = (degrees[i] - degrees[i - 1]) * (p * s + 0.5 * (p * t + q * s) + q * t) / 3.0;
+        sums.push(sums[i - 1] + part);
+    }
+    let all = sums[sums.len() - 1];
+    sums.iter_mut().for_each(|sum| *sum /= all);
+    sums
+}
