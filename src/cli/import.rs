@@ -19,12 +19,13 @@ use crate::{Result, import};
 Examples:
   spectile import scene.xml -o room                  a scene of Mitsuba 3
   spectile import scene.pbrt -o room                 one of pbrt-v4
+  spectile import scene.glb -o room                  one of glTF 2.0
   spectile render room/scene.toml -o room.zarr       then render it
   spectile render room/scene.toml -o room.zarr --set channels.equal.count=400
 
 Which things of which format are read is in docs/IMPORT.md.")]
 pub struct Args {
-    /// The scene: Mitsuba 3 (.xml) or pbrt-v4 (.pbrt)
+    /// The scene: Mitsuba 3 (.xml), pbrt-v4 (.pbrt) or glTF 2.0 (.gltf, .glb)
     pub scene: PathBuf,
 
     /// The folder to make; it must not be there

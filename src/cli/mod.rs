@@ -59,7 +59,7 @@ Examples:
   spectile converge scene.toml -o report                error against run time, as a report
   spectile bench -o report                              evaluators side by side, as a report
   spectile stress                                       stiff and extreme cases against their answers
-  spectile import scene.xml -o folder                   a scene of Mitsuba 3 as one of Spectile's
+  spectile import scene.xml -o folder                   a scene of Mitsuba, pbrt or glTF as one of Spectile's
   spectile help scene                                   every section and key of a scene file
 
 Radiance is in W m-2 sr-1 nm-1, wavelengths are in nm (vacuum), pixels are counted from 0 at the top left.

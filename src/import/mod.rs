@@ -4,6 +4,7 @@
 
 mod environment;
 mod geometry;
+mod gltf;
 mod metals;
 mod mitsuba;
 mod pbrt;
@@ -51,9 +52,11 @@ pub fn import(source: &Path, folder: &Path) -> Result<Summary> {
     let read = match extension.as_str() {
         "xml" => mitsuba::read,
         "pbrt" => pbrt::read,
+        "gltf" | "glb" => gltf::read,
         _ => {
             return Err(Error::Usage(format!(
-                "{}: scenes of Mitsuba 3 (.xml) and pbrt-v4 (.pbrt) are imported; this name ends otherwise",
+                "{}: scenes of Mitsuba 3 (.xml), pbrt-v4 (.pbrt) and glTF 2.0 (.gltf, .glb) are imported; this name ends \
+                 otherwise",
                 source.display()
             )));
         }

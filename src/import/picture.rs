@@ -38,13 +38,26 @@ impl Picture {
     pub fn read(path: &Path) -> std::result::Result<Picture, Box<Problem>> {
         let problem = |message: String| Box::new(Problem { file: path.to_owned(), message, ..Problem::default() });
         let bytes = std::fs::read(path).map_err(|e| problem(format!("cannot be read: {e}")))?;
+        Picture::parse(&bytes).map_err(problem)
+    }
+
+    /// [`Self::read`] on the content of a file.
+    ///
+    /// # Errors
+    /// A sentence.
+    pub fn parse(bytes: &[u8]) -> std::result::Result<Picture, String> {
         let is_exr = bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]);
-        let read = match &bytes[..] {
-            [b'P', b'F' | b'f', b'\n' | b'\r' | b' ', ..] => pfm(&bytes),
-            _ if is_exr => exr(&bytes),
-            _ => others(&bytes),
-        };
-        read.map_err(problem)
+        match bytes {
+            [b'P', b'F' | b'f', b'\n' | b'\r' | b' ', ..] => pfm(bytes),
+            _ if is_exr => exr(bytes),
+            _ => others(bytes),
+        }
+    }
+
+    /// The alpha of a PNG, if it has some, as a number for each texel.
+    pub fn alpha(bytes: &[u8]) -> Option<Vec<f32>> {
+        let image = planes::parse(bytes).ok()?;
+        image.planes.iter().find(|plane| image.is_alpha(plane)).map(|plane| plane.samples.clone())
     }
 
     /// Linear values of each texel.

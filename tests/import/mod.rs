@@ -1,5 +1,6 @@
 //! `spectile import`: what scenes of other programs become.
 
+mod gltf;
 mod mitsuba;
 mod pbrt;
 mod spoilt;

@@ -119,6 +119,7 @@ fn many(name: &str, valid: &str, cases: usize) {
 fn spoilt_scenes_are_imported_or_refused() {
     many("scene.xml", MITSUBA, 300);
     many("scene.pbrt", PBRT, 300);
+    many("scene.gltf", super::gltf::SCENE, 300);
 }
 
 #[test]

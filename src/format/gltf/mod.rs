@@ -9,6 +9,7 @@ use std::path::{Component, Path};
 
 use gltf_json::Root;
 
+pub use geometry::Placed;
 pub use gltf_json as json;
 
 use crate::error::Problem;

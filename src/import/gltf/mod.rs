@@ -1,0 +1,275 @@
+//! Scenes of glTF 2.0: meshes where their nodes put them, materials, lights and cameras.
+
+mod material;
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use glam::{DAffine3, DVec3};
+
+use self::material::Look;
+use super::geometry::Mesh;
+use super::report::{Fate, Place};
+use super::scene::{Scene, Section};
+use super::text;
+use crate::format::gltf::json::camera::Type as CameraType;
+use crate::format::gltf::json::extensions::scene::khr_lights_punctual::Type as LightType;
+use crate::format::gltf::json::mesh::Semantic;
+use crate::format::gltf::json::validation::Checked;
+use crate::format::gltf::{File, Placed, json, parse};
+use crate::format::mesh::{self, Part};
+use crate::{Error, Result};
+
+/// cd/m² of light whose luminance is 1 here: 683 lm/W times ∫ȳ dλ = 106.857 nm.
+pub const CANDELA: f64 = 683.002 * 106.857;
+
+struct Importer<'f, 's> {
+    file: &'f File,
+    scene: &'s mut Scene,
+    looks: HashMap<Option<usize>, Look>,
+}
+
+/// Translates the scene in the file `source`.
+pub fn read(source: &Path, scene: &mut Scene) -> Result<()> {
+    let bytes = mesh::content(source)?;
+    let file = parse(&bytes, source)?;
+    let mut importer = Importer { file: &file, scene, looks: HashMap::new() };
+    importer.all()
+}
+
+impl Importer<'_, '_> {
+    fn place(&self, path: impl Into<String>) -> Place {
+        Place { file: self.file.path.clone(), line: None, path: Some(path.into()) }
+    }
+
+    fn error(&self, message: String) -> Error {
+        self.file.problem(message).into()
+    }
+
+    fn all(&mut self) -> Result<()> {
+        let nodes = self.file.nodes(None).map_err(|message| self.error(message))?;
+        let mut bounds = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+        if nodes.iter().any(|placed| self.file.root.nodes[placed.node].mesh.is_some()) {
+            let read = self.file.mesh(None).map_err(|message| self.error(message))?;
+            if read.without_surface > 0 {
+                let what = format!("{} primitives of points and lines, which have no surface", read.without_surface);
+                self.scene.report.say(Fate::LeftOut, None, what);
+            }
+            for part in &read.parts {
+                for p in part.positions.iter().copied().map(DVec3::from_array) {
+                    bounds = [bounds[0].min(p), bounds[1].max(p)];
+                }
+                self.part(part)?;
+            }
+        }
+        for placed in &nodes {
+            self.light(placed)?;
+        }
+        self.cameras(&nodes, bounds)?;
+        self.scene.integrator = Some(Section::new("[integrator]").with("max_bounces", "8"));
+        self.scene.report.chosen("8 bounces: glTF has no integrators");
+        let is_lit = !self.scene.lights.is_empty()
+            || self.scene.objects.iter().any(|object| object.entries.iter().any(|(key, _)| key == "emission"));
+        if !is_lit {
+            let section =
+                Section::new("[environment]").comment("chosen: the file has no lights").with("radiance", "1.0");
+            self.scene.environment = Some(section);
+            self.scene.report.chosen("a uniform sky of radiance 1, as the file has no lights");
+        }
+        let root = &self.file.root;
+        for (what, count) in [("animation", root.animations.len()), ("skin", root.skins.len())] {
+            if count > 0 {
+                self.scene.report.say(Fate::LeftOut, None, format!("{count} {what}s: everything is where its node is"));
+            }
+        }
+        const READ: [&str; 7] = [
+            "KHR_lights_punctual",
+            "KHR_materials_emissive_strength",
+            "KHR_materials_ior",
+            "KHR_materials_transmission",
+            "KHR_materials_volume",
+            "KHR_texture_transform",
+            "KHR_mesh_quantization",
+        ];
+        for name in root.extensions_used.iter().filter(|name| !READ.contains(&name.as_str())) {
+            let shown: String = name.chars().take(60).collect();
+            self.scene.report.say(Fate::LeftOut, None, format!("the extension {}", shown.escape_debug()));
+        }
+        Ok(())
+    }
+
+    fn part(&mut self, part: &Part) -> Result<()> {
+        let mesh::Place::Json(path) = &part.place else { return Ok(()) };
+        // `meshes[I].primitives[J]`.
+        let numbers: Vec<usize> = path.split(['[', ']']).filter_map(|word| word.parse().ok()).collect();
+        let [m, p] = numbers[..] else { return Ok(()) };
+        let primitive = &self.file.root.meshes[m].primitives[p];
+        if primitive.attributes.contains_key(&Checked::Valid(Semantic::Colors(0))) {
+            self.scene.report.left_out(self.place(path.clone()), "colours of vertices (COLOR_0)");
+        }
+        let look = self.look(primitive.material.map(|material| material.value()))?;
+        let whole = mesh::Mesh { parts: vec![part.clone()], ..mesh::Mesh::default() };
+        let mut shape = Mesh::of_file(&whole);
+        let (mut material, mut emission) = (look.material.clone(), look.emission.clone());
+        if look.textured && shape.uv.is_none() {
+            // Textures need coordinates: without them glTF looks at (0, 0).
+            let what = "a textured material on a mesh without TEXCOORD_0 as its mean";
+            self.scene.report.approximated(self.place(path.clone()), what);
+            (material, emission) = (look.plain.clone(), look.plain_emission.clone());
+        }
+        if !look.textured {
+            shape.uv = None;
+        }
+        let name =
+            part.labels.object.clone().or(self.file.root.meshes[m].name.clone()).unwrap_or_else(|| format!("mesh {m}"));
+        let file = shape.write(self.scene, &name)?;
+        let shown: String = name.chars().take(60).collect();
+        let mut object = Section::new("[[objects]]").comment(shown.escape_debug().to_string());
+        object.set("mesh", text::quoted(&file));
+        object.set("material", text::quoted(&material));
+        if let Some(emission) = emission {
+            object.set("emission", emission);
+        }
+        self.scene.objects.push(object);
+        self.scene.report.translated("primitive", self.place(path.clone()));
+        Ok(())
+    }
+
+    fn light(&mut self, placed: &Placed) -> Result<()> {
+        let node = &self.file.root.nodes[placed.node];
+        let Some(of_node) = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref()) else {
+            return Ok(());
+        };
+        let path = format!("nodes[{}]", placed.node);
+        let index = of_node.light.value();
+        let lights = self.file.root.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
+        let light = lights.and_then(|all| all.lights.get(index));
+        let light = light.ok_or_else(|| self.error(format!("`{path}` names light {index}, which does not exist")))?;
+        let colour = light.color.map(f64::from);
+        let amount = f64::from(light.intensity);
+        if colour.iter().any(|v| !(0.0..1e30).contains(v)) || !(0.0..1e30).contains(&amount) {
+            return Err(self.error(format!("light {index} has a colour or intensity that is negative or not finite")));
+        }
+        let light_text = format!("{{ rgb = {}, scale = {} }}", text::list(colour), text::rounded(amount / CANDELA));
+        let position = text::vector(placed.to_world.translation);
+        let direction = placed.to_world.matrix3 * DVec3::NEG_Z;
+        let direction = text::vector(direction.normalize_or(DVec3::NEG_Z));
+        let (key, value) = match light.type_ {
+            Checked::Valid(LightType::Point) => {
+                ("point", format!("{{ position = {position}, intensity = {light_text} }}"))
+            }
+            Checked::Valid(LightType::Directional) => {
+                ("directional", format!("{{ direction = {direction}, irradiance = {light_text} }}"))
+            }
+            Checked::Valid(LightType::Spot) => {
+                let [inner, outer] = light.spot.as_ref().map_or([0.0, std::f64::consts::FRAC_PI_4], |spot| {
+                    [spot.inner_cone_angle, spot.outer_cone_angle].map(f64::from)
+                });
+                let half = outer.to_degrees().clamp(1e-3, 90.0);
+                let falloff = inner.to_degrees().clamp(0.0, half);
+                self.scene.report.approximated(
+                    self.place(path.clone()),
+                    "the edge of a spot: t² (3 - 2 t) for t², t linear in the cosine",
+                );
+                let angles = format!("half_angle = {}, falloff = {}", text::rounded(half), text::rounded(falloff));
+                (
+                    "spot",
+                    format!("{{ position = {position}, direction = {direction}, intensity = {light_text}, {angles} }}"),
+                )
+            }
+            Checked::Invalid => return Err(self.error(format!("light {index} has a type that is unknown"))),
+        };
+        if light.range.is_some() {
+            self.scene.report.left_out(self.place(path.clone()), "the `range` of a light");
+        }
+        self.scene.lights.push(Section::new("[[lights]]").with(key, value));
+        self.scene.report.translated(format!("light `{key}`"), self.place(path));
+        Ok(())
+    }
+
+    fn cameras(&mut self, nodes: &[Placed], bounds: [DVec3; 2]) -> Result<()> {
+        let mut with = nodes.iter().filter(|placed| self.file.root.nodes[placed.node].camera.is_some());
+        let Some(first) = with.next() else {
+            self.framed(bounds);
+            return Ok(());
+        };
+        let others: Vec<usize> = with.map(|placed| placed.node).collect();
+        for node in others {
+            self.scene.report.left_out(self.place(format!("nodes[{node}]")), "cameras after the first");
+        }
+        let index = self.file.root.nodes[first.node].camera.map_or(0, |camera| camera.value());
+        let found = self.file.root.cameras.get(index);
+        let camera = found
+            .ok_or_else(|| self.error(format!("`nodes[{}]` names camera {index}, which does not exist", first.node)))?;
+        self.camera(&first.to_world, camera, index)
+    }
+
+    fn camera(&mut self, to_world: &DAffine3, camera: &json::Camera, index: usize) -> Result<()> {
+        let matrix = to_world.matrix3;
+        let (forward, up) = (-matrix.z_axis.normalize_or(DVec3::Z), matrix.y_axis.normalize_or(DVec3::Y));
+        let kind = match camera.type_ {
+            Checked::Valid(CameraType::Perspective) => "perspective",
+            Checked::Valid(CameraType::Orthographic) => "orthographic",
+            Checked::Invalid => return Err(self.error(format!("`cameras[{index}].type` is unknown"))),
+        };
+        let mut section = Section::new(format!("[camera.{kind}]"));
+        section.set("position", text::vector(to_world.translation));
+        section.set("look_at", text::vector(to_world.translation + forward));
+        section.set("up", text::vector(up));
+        let aspect = match (&camera.perspective, &camera.orthographic) {
+            (Some(perspective), _) if kind == "perspective" => {
+                let fov = f64::from(perspective.yfov).to_degrees();
+                if !(0.0 < fov && fov < 180.0) {
+                    return Err(self.error(format!("`cameras[{index}].perspective.yfov` must be between 0 and π")));
+                }
+                section.set("fov", text::rounded(fov));
+                section.set("fov_axis", "\"y\"");
+                perspective.aspect_ratio.map_or(16.0 / 9.0, f64::from)
+            }
+            (_, Some(orthographic)) if kind == "orthographic" => {
+                let [x, y] = [orthographic.xmag, orthographic.ymag].map(|mag| f64::from(mag).abs());
+                if !(x > 0.0 && y > 0.0 && x.is_finite() && y.is_finite()) {
+                    return Err(
+                        self.error(format!("`cameras[{index}].orthographic` must have xmag and ymag other than 0"))
+                    );
+                }
+                section.set("width", text::rounded(2.0 * x * matrix.x_axis.length()));
+                x / y
+            }
+            _ => return Err(self.error(format!("`cameras[{index}]` has no `{kind}`"))),
+        };
+        if forward.cross(up).dot(matrix.x_axis) < 0.0 {
+            section.set("flip_x", "true");
+        }
+        self.scene.report.translated(format!("camera `{kind}`"), self.place(format!("cameras[{index}]")));
+        self.scene.camera = Some(section);
+        self.film(aspect);
+        Ok(())
+    }
+
+    fn film(&mut self, aspect: f64) {
+        const HEIGHT: f64 = 720.0;
+        let width = (HEIGHT * aspect).round().clamp(1.0, 65_536.0);
+        let section = Section::new("[film]").with("width", format!("{width}")).with("height", format!("{HEIGHT}"));
+        self.scene.film = Some(section.with("filter", "\"gaussian\""));
+        self.scene.report.chosen(format!("{width} x {HEIGHT} pixels: glTF has no films"));
+    }
+
+    /// A camera that sees everything, from the front, the right and above.
+    fn framed(&mut self, [low, high]: [DVec3; 2]) {
+        let (middle, radius) = match low.cmple(high).all() {
+            true => (0.5 * (low + high), (0.5 * (high - low).length()).max(1e-6)),
+            false => (DVec3::ZERO, 1.0),
+        };
+        const FOV: f64 = 40.0;
+        let position = middle + DVec3::new(0.5, 0.4, 1.0).normalize() * radius * 1.1 / (0.5 * FOV.to_radians()).sin();
+        let section =
+            Section::new("[camera.perspective]").comment("chosen: the file has no camera; this one sees everything");
+        let section = section.with("position", text::vector(position)).with("look_at", text::vector(middle));
+        let section =
+            section.with("up", "[0.0, 1.0, 0.0]").with("fov", text::number(FOV)).with("fov_axis", "\"smaller\"");
+        self.scene.camera = Some(section);
+        self.scene.report.chosen("a camera that sees everything, as the file has none");
+        self.film(16.0 / 9.0);
+    }
+}
