@@ -66,7 +66,7 @@ impl Importer<'_> {
                 ] {
                     parameters.get(unread);
                 }
-                self.scene.report.approximated(at.place(), "a `coatedconductor` as its metal without the coat: up to 8 % darker or brighter, with one highlight of two");
+                self.scene.report.approximated(at.place(), "a `coatedconductor` as its metal without the coat: by estimate up to 8 % darker or brighter, with one highlight of two");
                 self.conductor(name, "conductor.", parameters, at)?
             }
             "dielectric" => {
