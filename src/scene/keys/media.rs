@@ -4,8 +4,8 @@ use super::Kind::{File, ListOfTables, Number, Spectrum, Table};
 use super::{CELSIUS, Key, Section};
 use crate::scene::Quantity;
 
-const NOTHING_ELSE: &str = "`absorption`, `species`, `scattering` or `components`";
-const NO_OTHER: &str = "`absorption`, `species` or `scattering`";
+const NOTHING_ELSE: &str = "another of `absorption`, `species`, `scattering`, `components`";
+const NO_OTHER: &str = "another of `absorption`, `species`, `scattering`";
 
 const ABSORPTION: Key =
     Key::required("absorption", Spectrum(Quantity::Absorption), "Absorption coefficient at density 1.");
