@@ -281,16 +281,16 @@ fn clouds_against_the_reference() {
             .sun(DVec3::new(0.3, -1.0, -0.2).normalize(), 0.05, 4.0)
     };
     let bound = Bound { resolution: size::either(0.25, 0.1), allowance: 3e-4 };
-    let samples = size::either([16, 128], [64, 128]);
+    let samples = size::either([16, 128], [64, 256]);
     let warm = cloud(
         lit(Builder::new()).dielectric(sphere(DVec3::new(0.1, 0.0, 0.1), 0.3), 1.4, 0.0),
         0.2,
         Some(Field::Constant(2800.0)),
     );
-    assert_as_reference("warm cloud with a ball of glass", &warm.build(), samples, size::either(3_000, 30_000), bound);
+    assert_as_reference("warm cloud with a ball of glass", &warm.build(), samples, size::either(3_000, 50_000), bound);
     if size::is_full() {
         let cold = cloud(lit(Builder::new()), 0.2, None).build();
-        assert_as_reference("cloud", &cold, samples, 30_000, bound);
+        assert_as_reference("cloud", &cold, samples, 50_000, bound);
     }
 }
 
