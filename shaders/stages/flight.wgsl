@@ -112,7 +112,7 @@ fn is_scattered(path: ptr<function, Path>, list: ptr<function, RecordList>, begi
                     depth += step_depth;
                     done = end;
                 }
-                if (!next_cell(&cells)) {
+                if (!next_cell(&cells, end)) {
                     break;
                 }
             }

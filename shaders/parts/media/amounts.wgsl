@@ -49,7 +49,7 @@ fn amounts_along(first: u32, start: vec3<f32>, to: vec3<f32>, metres: f32) -> ar
             add_amounts(first, voxel_of(cells), metres * (end - done), &amounts);
             done = end;
         }
-        if (!next_cell(&cells)) {
+        if (!next_cell(&cells, end)) {
             break;
         }
     }

@@ -37,12 +37,12 @@ fn most_cells(size: vec3<i32>) -> u32 {
     return u32(size.x + size.y + size.z) + 3u;
 }
 
-// Goes to the next cell; false at the end. What rounding leaves beyond the last cell is nothing.
-fn next_cell(cells: ptr<function, Cells>) -> bool {
-    let next = (*cells).next;
-    if (cell_end(*cells) >= 1.0) {
+// Goes on from a cell that ends at `end`; false at the end of the way. What rounding leaves beyond the last cell is nothing.
+fn next_cell(cells: ptr<function, Cells>, end: f32) -> bool {
+    if (end >= 1.0) {
         return false;
     }
+    let next = (*cells).next;
     let axis = select(select(2u, 1u, next.y <= next.z), 0u, next.x <= next.y && next.x <= next.z);
     (*cells).cell[axis] += (*cells).ahead[axis];
     (*cells).next[axis] += (*cells).pace[axis];
@@ -53,12 +53,27 @@ fn volume_size(first: u32) -> vec3<i32> {
     return vec3<i32>(vec3<u32>(volumes[first + 7u], volumes[first + 8u], volumes[first + 9u]));
 }
 
-// A number that has voxels from word `at` on, or a value after it.
-fn value_in(at: u32, voxel: u32) -> f32 {
-    if (volumes[at] != NONE) {
-        return bitcast<f32>(volumes[volumes[at] + voxel]);
+// A number that has voxels, whose first word `voxels` is, or NONE; then it is `value` everywhere.
+struct Field {
+    voxels: u32,
+    value: f32,
+}
+
+// As words `at` and the next say.
+fn field_at(at: u32) -> Field {
+    return Field(volumes[at], bitcast<f32>(volumes[at + 1u]));
+}
+
+fn field_value(field: Field, voxel: u32) -> f32 {
+    var value = field.value;
+    if (field.voxels != NONE) {
+        value = bitcast<f32>(volumes[field.voxels + voxel]);
     }
-    return bitcast<f32>(volumes[at + 1u]);
+    return value;
+}
+
+fn value_in(at: u32, voxel: u32) -> f32 {
+    return field_value(field_at(at), voxel);
 }
 
 // Where a temperature lies among the columns of an absorber from word `column` on: the lower, the upper, and the share of the upper.

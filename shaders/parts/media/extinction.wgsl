@@ -14,6 +14,12 @@ fn march(record: vec4<u32>, start: vec3<f32>, to: vec3<f32>, quad: u32, s: Spect
         let index = spectrum_value(volumes[first + 5u], quad, s);
         squares = index * index;
     }
+    let list = volumes[first + 6u];
+    let temperature = field_at(first + 3u);
+#if ONE_KIND
+    let density_of_all = field_at(list + 1u);
+    let absorbers_of_all = volumes[list + 4u];
+#endif
     let size = volume_size(first);
     var cells = cells_along(start, to, size);
     var done = 0.0;
@@ -21,17 +27,33 @@ fn march(record: vec4<u32>, start: vec3<f32>, to: vec3<f32>, quad: u32, s: Spect
         let end = cell_end(cells);
         if (end > done) {
             let voxel = voxel_of(cells);
-            let kelvin = value_in(first + 3u, voxel);
-            let taken = coefficients(volumes[first + 6u], voxel, kelvin, quad, s);
+            let kelvin = field_value(temperature, voxel);
+#if ONE_KIND
+            let density = field_value(density_of_all, voxel);
+            var taken = Taken(density * absorption(list + 5u, absorbers_of_all, kelvin, quad, s), vec4<f32>(0.0));
+#if SCATTERS
+            if (volumes[list + 3u] != NONE) {
+                taken.scattering = density * spectrum_value(volumes[list + 3u], quad, s);
+            }
+#endif
+#else
+            let taken = coefficients(list, voxel, kelvin, quad, s);
+#endif
             let length = metres * (end - done);
+#if SCATTERS
             let lost = absorbed(length * (taken.absorption + taken.scattering));
             // Of what is lost on the way only what is absorbed is emitted.
             let both = max(taken.absorption + taken.scattering, vec4<f32>(1.0e-37));
             *radiance += emission * *through * lost * (taken.absorption / both) * squares * planck(wavelength, kelvin);
             *through *= exp(-length * (taken.absorption + taken.scattering));
+#else
+            let depth = length * taken.absorption;
+            *radiance += emission * *through * absorbed(depth) * squares * planck(wavelength, kelvin);
+            *through *= exp(-depth);
+#endif
             done = end;
         }
-        if (!next_cell(&cells)) {
+        if (!next_cell(&cells, end)) {
             break;
         }
     }
@@ -43,7 +65,29 @@ struct Taken {
     scattering: vec4<f32>,
 }
 
-// Of all kinds of matter in a voxel: absorption linear in temperature between columns, the ends held.
+// Of so many absorbers from word `first` on, at density 1: linear in temperature between columns, the ends held.
+fn absorption(first: u32, absorbers: u32, kelvin: f32, quad: u32, s: SpectralSample) -> vec4<f32> {
+    var sum = vec4<f32>(0.0);
+    var at = first;
+    for (var m = 0u; m < absorbers; m += 1u) {
+        let strength = bitcast<f32>(volumes[at]);
+        let columns = volumes[at + 1u];
+        let column = at + 2u;
+        at = column + 2u * columns;
+        let between = between_columns(column, columns, kelvin);
+        var value = spectrum_value(volumes[column + 2u * between.high + 1u], quad, s);
+        if (between.low != between.high) {
+            let under = spectrum_value(volumes[column + 2u * between.low + 1u], quad, s);
+            value = under + between.share * (value - under);
+        }
+        sum += strength * value;
+    }
+    return sum;
+}
+
+#if ONE_KIND
+#else
+// Of all kinds of matter in a voxel.
 fn coefficients(list: u32, voxel: u32, kelvin: f32, quad: u32, s: SpectralSample) -> Taken {
     var sum = Taken(vec4<f32>(0.0), vec4<f32>(0.0));
     var at = list + 1u;
@@ -55,20 +99,12 @@ fn coefficients(list: u32, voxel: u32, kelvin: f32, quad: u32, s: SpectralSample
         if (scattering != NONE) {
             sum.scattering += density * spectrum_value(scattering, quad, s);
         }
+        sum.absorption += density * absorption(at, absorbers, kelvin, quad, s);
         for (var m = 0u; m < absorbers; m += 1u) {
-            let strength = bitcast<f32>(volumes[at]) * density;
-            let columns = volumes[at + 1u];
-            let column = at + 2u;
-            at = column + 2u * columns;
-            let between = between_columns(column, columns, kelvin);
-            var value = spectrum_value(volumes[column + 2u * between.high + 1u], quad, s);
-            if (between.low != between.high) {
-                let under = spectrum_value(volumes[column + 2u * between.low + 1u], quad, s);
-                value = under + between.share * (value - under);
-            }
-            sum.absorption += strength * value;
+            at += 2u + 2u * volumes[at + 1u];
         }
     }
     return sum;
 }
+#endif
 #endif

@@ -98,6 +98,7 @@ pub const VOXELS: Part = Part {
     defines: |scene, _, defines| {
         let Some(media) = &scene.media else { return };
         defines.set("GRIDS", true).set("MOST_COLUMNS", media.most_columns).constant("MOST_TERMS", media.most_terms);
+        defines.set("ONE_KIND", media.most_kinds <= 1);
     },
     example: Some(|exhibit| exhibit.add_voxels()),
     ..Part::NOTHING
@@ -128,6 +129,8 @@ pub struct Media {
     pub camera_is_cut: bool,
     pub most_absorbers: u32,
     pub most_columns: u32,
+    /// Kinds of matter in a volume of voxels.
+    pub most_kinds: u32,
     /// Spectra of a volume of voxels whose amounts on a way tell its transmittance.
     pub most_terms: u32,
     /// Stretches of one way, voxels that it may go through, and those among them that evaluation marches through.
@@ -209,6 +212,7 @@ impl Media {
             camera_is_cut: false,
             most_absorbers: 0,
             most_columns: 0,
+            most_kinds: 0,
             most_terms: 1,
             stretches: (2 * volumes.len() as u32 + 1).clamp(4, MOST_STRETCHES),
             cells: 0,
@@ -361,6 +365,7 @@ impl Media {
     /// Lists the kinds of matter of a medium of voxels, and gives their number of terms.
     fn components(&mut self, scene: &Scene, medium: &Medium, densities: &[[u32; 2]]) -> u32 {
         self.volumes.push(medium.components.len() as u32);
+        self.most_kinds = self.most_kinds.max(medium.components.len() as u32);
         let (mut terms, mut absorbers) = (0, 0);
         for (component, density) in medium.components.iter().zip(densities) {
             self.note_voxels(self.volumes.len(), density[0]);
