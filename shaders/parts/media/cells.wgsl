@@ -83,14 +83,20 @@ struct Between {
     share: f32,
 }
 
-fn between_columns(column: u32, columns: u32, kelvin: f32) -> Between {
+// How many columns are of lower temperatures.
+fn columns_below(column: u32, columns: u32, kelvin: f32) -> u32 {
     // Without a loop: an invocation may have 32,768 iterations in all, and walks through cells take them.
-    var above = 0u;
+    var below = 0u;
 #repeat MOST_COLUMNS c
-    above += select(0u, 1u, bitcast<f32>(volumes[column + 2u * min($cu, columns - 1u)]) < kelvin && $cu < columns);
+    below += select(0u, 1u, bitcast<f32>(volumes[column + 2u * min($cu, columns - 1u)]) < kelvin && $cu < columns);
 #end
-    let high = min(above, columns - 1u);
-    let low = max(above, 1u) - 1u;
+    return below;
+}
+
+fn between_columns(column: u32, columns: u32, kelvin: f32) -> Between {
+    let below = columns_below(column, columns, kelvin);
+    let high = min(below, columns - 1u);
+    let low = max(below, 1u) - 1u;
     let a = bitcast<f32>(volumes[column + 2u * low]);
     let b = bitcast<f32>(volumes[column + 2u * high]);
     return Between(low, high, select(1.0, (kelvin - a) / (b - a), low != high));

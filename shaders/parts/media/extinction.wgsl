@@ -74,11 +74,15 @@ fn absorption(first: u32, absorbers: u32, kelvin: f32, quad: u32, s: SpectralSam
         let columns = volumes[at + 1u];
         let column = at + 2u;
         at = column + 2u * columns;
-        let between = between_columns(column, columns, kelvin);
-        var value = spectrum_value(volumes[column + 2u * between.high + 1u], quad, s);
-        if (between.low != between.high) {
-            let under = spectrum_value(volumes[column + 2u * between.low + 1u], quad, s);
-            value = under + between.share * (value - under);
+        let above = columns_below(column, columns, kelvin);
+        let high = min(above, columns - 1u);
+        let low = max(above, 1u) - 1u;
+        var value = spectrum_value(volumes[column + 2u * high + 1u], quad, s);
+        if (low != high) {
+            let a = bitcast<f32>(volumes[column + 2u * low]);
+            let b = bitcast<f32>(volumes[column + 2u * high]);
+            let under = spectrum_value(volumes[column + 2u * low + 1u], quad, s);
+            value = under + (kelvin - a) / (b - a) * (value - under);
         }
         sum += strength * value;
     }
