@@ -29,6 +29,39 @@ const FACES: [[[f64; 3]; 4]; 6] = [
 /// From Spectile's own axes of a sphere, whose poles are ±y, to those of Mitsuba's, whose are ±z, with the same longitudes.
 const POLES: DMat3 = DMat3::from_cols(DVec3::NEG_Y, DVec3::Z, DVec3::NEG_X);
 
+/// A shape on its way to an object.
+struct Placing<'a, 'n> {
+    plugin: &'a Plugin<'n>,
+    object: Section,
+    /// What its mesh is called, if it becomes one.
+    name: String,
+    to_world: DAffine3,
+    /// Whether its texture coordinates matter.
+    textured: bool,
+    /// Whether its other side is the front.
+    flipped: bool,
+}
+
+impl Placing<'_, '_> {
+    /// The object of a mesh file.
+    fn of_mesh(self, path: &str) -> Section {
+        let object = self.object.with("mesh", text::quoted(path));
+        match self.to_world == DAffine3::IDENTITY {
+            true => object,
+            false => object.with("transform", text::transform(&self.to_world)),
+        }
+    }
+}
+
+/// Normals as Mitsuba would have them.
+fn shade(mesh: &mut Mesh, face_normals: bool) {
+    match (face_normals, &mesh.normals) {
+        (true, _) => mesh.normals = None,
+        (false, None) => mesh.smooth(),
+        _ => {}
+    }
+}
+
 impl<'n> Importer<'n, '_> {
     /// Adds a shape within `outer`; shapes of a group may have a material of their instance.
     pub fn shape(&mut self, node: &'n Node, outer: &DAffine3, depth: Option<usize>) -> Result<()> {
@@ -149,8 +182,8 @@ impl<'n> Importer<'n, '_> {
         textured: bool,
         flipped: bool,
     ) -> Result<Option<Section>> {
-        let name = self.name_of(plugin.node);
-        let object = Section::new("[[objects]]");
+        let (name, object) = (self.name_of(plugin.node), Section::new("[[objects]]"));
+        let placing = |object: Section| Placing { plugin, object, name, to_world: *to_world, textured, flipped };
         let point = |x: f64, y: f64| to_world.transform_point3(DVec3::new(x, y, 0.0));
         let mirrored = to_world.matrix3.determinant() < 0.0;
         match plugin.kind() {
@@ -170,7 +203,7 @@ impl<'n> Importer<'n, '_> {
                     normals: None,
                     triangles: vec![[0, 1, 2], [0, 2, 3]],
                 };
-                self.put_mesh(object, mesh, to_world, flipped, &name).map(Some)
+                self.put_mesh(placing(object), mesh).map(Some)
             }
             "cube" if !textured && !flipped => {
                 let object = object.with("cube", "{ min = [-1.0, -1.0, -1.0], max = [1.0, 1.0, 1.0] }");
@@ -181,7 +214,7 @@ impl<'n> Importer<'n, '_> {
                 let triangles = (0..6u32).flat_map(|f| [[0, 1, 2], [3, 0, 2]].map(|t| t.map(|i| 4 * f + i))).collect();
                 let positions = FACES.iter().flatten().copied().map(DVec3::from_array).collect();
                 let mesh = Mesh { positions, uv: Some(uv.repeat(6)), normals: None, triangles };
-                self.put_mesh(object, mesh, to_world, flipped, &name).map(Some)
+                self.put_mesh(placing(object), mesh).map(Some)
             }
             "sphere" => {
                 let (center, radius) =
@@ -191,11 +224,12 @@ impl<'n> Importer<'n, '_> {
                 }
                 let local =
                     DAffine3::from_scale_rotation_translation(DVec3::splat(radius), glam::DQuat::IDENTITY, center);
-                self.sphere(plugin, object, &(*to_world * local), textured, flipped, &name).map(Some)
+                let placing = placing(object);
+                self.sphere(Placing { to_world: placing.to_world * local, ..placing }).map(Some)
             }
-            "disk" => self.disk(plugin, object, to_world, textured, flipped, &name).map(Some),
-            "cylinder" => self.cylinder(plugin, object, to_world, textured, flipped, &name).map(Some),
-            "obj" | "ply" | "serialized" => self.file(plugin, object, to_world, flipped, &name).map(Some),
+            "disk" => self.disk(placing(object)).map(Some),
+            "cylinder" => self.cylinder(placing(object)).map(Some),
+            "obj" | "ply" | "serialized" => self.file(placing(object)).map(Some),
             other => {
                 self.scene.report.left_out(plugin.place(), format!("the shape `{}`", values::shown(other)));
                 Ok(None)
@@ -203,53 +237,36 @@ impl<'n> Importer<'n, '_> {
         }
     }
 
-    fn put_mesh(
-        &mut self,
-        object: Section,
-        mut mesh: Mesh,
-        to_world: &DAffine3,
-        flipped: bool,
-        name: &str,
-    ) -> Result<Section> {
-        if flipped {
+    fn put_mesh(&mut self, placing: Placing<'_, 'n>, mut mesh: Mesh) -> Result<Section> {
+        if placing.flipped {
             mesh.reverse();
         }
-        let path = mesh.write(self.scene, name)?;
-        let object = object.with("mesh", text::quoted(&path));
-        Ok(match *to_world == DAffine3::IDENTITY {
-            true => object,
-            false => object.with("transform", text::transform(to_world)),
-        })
+        let path = mesh.write(self.scene, &placing.name)?;
+        Ok(placing.of_mesh(&path))
     }
 
     /// The unit sphere under `to_world`.
-    fn sphere(
-        &mut self,
-        plugin: &Plugin<'n>,
-        object: Section,
-        to_world: &DAffine3,
-        textured: bool,
-        flipped: bool,
-        name: &str,
-    ) -> Result<Section> {
-        match similarity(to_world.matrix3) {
-            Some(radius) if !textured && !flipped => {
-                let center = text::vector(to_world.translation);
-                Ok(object.with("sphere", format!("{{ center = {center}, radius = {} }}", text::rounded(radius))))
+    fn sphere(&mut self, placing: Placing<'_, 'n>) -> Result<Section> {
+        match similarity(placing.to_world.matrix3) {
+            Some(radius) if !placing.textured && !placing.flipped => {
+                let center = text::vector(placing.to_world.translation);
+                Ok(placing
+                    .object
+                    .with("sphere", format!("{{ center = {center}, radius = {} }}", text::rounded(radius))))
             }
-            Some(_) if !flipped => {
-                let turned = *to_world * DAffine3::from_mat3(POLES);
-                let object = object.with("sphere", "{ center = [0.0, 0.0, 0.0], radius = 1.0 }");
+            Some(_) if !placing.flipped => {
+                let turned = placing.to_world * DAffine3::from_mat3(POLES);
+                let object = placing.object.with("sphere", "{ center = [0.0, 0.0, 0.0], radius = 1.0 }");
                 Ok(object.with("transform", text::transform(&turned)))
             }
             _ => {
-                self.tessellated(plugin);
+                self.tessellated(placing.plugin);
                 let mesh = Mesh::grid(AROUND, AROUND / 2, |u, v| {
                     let (azimuth, polar) = (std::f64::consts::TAU * u, std::f64::consts::PI * v);
                     let p = DVec3::new(polar.sin() * azimuth.cos(), polar.sin() * azimuth.sin(), polar.cos());
                     (p, p, DVec2::new(u, 1.0 - v))
                 });
-                self.put_mesh(object, mesh, to_world, flipped, name)
+                self.put_mesh(placing, mesh)
             }
         }
     }
@@ -261,45 +278,32 @@ impl<'n> Importer<'n, '_> {
         self.scene.report.approximated(plugin.place(), what);
     }
 
-    fn disk(
-        &mut self,
-        plugin: &Plugin<'n>,
-        object: Section,
-        to_world: &DAffine3,
-        textured: bool,
-        flipped: bool,
-        name: &str,
-    ) -> Result<Section> {
-        let normal = (to_world.matrix3.inverse().transpose() * DVec3::Z).normalize() * if flipped { -1.0 } else { 1.0 };
+    fn disk(&mut self, placing: Placing<'_, 'n>) -> Result<Section> {
+        let to_world = &placing.to_world;
+        let normal =
+            (to_world.matrix3.inverse().transpose() * DVec3::Z).normalize() * if placing.flipped { -1.0 } else { 1.0 };
         let (x, y) = (to_world.matrix3.x_axis, to_world.matrix3.y_axis);
         let is_round =
             (x.length() - y.length()).abs() < 1e-5 * x.length() && x.dot(y).abs() < 1e-5 * x.length_squared();
-        if is_round && !textured {
+        if is_round && !placing.textured {
             let center = text::vector(to_world.translation);
             let value = format!(
                 "{{ center = {center}, normal = {}, radius = {} }}",
                 text::vector(normal),
                 text::rounded(x.length())
             );
-            return Ok(object.with("disk", value));
+            return Ok(placing.object.with("disk", value));
         }
-        self.tessellated(plugin);
+        self.tessellated(placing.plugin);
         let mesh = Mesh::grid(AROUND, 8, |u, v| {
             let azimuth = std::f64::consts::TAU * u;
             (v * DVec3::new(azimuth.cos(), azimuth.sin(), 0.0), DVec3::Z, DVec2::new(v, u))
         });
-        self.put_mesh(object, mesh, to_world, flipped, name)
+        self.put_mesh(placing, mesh)
     }
 
-    fn cylinder(
-        &mut self,
-        plugin: &Plugin<'n>,
-        object: Section,
-        to_world: &DAffine3,
-        textured: bool,
-        flipped: bool,
-        name: &str,
-    ) -> Result<Section> {
+    fn cylinder(&mut self, placing: Placing<'_, 'n>) -> Result<Section> {
+        let (plugin, to_world) = (placing.plugin, placing.to_world);
         let (p0, p1) = (plugin.vector("p0")?.unwrap_or(DVec3::ZERO), plugin.vector("p1")?.unwrap_or(DVec3::Z));
         let radius = plugin.float("radius")?.unwrap_or(1.0);
         let axis = (p1 - p0).try_normalize();
@@ -308,10 +312,10 @@ impl<'n> Importer<'n, '_> {
             .ok_or_else(|| plugin.node.problem("a `cylinder` needs a length and a `radius`"))?;
         let length = (p1 - p0).length();
         match similarity(to_world.matrix3) {
-            Some(factor) if !textured && !flipped => {
+            Some(factor) if !placing.textured && !placing.flipped => {
                 let [from, to] = [p0, p1].map(|p| text::vector(to_world.transform_point3(p)));
                 let radius = text::rounded(radius * factor);
-                Ok(object.with("cylinder", format!("{{ from = {from}, to = {to}, radius = {radius} }}")))
+                Ok(placing.object.with("cylinder", format!("{{ from = {from}, to = {to}, radius = {radius} }}")))
             }
             _ => {
                 self.tessellated(plugin);
@@ -321,21 +325,14 @@ impl<'n> Importer<'n, '_> {
                     let normal = turn * DVec3::new(azimuth.cos(), azimuth.sin(), 0.0);
                     (p0 + radius * normal + v * length * axis, normal, DVec2::new(u, v))
                 });
-                self.put_mesh(object, mesh, to_world, flipped, name)
+                self.put_mesh(placing, mesh)
             }
         }
     }
 
     /// A mesh of a file: the file itself where its normals are what Mitsuba would have.
-    fn file(
-        &mut self,
-        plugin: &Plugin<'n>,
-        object: Section,
-        to_world: &DAffine3,
-        flipped: bool,
-        name: &str,
-    ) -> Result<Section> {
-        let node = plugin.node;
+    fn file(&mut self, placing: Placing<'_, 'n>) -> Result<Section> {
+        let (plugin, node) = (placing.plugin, placing.plugin.node);
         let named = plugin.string("filename")?.ok_or_else(|| node.problem("the shape has no `filename`"))?;
         let path = inside(named, node)?;
         let bytes = meshes::content(&path).map_err(|problem| at(node, &problem))?;
@@ -344,35 +341,24 @@ impl<'n> Importer<'n, '_> {
             let index = plugin.whole("shape_index")?.unwrap_or(0).max(0) as usize;
             let mut mesh =
                 serialized::parse(&bytes, index).map_err(|message| node.problem(format!("{named} {message}")))?;
-            match (face_normals, &mesh.normals) {
-                (true, _) => mesh.normals = None,
-                (false, None) => mesh.smooth(),
-                _ => {}
-            }
-            return self.put_mesh(object, mesh, to_world, flipped, name);
+            shade(&mut mesh, face_normals);
+            return self.put_mesh(placing, mesh);
         }
         let format = if plugin.kind() == "obj" { Format::Obj } else { Format::Ply };
         let read = meshes::parse(format, &bytes, &path).map_err(|problem| at(node, &problem))?;
         let has_normals = read.parts.iter().all(|part| part.normals.is_some());
-        if has_normals && !face_normals && !flipped {
+        if has_normals && !face_normals && !placing.flipped {
             let path = self.scene.copy("meshes", &path)?;
-            let object = object.with("mesh", text::quoted(&path));
-            return Ok(match *to_world == DAffine3::IDENTITY {
-                true => object,
-                false => object.with("transform", text::transform(to_world)),
-            });
+            return Ok(placing.of_mesh(&path));
         }
         // The vertices of a PLY are what normals are shared by; those of an OBJ are what its corners have in common.
         let mut mesh = match (&read.parts[..], format) {
             ([part], Format::Ply) => Mesh::of_vertices(part),
             _ => Mesh::of_file(&read),
         };
-        match (face_normals, &mesh.normals) {
-            (true, _) => mesh.normals = None,
-            (false, None) => mesh.smooth(),
-            _ => {}
-        }
-        let stem = Path::new(named).file_stem().map_or(name.to_owned(), |stem| stem.to_string_lossy().into_owned());
-        self.put_mesh(object, mesh, to_world, flipped, &stem)
+        shade(&mut mesh, face_normals);
+        let stem = Path::new(named).file_stem().map(|stem| stem.to_string_lossy().into_owned());
+        let name = stem.unwrap_or_else(|| placing.name.clone());
+        self.put_mesh(Placing { name, ..placing }, mesh)
     }
 }
