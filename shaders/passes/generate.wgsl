@@ -40,11 +40,7 @@ fn append_light(list: ptr<function, RecordList>, path: u32, aim: Aim, way: ptr<f
 // Both directions in turn: the light's, if it is seen, adds its radiance; `choice` goes on, unless it is the only one of its lobe.
 fn scatter(list: ptr<function, RecordList>, path: Path, site: Site, v: Vertex, aim: Aim, choice: ptr<function, DirectionChoice>, overflow: ptr<function, bool>) {
     let material = site.material;
-#if SCATTERS
-    let ab = lobes[select((*choice).lobe, 0u, site.in_matter)].ab;
-#else
     let ab = lobes[(*choice).lobe].ab;
-#endif
     var way: LightWay;
     var advanced = false;
     for (var turn = select(1u, 0u, aim.density > 0.0); turn < 2u; turn += 1u) {
@@ -54,11 +50,12 @@ fn scatter(list: ptr<function, RecordList>, path: Path, site: Site, v: Vertex, a
         }
         let direction = select((*choice).direction, aim.direction, to_light);
 #if SCATTERS
-        var chance: f32;
-        if (site.in_matter) {
-            chance = matter_density(direction);
-        } else {
+        // Of its own turn in matter it is known since that was chosen.
+        var chance = (*choice).density;
+        if (!site.in_matter) {
             chance = bsdf_density(material, v, direction);
+        } else if (to_light) {
+            chance = matter_density(direction);
         }
 #else
         let chance = bsdf_density(material, v, direction);
@@ -237,7 +234,7 @@ fn generate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroup
 #if SCATTERS
     if (site.in_matter) {
         path.ray.origin = site.surface.position;
-        note_turn(path.ray.direction);
+        note_turn();
     }
 #endif
 #lines PASSED

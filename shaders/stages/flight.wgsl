@@ -59,12 +59,7 @@ fn is_scattered(path: ptr<function, Path>, list: ptr<function, RecordList>, begi
     // Rounding must not put a place beyond the end of its stretch.
     let reach = abs(ray.origin) / length(ray.direction);
     let slack = 2.4e-7 * max(reach.x, max(reach.y, reach.z));
-    var depths: Depths;
-    for (var t = 0u; t < TECHNIQUES; t += 1u) {
-        depths.flight[t] = 0.0;
-        depths.lost[t] = 0.0;
-    }
-    depths.least = 0.0;
+    var depths = Depths();
     var depth = 0.0;
     var is_hit = false;
     var rate_there = array<f32, TECHNIQUES>();
@@ -82,7 +77,7 @@ fn is_scattered(path: ptr<function, Path>, list: ptr<function, RecordList>, begi
         if ((volumes[first] & VOLUME_GRID) != 0u) {
             let from_voxels = to_voxels(first, ray.origin + start * ray.direction);
             let end_voxels = to_voxels(first, ray.origin + to * ray.direction);
-            var amounts = no_amounts();
+            var amounts = array<f32, MOST_TERMS>();
             let size = volume_size(first);
             var cells = cells_along(from_voxels, end_voxels, size);
             var done = 0.0;
@@ -90,7 +85,7 @@ fn is_scattered(path: ptr<function, Path>, list: ptr<function, RecordList>, begi
                 let end = cell_end(cells);
                 if (end > done) {
                     let voxel = voxel_of(cells);
-                    var here = no_amounts();
+                    var here = array<f32, MOST_TERMS>();
                     add_amounts(first, voxel, metres * (end - done), &here);
                     let step_depth = rate_of_amounts(first, own, &here);
                     var part = 1.0;

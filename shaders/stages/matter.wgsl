@@ -27,6 +27,10 @@ fn choose_turn(u: vec2<f32>, u_kind: f32) -> DirectionChoice {
     choice.lobe = 0u;
     choice.goes_on = true;
     choice.direction = sample_turn(u, u_kind);
+    choice.density = matter_density(choice.direction);
+#if RATIOS
+    chosen_turn = turns;
+#endif
 #if DISPERSION
     choice.only_channel = NONE;
 #endif
@@ -34,14 +38,11 @@ fn choose_turn(u: vec2<f32>, u_kind: f32) -> DirectionChoice {
 }
 
 // The density of a direction in which the path goes on becomes a part of its densities; its weight has that of all techniques already.
-fn note_turn(direction: vec3<f32>) {
+fn note_turn() {
 #if RATIOS
-    let versine = versine_between(collision.direction, direction);
-    let own = max(turn_density(collision.technique, versine), 1.0e-30);
+    let own = max(chosen_turn[collision.technique], 1.0e-30);
     for (var t = 0u; t < TECHNIQUES; t += 1u) {
-        if (ratios[t] > 0.0) {
-            ratios[t] = min(ratios[t] * turn_density(t, versine) / own, 1.0e30);
-        }
+        ratios[t] = min(ratios[t] * chosen_turn[t] / own, 1.0e30);
     }
 #endif
 }

@@ -2,8 +2,8 @@
 
 use std::borrow::Cow;
 
-use crate::device::accel::{Accel, bounds};
-use crate::device::parts::media::absorption;
+use crate::device::accel::Accel;
+use crate::device::parts::media::{absorption, extent};
 use crate::scene::{Cone, Light, Medium, Profile, Scene, Sides};
 use crate::spectral::{Curve, planck};
 
@@ -88,12 +88,9 @@ fn hot_gases<'a>(scene: &'a Scene, accel: &Accel) -> Vec<Share<'a>> {
             continue;
         }
         seen.push(interior.body);
-        let surface = scene.objects.iter().filter(|o| o.interior.is_some_and(|i| i.body == interior.body));
-        if let Some([min, max]) = bounds(surface.map(|o| &o.shape)) {
-            bodies.push((interior.medium, 0.5 * (max - min).length()));
-        }
+        bodies.push((interior.medium, 0.5 * extent(scene, accel, Some(&interior))));
     }
-    bodies.extend(scene.camera_medium.map(|medium| (medium, accel.space.radius / accel.space.scale)));
+    bodies.extend(scene.camera_medium.map(|medium| (medium, 0.5 * extent(scene, accel, None))));
     let share = |(medium, radius): (usize, f64)| {
         let medium = &scene.media[medium];
         let (kelvin, densities) = typical(medium)?;

@@ -10,7 +10,7 @@ use crate::gpu::buffer;
 use crate::{Error, Result};
 
 /// Bytes of a path between the passes, beside its state and its records: head (8), its places in the queues (8),
-/// throughput under roulette (4).
+/// what roulette and flights have made of its weight (4).
 const HEAD_BYTES: u64 = 8;
 const QUEUE_BYTES: u64 = 8;
 const THROUGHPUT_BYTES: u64 = 4;
@@ -68,7 +68,8 @@ pub struct WavePlan {
     pub spectral_state_size: u32,
     /// Whether evaluation has a dispatch a sample.
     pub sample_by_sample: bool,
-    pub roulette: bool,
+    /// Whether paths keep what has become of their weight (`SCALED`).
+    pub scaled: bool,
     /// Whether roulette decides which paths are evaluated.
     pub thinned: bool,
     pub limits: DeviceLimits,
@@ -116,7 +117,7 @@ impl WavePlan {
             record_size: prepared.record_bytes(),
             spectral_state_size: prepared.spectral_state_bytes(),
             sample_by_sample: prepared.evaluator.takes_one_sample(),
-            roulette: prepared.features.roulette || prepared.scattering.is_some(),
+            scaled: prepared.features.roulette || prepared.scattering.is_some(),
             thinned: prepared.thinning.is_some(),
             limits,
             scene_bytes: facts::scene_bytes(&on_device, buffer::allocated),
@@ -196,7 +197,7 @@ impl WavePlan {
     }
 
     pub fn throughput_bytes(&self) -> u64 {
-        if self.roulette { u64::from(self.paths) * THROUGHPUT_BYTES } else { 0 }
+        if self.scaled { u64::from(self.paths) * THROUGHPUT_BYTES } else { 0 }
     }
 
     pub fn chance_bytes(&self) -> u64 {
@@ -251,7 +252,7 @@ impl WavePlan {
             [size_of::<Wave>() as u64, size_of::<Counters>() as u64, self.step_bytes(), self.queue_length_bytes()];
         let by_paths = [self.state_bytes(), self.head_bytes(), self.record_bytes(), self.queue_bytes()];
         let by_units = [self.unit_list_bytes(), self.mean_bytes(), self.staging_bytes(), self.staging_bytes()];
-        let throughputs = self.roulette.then(|| self.throughput_bytes());
+        let throughputs = self.scaled.then(|| self.throughput_bytes());
         let chances = self.thinned.then(|| self.chance_bytes());
         let spectral = (self.spectral_state_size > 0).then(|| self.spectral_state_bytes());
         let sizes = [fixed, by_paths, by_units];
@@ -347,7 +348,7 @@ mod tests {
             record_size: 8,
             spectral_state_size: 0,
             sample_by_sample: false,
-            roulette: false,
+            scaled: false,
             thinned: false,
             limits: LIMITS,
             scene_bytes: 0,

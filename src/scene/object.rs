@@ -236,8 +236,7 @@ impl<'s, 'a> Objects<'s, 'a> {
         };
         match loaded? {
             Loaded::Mesh(format, mesh) => {
-                let wrong = [(node, true, "glTF"), (group, format != Format::Obj, "OBJ")];
-                for (key, _, kind) in wrong.into_iter().filter(|(_, is_wrong, _)| *is_wrong) {
+                for (key, kind) in [(node, "glTF"), (group.filter(|_| format != Format::Obj), "OBJ")] {
                     if let Some(key) = key {
                         key.error_help(format!("goes with {kind} meshes only"), "remove it");
                         return None;

@@ -280,7 +280,6 @@ impl<'a> Spectra<'a> {
         Some(scaled)
     }
 
-    /// Says `warning` to the user, once.
     /// The curve of a checked spectrum.
     pub fn checked_curve(&self, handle: Handle) -> &Curve {
         &self.checked[handle].curve
@@ -291,6 +290,7 @@ impl<'a> Spectra<'a> {
         self.channels.as_ref()
     }
 
+    /// Says `warning` to the user, once.
     pub fn warn(&self, warning: String) {
         self.cx.warn(warning);
     }

@@ -29,17 +29,9 @@ fn add_amounts(first: u32, voxel: u32, metres: f32, amounts: ptr<function, array
     }
 }
 
-fn no_amounts() -> array<f32, MOST_TERMS> {
-    var amounts: array<f32, MOST_TERMS>;
-    for (var n = 0u; n < MOST_TERMS; n += 1u) {
-        amounts[n] = 0.0;
-    }
-    return amounts;
-}
-
 // Those of a whole way, `start` and `to` in voxels.
 fn amounts_along(first: u32, start: vec3<f32>, to: vec3<f32>, metres: f32) -> array<f32, MOST_TERMS> {
-    var amounts = no_amounts();
+    var amounts = array<f32, MOST_TERMS>();
     let size = volume_size(first);
     var cells = cells_along(start, to, size);
     var done = 0.0;

@@ -12,6 +12,9 @@ const STEP_WORDS: u32 = 2u * TECHNIQUES + 1u;
 // Densities of the path so far under each technique, over that of its own.
 #if RATIOS
 var<private> ratios: array<f32, TECHNIQUES>;
+// The densities of the turn that was looked at last, 0 of techniques that never come there; and of the one that the path takes.
+var<private> turns: array<f32, TECHNIQUES>;
+var<private> chosen_turn: array<f32, TECHNIQUES>;
 #endif
 
 // Where a path was scattered by matter.
@@ -145,9 +148,11 @@ fn matter_density(direction: vec3<f32>) -> f32 {
     var sum = 0.0;
     var all = 0.0;
     for (var t = 0u; t < TECHNIQUES; t += 1u) {
+        turns[t] = 0.0;
         // What never comes here decides nothing.
         if (ratios[t] > 0.0) {
-            sum += ratios[t] * turn_density(t, versine);
+            turns[t] = turn_density(t, versine);
+            sum += ratios[t] * turns[t];
             all += ratios[t];
         }
     }

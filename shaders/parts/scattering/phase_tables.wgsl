@@ -9,22 +9,28 @@ fn phase_number(at: u32) -> f32 {
     return bitcast<f32>(volumes[at]);
 }
 
-// The place of an angle among the rows of a table, by 1 - cos of it.
-fn phase_place(number: u32, versine: f32) -> f32 {
-    let head = phase_head(number);
-    let degrees = 114.591559 * asin(min(sqrt(0.5 * versine), 1.0));
+// The last of `count` ascending numbers from word `first` on that is not above `x`, but for the very last: where an interval begins.
+fn last_below(first: u32, count: u32, x: f32) -> u32 {
     var low = 0u;
-    var high = volumes[head] - 1u;
+    var high = count - 1u;
     while (high - low > 1u) {
         let middle = (low + high) / 2u;
-        if (degrees < phase_number(head + 2u + middle)) {
+        if (x < phase_number(first + middle)) {
             high = middle;
         } else {
             low = middle;
         }
     }
+    return low;
+}
+
+// The place of an angle among the rows of a table, by 1 - cos of it.
+fn phase_place(number: u32, versine: f32) -> f32 {
+    let head = phase_head(number);
+    let degrees = 114.591559 * asin(min(sqrt(0.5 * versine), 1.0));
+    let low = last_below(head + 2u, volumes[head], degrees);
     let a = phase_number(head + 2u + low);
-    let b = phase_number(head + 2u + high);
+    let b = phase_number(head + 3u + low);
     return f32(low) + clamp((degrees - a) / (b - a), 0.0, 1.0);
 }
 

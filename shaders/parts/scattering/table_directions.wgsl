@@ -18,16 +18,8 @@ fn sample_table(number: u32, t: u32, u_in: f32) -> f32 {
     let rows = volumes[head];
     let values = technique_rows(number, t);
     let shares = values + rows;
-    var low = 0u;
-    var high = rows - 1u;
-    while (high - low > 1u) {
-        let middle = (low + high) / 2u;
-        if (u_in < phase_number(shares + middle)) {
-            high = middle;
-        } else {
-            low = middle;
-        }
-    }
+    let low = last_below(shares, rows, u_in);
+    let high = low + 1u;
     let below = phase_number(shares + low);
     let share = phase_number(shares + high) - below;
     var u = clamp((u_in - below) / max(share, 1.0e-30), 0.0, 0.99999994);

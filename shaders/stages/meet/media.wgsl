@@ -41,16 +41,22 @@ struct LightWay {
     way: Way,
 }
 
+// The number of the volume behind a surface + 1, or 0.
+fn volume_behind(site: Site) -> u32 {
+#if SCATTERS
+    if (site.in_matter) {
+        return 0u;
+    }
+#endif
+    return boundaries[site.hit.primitive] & 0xffu;
+}
+
 // Whether a light is seen through media; notes them.
 fn reaches(aim: Aim, nested: vec2<u32>, site: Site, through: ptr<function, LightWay>, overflow: ptr<function, bool>) -> bool {
     var way: Way;
     way.count = 0u;
     var around = nested;
-#if SCATTERS
-    let inner = select(boundaries[select(site.hit.primitive, 0u, site.in_matter)] & 0xffu, 0u, site.in_matter);
-#else
-    let inner = boundaries[site.hit.primitive] & 0xffu;
-#endif
+    let inner = volume_behind(site);
     if (aim.direction.z < 0.0 && inner != 0u && !cross_boundary(&around, inner, site.from_front)) {
         *overflow = true;
     }
@@ -70,12 +76,7 @@ fn append_light_way(list: ptr<function, RecordList>, through: ptr<function, Ligh
 
 // Enters or leaves the body behind a surface, where the path goes on through it.
 fn pass_surface(path: ptr<function, Path>, site: Site, direction: vec3<f32>, overflow: ptr<function, bool>) {
-#if SCATTERS
-    if (site.in_matter) {
-        return;
-    }
-#endif
-    let behind = boundaries[site.hit.primitive] & 0xffu;
+    let behind = volume_behind(site);
     var nested = (*path).nested;
     if (direction.z < 0.0 && behind != 0u && !cross_boundary(&nested, behind, site.from_front)) {
         *overflow = true;

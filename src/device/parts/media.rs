@@ -11,7 +11,7 @@ use crate::device::text::{Module, module};
 use crate::device::words::{
     NONE, NULL_BOUNDARY, Primitive, VOLUME_EMITS, VOLUME_GRID, VOLUME_SCATTERS, VOLUME_WORDS, VOLUMES_HEAD,
 };
-use crate::scene::{Bsdf, Component, Field, Interior, MaterialId, Medium, MediumId, Scene, SpectrumId};
+use crate::scene::{Absorber, Bsdf, Component, Field, Interior, MaterialId, Medium, MediumId, Scene, SpectrumId};
 use crate::spectral::{Curve, planck};
 use crate::{Error, Result};
 
@@ -158,6 +158,39 @@ pub struct Filled {
     pub extent: f64,
 }
 
+/// Words that are to stand behind the volumes.
+#[derive(Default)]
+pub struct List {
+    pub words: Vec<u32>,
+    /// Which of them are positions among spectra.
+    spectra: Vec<usize>,
+    /// Which of them count voxels, or are [`NONE`].
+    voxels: Vec<usize>,
+}
+
+impl From<Vec<u32>> for List {
+    fn from(words: Vec<u32>) -> List {
+        List { words, ..List::default() }
+    }
+}
+
+impl List {
+    /// Adds a density, as [`Filled`] has it.
+    pub fn push_density(&mut self, density: [u32; 2]) {
+        self.voxels.push(self.words.len());
+        self.words.extend(density);
+    }
+
+    pub fn push_spectrum(&mut self, media: &mut Media, needed: Needed) {
+        self.spectra.push(self.words.len());
+        self.words.push(media.need(needed));
+    }
+
+    pub fn push_numbers(&mut self, numbers: impl IntoIterator<Item = f64>) {
+        self.words.extend(numbers.into_iter().map(|value| (value as f32).to_bits()));
+    }
+}
+
 /// A medium in a place: of one body, or of all space.
 struct Volume<'a> {
     id: MediumId,
@@ -231,7 +264,11 @@ impl Media {
         for (index, (volume, within)) in volumes.iter_mut().zip(within).enumerate() {
             volume.index = within;
             let densities = media.fill(scene, accel, index, volume);
-            media.places.push(Filled { medium: volume.id, densities, extent: extent(scene, accel, volume) });
+            media.places.push(Filled {
+                medium: volume.id,
+                densities,
+                extent: extent(scene, accel, volume.interior.as_ref()),
+            });
         }
         media.place_camera(scene, accel)?;
         Ok(Some(media))
@@ -426,12 +463,12 @@ impl Media {
         }) as u32
     }
 
-    /// Appends words; `spectra`: those of them that are positions among spectra, `voxels`: those that count voxels or are [`NONE`].
-    pub fn append(&mut self, words: &[u32], spectra: &[usize], voxels: &[usize]) -> u32 {
+    /// Appends a list, and says where it begins.
+    pub fn append(&mut self, list: List) -> u32 {
         let first = self.volumes.len();
-        self.volumes.extend_from_slice(words);
-        self.spectrum_words.extend(spectra.iter().map(|word| first + word));
-        voxels.iter().for_each(|&word| self.note_voxels(first + word, words[word]));
+        self.spectrum_words.extend(list.spectra.iter().map(|word| first + word));
+        list.voxels.iter().for_each(|&word| self.note_voxels(first + word, list.words[word]));
+        self.volumes.extend(list.words);
         first as u32
     }
 
@@ -535,9 +572,9 @@ fn source(scene: &Scene, kelvin: f64, index: Option<&Curve>) -> Curve {
     Curve::derived_by_stretch(&[index], &scene.channels, |nm, v| planck::radiance(nm, kelvin) * v[0] * v[0])
 }
 
-/// How far a volume reaches, in metres: of all space, as far as the scene.
-fn extent(scene: &Scene, accel: &Accel, volume: &Volume) -> f64 {
-    let Some(interior) = volume.interior else { return 2.0 * accel.space.radius / accel.space.scale };
+/// How far an interior reaches, in metres from end to end; without one, all space, as far as the scene.
+pub fn extent(scene: &Scene, accel: &Accel, interior: Option<&Interior>) -> f64 {
+    let Some(interior) = interior else { return 2.0 * accel.space.radius / accel.space.scale };
     let of_body = scene.objects.iter().filter(|o| o.interior.is_some_and(|i| i.body == interior.body));
     bounds(of_body.map(|object| &object.shape)).map_or(0.0, |[low, high]| (high - low).length())
 }
@@ -548,25 +585,29 @@ pub fn absorption(
     kelvin: Option<f64>,
     mut density: impl FnMut(&Component) -> f64,
 ) -> (Vec<SpectrumId>, Vec<f64>) {
-    let mut all = Vec::new();
-    let absorbers = medium.components.iter().flat_map(|component| {
+    let of = |component: &Component| {
         let density = density(component);
-        component.absorbers.iter().map(move |absorber| (absorber, density))
-    });
-    for (absorber, density) in absorbers {
-        let (columns, strength) = (&absorber.columns, absorber.strength * density);
-        let above = kelvin.map_or(0, |kelvin| columns.partition_point(|column| column.0 < kelvin));
-        let high = above.min(columns.len() - 1);
-        let low = above.max(1) - 1;
-        if low == high || columns.len() == 1 {
-            all.push((columns[high].1, strength));
-            continue;
-        }
-        let kelvin = kelvin.expect("a table over temperature has one to look up");
-        let place = (kelvin - columns[low].0) / (columns[high].0 - columns[low].0);
-        all.extend([(columns[low].1, strength * (1.0 - place)), (columns[high].1, strength * place)]);
+        component
+            .absorbers
+            .iter()
+            .flat_map(move |absorber| absorption_of(absorber, kelvin, density))
+            .collect::<Vec<_>>()
+    };
+    medium.components.iter().flat_map(of).unzip()
+}
+
+/// Those of one absorber: a column of its table, or the two around a temperature.
+pub fn absorption_of(absorber: &Absorber, kelvin: Option<f64>, density: f64) -> Vec<(SpectrumId, f64)> {
+    let (columns, strength) = (&absorber.columns, absorber.strength * density);
+    let above = kelvin.map_or(0, |kelvin| columns.partition_point(|column| column.0 < kelvin));
+    let high = above.min(columns.len() - 1);
+    let low = above.max(1) - 1;
+    if low == high || columns.len() == 1 {
+        return vec![(columns[high].1, strength)];
     }
-    all.into_iter().unzip()
+    let kelvin = kelvin.expect("a table over temperature has one to look up");
+    let place = (kelvin - columns[low].0) / (columns[high].0 - columns[low].0);
+    vec![(columns[low].1, strength * (1.0 - place)), (columns[high].1, strength * place)]
 }
 
 /// The same of its scattering.

@@ -2,13 +2,13 @@
 //! takes of a way, and the phase functions.
 
 use crate::device::part::{Part, Place, Records};
-use crate::device::parts::media::{self, Filled, Media};
+use crate::device::parts::media::{self, Filled, List, Media};
 use crate::device::parts::surfaces::Needed;
 use crate::device::text::module;
 use crate::device::words::{
     NONE, PHASE_HENYEY_GREENSTEIN, PHASE_RAYLEIGH, PHASE_TABLE, VOLUME_BY_EXTINCTION, VOLUME_WORDS, VOLUMES_HEAD,
 };
-use crate::scene::{Component, Field, Medium, Phase, PhaseTable, Scene, SpectrumId};
+use crate::scene::{self, Component, Field, Medium, Phase, PhaseTable, Scene, SpectrumId};
 use crate::spectral::{Curve, Outside};
 
 pub const SCATTERING: Part = Part {
@@ -107,24 +107,18 @@ impl Scattering {
         for (i, place) in media.places.clone().into_iter().enumerate() {
             let (medium, of) = (&scene.media[place.medium], &coefficients[place.medium]);
             let first = VOLUMES_HEAD as usize + WORDS * i;
-            let mut words = of.walked(medium, &deciding);
-            let (mut spectra, mut voxels) = (Vec::new(), Vec::new());
+            let mut list = List::default();
+            list.push_numbers(of.walked(medium, &deciding));
             let scatterers = medium.components.iter().filter(|component| component.scattering.is_some()).count() as u32;
-            words.push(scatterers);
+            list.words.push(scatterers);
             scattering.most_scatterers = scattering.most_scatterers.max(scatterers);
             for (c, component) in medium.components.iter().enumerate() {
-                voxels.extend(component.scattering.as_ref().map(|_| words.len()));
-                of.scatterer(
-                    scene,
-                    media,
-                    &deciding,
-                    &mut tables,
-                    (c, component, place.densities[c]),
-                    &mut words,
-                    &mut spectra,
-                );
+                if let Some(how) = &component.scattering {
+                    list.push_density(place.densities[c]);
+                    of.scatterer(scene, media, &deciding, &mut tables, (c, how), &mut list);
+                }
             }
-            media.volumes[first + 22] = media.append(&words, &spectra, &voxels);
+            media.volumes[first + 22] = media.append(list);
             if of.by_extinction {
                 media.volumes[first] |= VOLUME_BY_EXTINCTION;
                 if !scattering.by_extinction.contains(&medium.name) {
@@ -134,7 +128,7 @@ impl Scattering {
         }
         scattering.has_tables = !tables.0.is_empty();
         let words = tables.words(scene, &deciding, media.volumes.len() as u32);
-        media.volumes[4] = media.append(&words, &[], &[]);
+        media.volumes[4] = media.append(words.into());
         Some(scattering)
     }
 
@@ -159,8 +153,8 @@ struct Coefficients {
 }
 
 struct ComponentCoefficients {
-    /// m⁻¹ in each channel, of each column of each absorber, at strength and density 1; their strengths.
-    columns: Vec<(f64, Vec<f64>)>,
+    /// m⁻¹ in each channel, of each column of each absorber, at strength and density 1.
+    columns: Vec<Vec<f64>>,
     /// m⁻¹ in each channel; empty where nothing is scattered.
     scattering: Vec<f64>,
     /// g in each channel, of Henyey and Greenstein's phase function.
@@ -187,19 +181,22 @@ fn mean_of(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
+fn least_of(values: &[f64]) -> f64 {
+    values.iter().copied().fold(f64::INFINITY, f64::min)
+}
+
+/// Of an amount on a way: what every technique makes of it for how far paths go; what it loses of it, and the channel that absorbs least.
+type Term = (Vec<f64>, Vec<f64>, f64);
+
 impl Coefficients {
     fn of(scene: &Scene, medium: &Medium) -> Coefficients {
         let kelvin = medium.temperature.as_ref().map(mean);
         let count = scene.channels.len();
         let component = |component: &Component| {
-            let columns = component
-                .absorbers
-                .iter()
-                .flat_map(|absorber| absorber.columns.iter().map(|column| (absorber.strength, means(scene, column.1))));
-            let alone = Medium { name: String::new(), components: vec![component.clone()], temperature: None };
-            let (spectra, factors) = media::absorption(&alone, kelvin, |_| 1.0);
+            let columns = component.absorbers.iter().flat_map(|absorber| &absorber.columns);
             let mut absorption = vec![0.0; count];
-            for (spectrum, factor) in spectra.into_iter().zip(factors) {
+            let terms = component.absorbers.iter().flat_map(|absorber| media::absorption_of(absorber, kelvin, 1.0));
+            for (spectrum, factor) in terms {
                 absorption.iter_mut().zip(means(scene, spectrum)).for_each(|(sum, value)| *sum += factor * value);
             }
             let scattering = component.scattering.as_ref();
@@ -208,7 +205,7 @@ impl Coefficients {
                 _ => Vec::new(),
             };
             ComponentCoefficients {
-                columns: columns.collect(),
+                columns: columns.map(|column| means(scene, column.1)).collect(),
                 scattering: scattering.map_or_else(Vec::new, |scattering| means(scene, scattering.coefficient)),
                 asymmetry,
                 density: mean(&component.density),
@@ -232,31 +229,36 @@ impl Coefficients {
 
     /// Words of a volume: for each amount on a way, what every technique makes of it for how far paths go; then what every technique, and the
     /// channel that absorbs least, loses of it.
-    fn walked(&self, medium: &Medium, deciding: &Deciding) -> Vec<u32> {
-        let mut terms: Vec<(Vec<f64>, Vec<f64>, f64)> = Vec::new();
+    fn walked(&self, medium: &Medium, deciding: &Deciding) -> Vec<f64> {
+        let terms =
+            if medium.grid_size().is_some() { self.along_amounts(deciding) } else { vec![self.along_metres(deciding)] };
+        terms
+            .into_iter()
+            .flat_map(|(flights, losses, least)| flights.into_iter().chain(losses).chain([least]))
+            .collect()
+    }
+
+    /// Of each amount of a medium of voxels.
+    fn along_amounts(&self, deciding: &Deciding) -> Vec<Term> {
+        let none = || vec![0.0; deciding.count()];
+        let mut terms = Vec::new();
         for component in &self.components {
-            for (_, column) in &component.columns {
+            for column in &component.columns {
                 let values = deciding.values(column);
-                let least = column.iter().copied().fold(f64::INFINITY, f64::min);
                 terms.push(match self.by_extinction {
-                    true => (values, vec![0.0; deciding.count()], 0.0),
-                    false => (vec![0.0; deciding.count()], values, least),
+                    true => (values, none(), 0.0),
+                    false => (none(), values, least_of(column)),
                 });
             }
             if !component.scattering.is_empty() {
-                terms.push((deciding.covering(&component.scattering), vec![0.0; deciding.count()], 0.0));
+                terms.push((deciding.covering(&component.scattering), none(), 0.0));
             }
         }
-        if medium.grid_size().is_none() {
-            terms = vec![self.along_metres(deciding)];
-        }
-        let numbers =
-            terms.into_iter().flat_map(|(flights, losses, least)| flights.into_iter().chain(losses).chain([least]));
-        numbers.map(|value| (value as f32).to_bits()).collect()
+        terms
     }
 
     /// The one amount of a medium that is the same everywhere: metres.
-    fn along_metres(&self, deciding: &Deciding) -> (Vec<f64>, Vec<f64>, f64) {
+    fn along_metres(&self, deciding: &Deciding) -> Term {
         let (mut flights, mut losses) = (vec![0.0; deciding.count()], vec![0.0; deciding.count()]);
         let mut least = 0.0;
         for component in &self.components {
@@ -266,7 +268,7 @@ impl Coefficients {
             let absorbed = if self.by_extinction { &mut flights } else { &mut losses };
             add(absorbed, deciding.values(&component.absorption));
             if !self.by_extinction {
-                least += component.density * component.absorption.iter().copied().fold(f64::INFINITY, f64::min);
+                least += component.density * least_of(&component.absorption);
             }
             if !component.scattering.is_empty() {
                 add(&mut flights, deciding.covering(&component.scattering));
@@ -275,53 +277,42 @@ impl Coefficients {
         (flights, losses, least)
     }
 
-    /// Adds the words of a kind of matter, if it scatters, and which of them are spectra.
-    #[expect(clippy::too_many_arguments)]
+    /// Adds the words of kind of matter `number`, behind those of its density.
     fn scatterer(
         &self,
         scene: &Scene,
         media: &mut Media,
         deciding: &Deciding,
         tables: &mut Tables,
-        (number, component, density): (usize, &Component, [u32; 2]),
-        words: &mut Vec<u32>,
-        spectra: &mut Vec<usize>,
+        (number, scattering): (usize, &scene::Scattering),
+        list: &mut List,
     ) {
-        let Some(scattering) = &component.scattering else { return };
-        let mut spectrum = |words: &mut Vec<u32>, needed: Needed| {
-            spectra.push(words.len());
-            let position = media.need(needed);
-            words.push(position);
-        };
-        words.extend(density);
         let named = |id: SpectrumId| (scene.spectra[id].name.clone(), scene.spectra[id].curve.clone());
         let (name, curve) = named(scattering.coefficient);
-        spectrum(words, Needed::Pointwise(name, curve));
+        list.push_spectrum(media, Needed::Pointwise(name, curve));
         match &scattering.phase {
             Phase::HenyeyGreenstein(g) => {
-                words.push(PHASE_HENYEY_GREENSTEIN);
+                list.words.push(PHASE_HENYEY_GREENSTEIN);
                 let (name, curve) = named(*g);
-                spectrum(words, Needed::Exact(name, curve));
+                list.push_spectrum(media, Needed::Exact(name, curve));
             }
             Phase::Rayleigh { depolarisation } => {
-                words.push(PHASE_RAYLEIGH);
-                words.push(((depolarisation / (2.0 - depolarisation)) as f32).to_bits());
+                list.words.push(PHASE_RAYLEIGH);
+                list.push_numbers([depolarisation / (2.0 - depolarisation)]);
             }
-            Phase::Table(table) => {
-                words.push(PHASE_TABLE);
-                words.push(tables.number(table));
-            }
+            Phase::Table(table) => list.words.extend([PHASE_TABLE, tables.number(table)]),
         }
-        words.push((self.share(number) as f32).to_bits());
+        list.push_numbers([self.share(number)]);
         match &scattering.phase {
-            Phase::Table(table) => spectrum(words, Needed::Exact("columns of a phase function".into(), axis(table))),
-            _ => words.push(NONE),
+            Phase::Table(table) => {
+                list.push_spectrum(media, Needed::Exact("columns of a phase function".into(), axis(table)));
+            }
+            _ => list.words.push(NONE),
         }
         let own = &self.components[number];
         let asymmetry =
             if own.asymmetry.is_empty() { vec![0.0; deciding.count()] } else { deciding.values(&own.asymmetry) };
-        let values = deciding.covering(&own.scattering).into_iter().chain(asymmetry);
-        words.extend(values.map(|value| (value as f32).to_bits()));
+        list.push_numbers(deciding.covering(&own.scattering).into_iter().chain(asymmetry));
     }
 
     /// What a kind of matter counts, per density, where all channels have a say: half of the mean over channels of its share of what is

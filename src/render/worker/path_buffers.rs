@@ -44,7 +44,7 @@ impl PathBuffers {
                 .then(|| buffer::empty(gpu, "spectral_states", plan.spectral_state_bytes(), storage)),
             heads: buffer::empty(gpu, "heads", plan.head_bytes(), storage),
             records: buffer::empty(gpu, "records", plan.record_bytes(), storage),
-            throughputs: plan.roulette.then(|| buffer::empty(gpu, "throughputs", plan.throughput_bytes(), storage)),
+            throughputs: plan.scaled.then(|| buffer::empty(gpu, "throughputs", plan.throughput_bytes(), storage)),
             chances: plan.thinned.then(|| buffer::empty(gpu, "chances", plan.chance_bytes(), storage)),
             queue: buffer::empty(gpu, "queue", plan.queue_bytes(), storage),
             queue_lengths: buffer::empty(gpu, "queue_lengths", plan.queue_length_bytes(), storage),
