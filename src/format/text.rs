@@ -446,7 +446,7 @@ pub(super) fn ascending(mut table: SpectrumTable, path: &Path, of: &str) -> Resu
         let message = format!("has {} values{of}", table.nm.len());
         return Err(wrong(None, &table, message, "give at least two wavelengths"));
     }
-    if let Some(i) = table.nm.iter().position(|nm| !nm.is_finite()) {
+    if let Some(i) = table.nm.iter().position(|nm| !(nm.is_finite() && *nm > 0.0)) {
         return Err(wrong(Some(i), &table, "the wavelength cannot be represented in nm".to_owned(), ""));
     }
     if table.nm.first() > table.nm.last() {

@@ -235,7 +235,7 @@ fn textured_heat_agrees_with_the_reference() {
     // The tables of `scattering` are within 1e-3: over four events, and in the mean.
     let (reference, resolution) = if size::is_full() { (20_000, 0.06) } else { (2_500, 0.12) };
     let bound = Bound { resolution, allowance: 10.0 * ORIGIN_OFFSET + 1e-3 };
-    assert_as_reference("textured heat", &scene, [32, 64], reference, bound);
+    assert_as_reference("textured heat", &scene, [size::either(32, 128), 64], reference, bound);
 }
 
 /// Scenes without such surfaces have none of it: not in their shaders' switches, nor in their records.

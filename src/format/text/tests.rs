@@ -127,6 +127,7 @@ fn mistakes_name_their_line() {
         ("400,1\n500,", Some(2), "finite"),
         ("400,1\n500,1,1", Some(2), "cells"),
         ("400,1\n-500,1", Some(2), "greater than 0"),
+        ("1e-32nm,v\n1e-320,1\n500,1", Some(2), "cannot be represented"),
         ("400,1\n500,1\n450,1\n600,1", Some(3), "follows"),
         ("400,1\n400,2\n400,3\n500,1", Some(3), "third time"),
         ("400,1", None, "1 values"),
