@@ -191,7 +191,9 @@ impl Found {
     fn is_pending(&self) -> bool {
         let attributes = &self.cube.header().attributes;
         let setting = attributes.get("settings").and_then(|settings| settings["integrator"]["evaluation"].as_str());
-        let by_itself = attributes.get("evaluator").is_some_and(|evaluator| evaluator == Evaluator::Pt.name());
+        let by_itself = [Evaluator::Pt, Evaluator::Factored].map(Evaluator::name);
+        let by_itself =
+            attributes.get("evaluator").is_some_and(|evaluator| by_itself.iter().any(|name| evaluator == name));
         !by_itself && self.progress.samples[1] == 0 && setting.is_some_and(|setting| setting != Evaluation::All.name())
     }
 
@@ -230,7 +232,10 @@ impl Found {
             let epochs = epochs(cube, progress);
             let what = match epochs {
                 0 | 1 => "of every pixel and channel once there are 2 epochs".to_owned(),
-                n => format!("of every pixel and channel, from {n} epochs (Student's t, {} degrees of freedom)", n - 1),
+                n => format!(
+                    "of every pixel and channel, from {n} epochs (Student's t, {} degrees of freedom)",
+                    header.freedom(n)
+                ),
             };
             row("standard error", what);
         }
@@ -244,7 +249,18 @@ impl Found {
         }
         row("preview", shows(cube));
         row("on disk", format!("{} when all tiles are begun", crate::files::format_bytes(header.store_bytes())));
-        for (name, value) in &header.attributes {
+        if let Some(basis) = header.basis() {
+            let names: Vec<&str> = basis.spectra.iter().filter(|leaf| leaf.is_named).map(|leaf| &*leaf.name).collect();
+            let what = format!(
+                "weights of products of {} factors and {} sources; spectile relight changes the spectra {}",
+                basis.factors.len(),
+                basis.sources.len(),
+                if names.is_empty() { "(none has a name)".to_owned() } else { names.join(", ") }
+            );
+            row("factored", what);
+        }
+        let written = header.attributes.iter().filter(|(name, _)| !header.is_factored() || *name != "factored");
+        for (name, value) in written {
             row(name, value.as_str().map_or_else(|| value.to_string(), str::to_owned));
         }
         if let Some(verified) = &self.verified {

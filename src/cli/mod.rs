@@ -16,6 +16,7 @@ mod output;
 mod plan;
 mod program;
 mod progress;
+mod relight;
 mod render;
 mod scene;
 mod sensor;
@@ -54,6 +55,7 @@ Examples:
   spectile spectrum cube.zarr 120 80                    the spectrum of one pixel, as CSV
   spectile export cube.zarr -o picture.png              a picture of it
   spectile sensor cube.zarr --responses s.csv -o s.zarr what a sensor would see of it
+  spectile relight cube.zarr -o warm.zarr --set …       a factored cube under other lamps, paints, channels
   spectile view cube.zarr                               a page to look at it
   spectile compare cube.zarr reference.zarr             how it differs from another cube
   spectile converge scene.toml -o report                error against run time, as a report
@@ -86,6 +88,7 @@ enum Command {
     Compare(compare::Args),
     Export(export::Args),
     Sensor(sensor::Args),
+    Relight(relight::Args),
     View(view::Args),
     Converge(converge::Args),
     Bench(bench::Args),
@@ -114,6 +117,7 @@ impl Cli {
             Command::Compare(args) => args.json,
             Command::Export(args) => args.json,
             Command::Sensor(args) => args.json,
+            Command::Relight(args) => args.json,
             Command::View(args) => args.json,
             Command::Converge(args) => args.json,
             Command::Bench(args) => args.json,
@@ -136,6 +140,7 @@ impl Cli {
             Command::Compare(args) => compare::run(args, output),
             Command::Export(args) => export::run(args, output),
             Command::Sensor(args) => sensor::run(args, output),
+            Command::Relight(args) => relight::run(args, output),
             Command::View(args) => view::run(args, output),
             Command::Converge(args) => converge::run(args, output),
             Command::Bench(args) => bench::run(args, output),

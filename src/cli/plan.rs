@@ -13,6 +13,7 @@ use crate::device::evaluator::EvaluateShape;
 use crate::device::facts;
 use crate::device::part::OnDevice;
 use crate::device::prepared::Prepared;
+use crate::device::separable;
 use crate::device::windows::Windows;
 use crate::files::{format_bytes, shown};
 use crate::gpu::adapter::{Gpu, Selection};
@@ -242,6 +243,7 @@ impl Plan<'_> {
             "choices": self.choices,
             "features": features.collect::<Vec<_>>(),
             "spectra": facts::table_bounds(self.prepared),
+            "factored_obstacles": separable::obstacles(self.scene),
             "storage_buffers": self.storage_buffers(),
             "primitives": self.prepared.accel.primitives.len(),
             "bvh_nodes": self.prepared.accel.nodes.len(),
@@ -314,6 +316,13 @@ impl Plan<'_> {
             text += &wrapped("left out", &format!("{} (--verbose says what each would cost)", names.join(", ")));
         }
         text += &self.describe_spectra();
+        text += &wrapped(
+            "factored",
+            &match &separable::obstacles(self.scene)[..] {
+                [] => "the scene separates: render --factored keeps weights, so that spectra and channels can be changed afterwards".to_owned(),
+                obstacles => format!("the scene does not separate (render --factored): {}", obstacles.join(", ")),
+            },
+        );
         if self.args.verbose {
             text += &format!("kernels   bind {} storage buffers at most\n", self.storage_buffers());
         }

@@ -74,6 +74,15 @@ pub struct Args {
     #[arg(long)]
     pub uncertainty: bool,
 
+    /// Keep weights of products of spectra instead of radiance, so that lamps, paints and channels can be changed afterwards
+    ///
+    /// For scenes of diffuse, translucent and black surfaces, also blends and textures of endmembers, under lamps, lights, suns and
+    /// uniform skies: what a path brings is a number times one source spectrum times the spectra of what it met. The cube holds
+    /// these numbers; its size does not depend on the channels, nor is there noise from wavelengths. `spectile relight` makes
+    /// cubes of it, all else reads it as it is. docs/METHOD.md says how, `spectile plan` whether a scene separates.
+    #[arg(long)]
+    pub factored: bool,
+
     /// Seed of all random numbers
     ///
     /// The same scene, settings and seed give the same cube, bit for bit. Cubes of different seeds are independent:
@@ -189,6 +198,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     }
     let interrupt = output.interrupt()?;
     let scene = args.scene.load()?;
+    let scene = if args.factored { scene.factored() } else { scene };
     let mut reporter = Reporter::new(args.quiet, output);
     for warning in &scene.warnings {
         reporter.warn(warning)?;

@@ -96,7 +96,7 @@ fn each_text(value: &toml::Value, each: &mut impl FnMut(&str)) {
     }
 }
 
-fn parse_override(text: &str) -> std::result::Result<(String, String), String> {
+pub(super) fn parse_override(text: &str) -> std::result::Result<(String, String), String> {
     match text.split_once('=') {
         Some((key, value)) if !key.trim().is_empty() => Ok((key.trim().to_owned(), value.trim().to_owned())),
         _ => Err("an override is KEY=VALUE, such as film.width=256".into()),

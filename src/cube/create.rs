@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use super::lock::TileLock;
 use super::metadata::{self, Header};
 use super::restore::{coordinates, pretty};
-use super::store::{Cube, Origin, PRIVATE, RECORD, TileArray};
+use super::store::{Cube, Origin, PRIVATE, RECORD};
 use super::writer::BATCH_BYTES;
 use crate::files::output::{Product, only_holds, put_folder};
 use crate::{Error, Result, files};
@@ -211,7 +211,7 @@ fn find_way(path: &Path, header: &Header, existing: Existing, tiles: &Range<u32>
         }
         Existing::Resume if there => {
             let cube = open_same(path, header)?;
-            let missing = tiles.clone().filter(|&tile| !cube.part_path(TileArray::Radiance, tile).exists()).count();
+            let missing = tiles.clone().filter(|&tile| !cube.part_path(cube.main_part(), tile).exists()).count();
             if missing > 0 {
                 // What a killed process left aside goes first.
                 check_space(path, cube.path(), header, missing as u64, files::bytes_of(&cube.aside_folder()))?;

@@ -14,7 +14,7 @@ use super::store::{Cube, TileArray};
 use crate::{Error, Result, files};
 
 const MAGIC: [u8; 8] = *b"SPTJRNL1";
-const HEAD_BYTES: usize = 32 + 16 * TileArray::ALL.len();
+const HEAD_BYTES: usize = 32 + 16 * TileArray::MOST;
 /// A journal that is this long is written anew with its last record only, so that it stays small beside its tile.
 const MAX_RECORDS: u64 = 16;
 /// The most that a journal takes.
@@ -31,8 +31,8 @@ pub(super) struct Record {
     pub epoch: u32,
     /// The name that the files had aside; no two commits have the same.
     pub suffix: u64,
-    /// Of the tile's files, in the order of [`TileArray::ALL`].
-    pub checksums: [u128; TileArray::ALL.len()],
+    /// Of the tile's files, by [`TileArray::place`].
+    pub checksums: [u128; TileArray::MOST],
     /// Per channel: Σ over pixels of Welford's M2 = Σ (epoch mean - mean)² over the epochs so far.
     pub spread: Vec<f64>,
     /// Per channel: Σ over pixels of mean².

@@ -16,14 +16,26 @@ compile_error!("chunks are little-endian floats that are used in place; a big-en
 /// ([tile_h][tile_w][K] in cubes of version 1). Pixels beyond the edge of the picture are NaN. It stays what it was when the
 /// tile is merged again.
 pub struct Chunk {
-    map: Mmap,
+    values: Values,
     rect: Rect,
     tile: [u32; 2],
     channels: usize,
     layout: Layout,
 }
 
+/// Where the values are.
+enum Values {
+    File(Mmap),
+    /// Made of weights.
+    Memory(Vec<f32>),
+}
+
 impl Chunk {
+    /// Values made of something else, column by column.
+    pub(super) fn of(values: Vec<f32>, rect: Rect, tile: [u32; 2], channels: usize) -> Chunk {
+        Chunk { values: Values::Memory(values), rect, tile, channels, layout: Layout::Columns }
+    }
+
     /// Maps a chunk that is open; `path` is what errors name.
     pub(super) fn map(
         file: &File,
@@ -40,18 +52,25 @@ impl Chunk {
         if bytes != expected {
             return Err(Error::storage(path, format!("is damaged: {bytes} bytes long, not {expected}")));
         }
-        Ok(Chunk { map, rect, tile, channels, layout })
+        Ok(Chunk { values: Values::File(map), rect, tile, channels, layout })
     }
 
     /// All values, as they lie in the file.
     pub fn values(&self) -> &[f32] {
         // A mapping starts at a page, so it is aligned, and `map` has checked the length.
-        bytemuck::cast_slice(&self.map)
+        match &self.values {
+            Values::File(map) => bytemuck::cast_slice(map),
+            Values::Memory(values) => values,
+        }
     }
 
     /// The file as it is.
     pub(super) fn bytes(&self) -> &[u8] {
-        &self.map
+        bytemuck::cast_slice(self.values())
+    }
+
+    pub(super) fn layout(&self) -> Layout {
+        self.layout
     }
 
     /// The pixels of the picture in this tile.

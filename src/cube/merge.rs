@@ -131,6 +131,11 @@ impl<'a> UnitPass<'a> {
         file.write_all(bytemuck::cast_slice(&buffer))
     }
 
+    /// The pass of values that stand for others, whose distances `of` has.
+    pub fn with_distance(self, of: UnitPass) -> Self {
+        UnitPass { distance: of.distance, ..self }
+    }
+
     /// Adds a pixel's new mean to everything derived.
     fn gather(&mut self, x: usize, y: usize, mean: &[f32]) {
         let pixel = y * self.grid.tile[0] as usize + x;

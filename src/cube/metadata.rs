@@ -7,7 +7,9 @@ use std::path::Path;
 use serde_json::{Map, Value, json};
 
 use super::grid::Grid;
+use super::weights::{GROUPS, GROUPS_WITH_UNCERTAINTY, Shape, ZSTD_LEVEL};
 use crate::spectral::colour::{Projection, ProjectionKind};
+use crate::spectral::product::Basis;
 use crate::spectral::{Channels, Curve, Response};
 use crate::{Error, Result};
 
@@ -64,8 +66,14 @@ pub struct Header {
 /// The attribute of cubes with standard errors.
 pub(super) const UNCERTAINTY: &str = "uncertainty";
 
+/// Of a cube that holds weights of products of spectra: which spectra.
+pub const FACTORED: &str = "factored";
+
 /// Of a cube that was made of another one's channels: how.
 pub(super) const DERIVED: &str = "derived";
+
+/// Places in a tile's files are exact in f32.
+const MOST_FACTORED_PIXELS: usize = 1 << 16;
 
 /// Attributes of the group that the header's own fields make.
 const RESERVED: [&str; 9] = [
@@ -86,10 +94,50 @@ impl Header {
         self.attributes.get(UNCERTAINTY) == Some(&Value::Bool(true))
     }
 
+    /// Degrees of freedom of the standard errors after so many epochs: of factored cubes, and those made of them, these are told apart
+    /// in a few groups only.
+    pub fn freedom(&self, epochs: u32) -> u32 {
+        let is_relit = self.attributes.get(DERIVED).is_some_and(|derived| !derived["relit"].is_null());
+        let spreads = if self.is_factored() || is_relit { epochs.min(GROUPS_WITH_UNCERTAINTY as u32) } else { epochs };
+        spreads.saturating_sub(1)
+    }
+
     /// The same with the array `standard_error`.
     pub fn with_uncertainty(mut self) -> Header {
         self.attributes.insert(UNCERTAINTY.into(), Value::Bool(true));
         self
+    }
+
+    /// Whether the cube holds weights of products of spectra instead of radiance.
+    pub fn is_factored(&self) -> bool {
+        self.attributes.contains_key(FACTORED)
+    }
+
+    /// What the products of a factored cube are made of.
+    pub fn basis(&self) -> Option<Basis> {
+        serde_json::from_value(self.attributes.get(FACTORED)?.get("basis")?.clone()).ok()
+    }
+
+    /// The same cube, with weights of products of spectra of `basis`, of so many factors at most, instead of radiance.
+    pub fn with_weights(mut self, basis: &Basis, most_factors: u32) -> Header {
+        self.attributes.insert(FACTORED.into(), json!({ "most_factors": most_factors, "basis": basis }));
+        self
+    }
+
+    /// The numbers of factors and of sources of a factored cube.
+    pub(super) fn basis_size(&self) -> [usize; 2] {
+        let count =
+            |name: &str| self.attributes.get(FACTORED).map_or(0, |of| of["basis"][name].as_array().map_or(0, Vec::len));
+        [count("factors"), count("sources")]
+    }
+
+    pub(super) fn most_factors(&self) -> usize {
+        self.attributes.get(FACTORED).and_then(|of| of["most_factors"].as_u64()).unwrap_or(0) as usize
+    }
+
+    /// Parts of the epochs whose weights are told apart.
+    pub(super) fn groups(&self) -> usize {
+        if self.has_uncertainty() { GROUPS_WITH_UNCERTAINTY } else { GROUPS }
     }
 
     pub fn grid(&self) -> Grid {
@@ -117,7 +165,12 @@ impl Header {
         let blocks = self.grid().tile_blocks().map(u64::from);
         let journal = super::journal::MAX_BYTES_PER_CHANNEL * channels + super::journal::MAX_BYTES;
         let errors = if self.has_uncertainty() { pixels * channels * 4 } else { 0 };
-        let files = [pixels * channels * 4, errors, pixels * 12, blocks[0] * blocks[1] * channels * 4, 4, journal];
+        let (radiance, errors) = match self.is_factored() {
+            false => (pixels * channels * 4, errors),
+            // With as many entries as are kept.
+            true => (pixels * Shape::of(self).entry_bytes(), pixels * 16),
+        };
+        let files = [radiance, errors, pixels * 12, blocks[0] * blocks[1] * channels * 4, 4, journal];
         // Each tile has a folder of `preview`, each row of tiles one of every array.
         let tile = files.into_iter().map(in_blocks).sum::<u64>() + BLOCK_BYTES;
         let [_, rows] = self.grid().tiles().map(u64::from);
@@ -214,6 +267,12 @@ impl Header {
         let values = u128::from(self.tile[0]) * u128::from(self.tile[1]) * self.channels.len() as u128;
         if values > (isize::MAX / 8) as u128 {
             return Err(format!("a tile of {}x{} pixels is too large", self.tile[0], self.tile[1]));
+        }
+        if self.is_factored() && self.grid().tile_pixels() > MOST_FACTORED_PIXELS {
+            return Err(format!(
+                "a tile of {}x{} pixels is too large for a factored cube: at most 256x256",
+                self.tile[0], self.tile[1]
+            ));
         }
         if !self.epoch.is_power_of_two() || self.epoch > 1024 {
             return Err(format!("an epoch of {} samples is not a power of two up to 1024", self.epoch));
@@ -357,11 +416,16 @@ impl Header {
         let numbers = |value: &Value| -> Option<Vec<u32>> {
             value.as_array()?.iter().map(|v| u32::try_from(v.as_u64()?).ok()).collect()
         };
-        let shape = numbers(&stored["radiance"]["shape"]);
-        let chunk = numbers(&stored["radiance"]["chunk_grid"]["configuration"]["chunk_shape"]);
-        let (Some([count, height, width]), Some([_, tile_height, tile_width])) = (shape.as_deref(), chunk.as_deref())
-        else {
-            return Err(damaged("gives no shape [wavelength, y, x] and chunk of `radiance`"));
+        let shape_of = |name: &str| numbers(&stored[name]["shape"]);
+        let chunk_of = |name: &str| numbers(&stored[name]["chunk_grid"]["configuration"]["chunk_shape"]);
+        let ([height, width], [tile_height, tile_width]) = match (shape_of("preview"), chunk_of("preview")) {
+            (Some(shape), Some(chunk)) if shape.len() == 3 && chunk.len() == 3 => {
+                ([shape[0], shape[1]], [chunk[0], chunk[1]])
+            }
+            _ => return Err(damaged("gives no shape [y, x, rgb] and chunk of `preview`")),
+        };
+        let Some(&[count]) = shape_of("wavelength").as_deref() else {
+            return Err(damaged("gives no shape [wavelength] of `wavelength`"));
         };
 
         let mut attributes = group["attributes"].as_object().cloned().unwrap_or_default();
@@ -379,10 +443,10 @@ impl Header {
             attributes.remove(name);
         }
         let header = Header {
-            size: [*width, *height],
+            size: [width, height],
             origin,
-            tile: [*tile_width, *tile_height],
-            channels: Channels { bounds: read_bounds(*count as usize)?, names, false_colour, responses },
+            tile: [tile_width, tile_height],
+            channels: Channels { bounds: read_bounds(count as usize)?, names, false_colour, responses },
             epoch,
             attributes,
         };
@@ -429,7 +493,7 @@ fn unknown_format(path: &Path, format: u64) -> Error {
 }
 
 /// Attributes whose values are made of others, so that netCDF could hold them as text only.
-const STRUCTURED: [&str; 3] = ["settings", "responses", DERIVED];
+const STRUCTURED: [&str; 4] = ["settings", "responses", DERIVED, FACTORED];
 
 /// The same without values that netCDF cannot hold.
 pub fn plain_attributes(mut attributes: Map<String, Value>) -> Map<String, Value> {
@@ -464,7 +528,7 @@ fn structure_attributes(attributes: &mut Map<String, Value>) {
 
 /// Whether the files of an array are read and written as they are.
 pub(super) fn is_raw(name: &str) -> bool {
-    super::store::TileArray::ALL.iter().any(|part| part.name() == name)
+    super::store::TileArray::all().any(|part| part.name() == name)
 }
 
 /// Whether the files of an array hold the same in both descriptions.
@@ -578,7 +642,40 @@ pub(super) fn arrays(header: &Header, layout: Layout) -> Vec<(&'static str, Valu
             .chunked(&[channels, tile_blocks_y, tile_blocks_x]),
         ),
     ];
-    if header.has_uncertainty() {
+    if header.is_factored() {
+        let shape = Shape::of(header);
+        let [entries, columns_of_entries, width] = [shape.entries, shape.columns, shape.width].map(|n| n as u64);
+        let weights = Array {
+            fill: json!(0.0),
+            codecs: compressed(),
+            attributes: json!({
+                "long_name": "entries of the pixels of a tile: pixel (row x tile width + column), place in `products`, weight, and \
+                              the shares of the weight that the groups of epochs but the first have; weight 0: none",
+                "units": "1",
+            }),
+            ..Array::new(
+                "float32",
+                &[rows, columns, columns_of_entries, entries],
+                &["tile_y", "tile_x", "column", "entry"],
+            )
+        };
+        let products = Array {
+            fill: json!(u16::MAX),
+            codecs: compressed(),
+            attributes: json!({
+                "long_name": "of each product of a tile: the place of its source and of its factors in the attribute `factored`; \
+                              65535: none",
+                "units": "1",
+            }),
+            ..Array::new(
+                "uint16",
+                &[rows, columns, entries, width],
+                &["tile_y", "tile_x", "product", "source_and_factors"],
+            )
+        };
+        arrays[0] = ("weights", weights.chunked(&[1, 1, columns_of_entries, entries]));
+        arrays.push(("products", products.chunked(&[1, 1, entries, width])));
+    } else if header.has_uncertainty() {
         let errors = Array {
             codecs: channel_fastest(layout),
             attributes: json!({
@@ -601,6 +698,13 @@ fn channel_fastest(layout: Layout) -> Value {
     json!([
         { "name": "transpose", "configuration": { "order": order } },
         { "name": "bytes", "configuration": { "endian": "little" } },
+    ])
+}
+
+fn compressed() -> Value {
+    json!([
+        { "name": "bytes", "configuration": { "endian": "little" } },
+        { "name": "zstd", "configuration": { "level": ZSTD_LEVEL, "checksum": true } },
     ])
 }
 

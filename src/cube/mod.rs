@@ -27,6 +27,7 @@ mod preview;
 #[cfg(all(test, unix))]
 mod protocol_tests;
 mod recover;
+mod relight;
 mod restore;
 mod runs;
 mod sensor;
@@ -34,6 +35,7 @@ mod state;
 mod store;
 mod verify;
 mod view;
+mod weights;
 mod writer;
 
 pub use choices::Choices;
@@ -43,15 +45,28 @@ pub use epochs::{epoch_samples, epochs_in, samples_before, whole_epochs};
 pub use grid::{Grid, Rect};
 pub use map::Chunk;
 pub use merge::{merge_bytes, merge_means};
-pub use metadata::{FORMAT, Header, SENSOR_FORMAT, plain_attributes};
+pub use metadata::{FACTORED, FORMAT, Header, SENSOR_FORMAT, plain_attributes};
 pub use preview::reduction;
+pub use relight::{Relighted, relight};
 pub use runs::{Run, RunFile, RunState, SlurmTask, Stand, Work, node_name, now_s};
 pub use sensor::{Findings, integrate};
 pub use state::{CubeState, RegionMean, Seen, Window};
 pub use store::{Cube, Progress};
 pub use verify::Verification;
 pub use view::{Quantity, Reader, Strides, View, White};
+pub use weights::{Weights, group_after, systematic};
 pub use writer::Writer;
+
+/// A number from others, the same on every machine (the mixing of SplitMix64: Steele, Lea and Flood 2014).
+pub fn random_of(words: [u32; 4]) -> u64 {
+    const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
+    words.iter().fold(STEP, |state, &word| {
+        let mut z = (state ^ u64::from(word)).wrapping_add(STEP);
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    })
+}
 
 /// Side, in pixels, of the blocks whose means make up `overview`.
 pub const BLOCK: u32 = 8;

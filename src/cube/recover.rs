@@ -116,7 +116,7 @@ fn put_in_place(cube: &Cube, record: &Record) -> Result<bool> {
     let mut folders = BTreeSet::new();
     let mut missing = Vec::new();
     for &part in cube.parts() {
-        let checksum = record.checksums[part as usize];
+        let checksum = record.checksums[part.place()];
         let target = cube.part_path(part, record.tile);
         let aside = cube.aside_path(part, record.tile, record.suffix);
         if checksum_of(&target) == Some(checksum) {
@@ -153,19 +153,19 @@ pub(super) fn checksum_of(path: &Path) -> Option<u128> {
 fn rebuild(cube: &Cube, record: &Record, parts: &[TileArray], folders: &mut BTreeSet<PathBuf>) -> Result<()> {
     let (grid, tile) = (cube.grid(), record.tile);
     let chunk =
-        cube.chunk(tile)?.ok_or_else(|| Error::storage(&cube.part_path(TileArray::Radiance, tile), "has vanished"))?;
+        cube.chunk(tile)?.ok_or_else(|| Error::storage(&cube.part_path(cube.main_part(), tile), "has vanished"))?;
     let mut pass = UnitPass::new(grid, grid.rect(tile), cube.channels().len(), cube.projection());
-    pass.run(None, chunk.values(), cube.layout(), 1.0, &mut std::io::sink())
+    pass.run(None, chunk.values(), chunk.layout(), 1.0, &mut std::io::sink())
         .map_err(|error| Error::storage(cube.path(), error))?;
     for &part in parts {
         let samples = record.samples.to_le_bytes();
         let bytes: &[u8] = match part {
-            TileArray::Radiance | TileArray::StandardError => continue,
             TileArray::Samples => &samples,
             TileArray::Preview => bytemuck::cast_slice(&pass.preview),
             TileArray::Overview => bytemuck::cast_slice(&pass.overview),
+            _ => continue,
         };
-        if checksums::of(bytes) != record.checksums[part as usize] {
+        if checksums::of(bytes) != record.checksums[part.place()] {
             let what = format!("`{}` of tile {tile}, made anew, is not what it was", part.name());
             return Err(Error::Internal(what));
         }

@@ -157,6 +157,7 @@ pub fn integrate(
     let mut attributes = cube.header().attributes.clone();
     // The errors of channels that one path made belong together: those of their sums are not known.
     attributes.remove(super::metadata::UNCERTAINTY);
+    attributes.remove(super::metadata::FACTORED);
     attributes
         .insert(super::metadata::DERIVED.into(), json!({ "sensor": about, "channels_integrated": channels.len() }));
     let header = Header { channels: Channels::from_responses(of_bands, None), attributes, ..cube.header().clone() };

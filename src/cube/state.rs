@@ -12,10 +12,15 @@ use super::grid::Rect;
 use super::map::Chunk;
 use super::metadata::Layout;
 use super::store::{Cube, TileArray};
+use super::weights::Weights;
 use super::writer::Writer;
 use super::{BLOCK, Grid};
 use crate::spectral::tone::Picture;
 use crate::{Error, Result};
+
+/// How often two files are read that must be of one commit, and what lies between.
+const READS: u32 = 50;
+const PAUSE: Duration = Duration::from_millis(20);
 
 /// Bytes of radiance that one call may go through; more is refused.
 const MOST_RADIANCE: u64 = 4 << 30;
@@ -103,14 +108,51 @@ impl<'a> CubeState<'a> {
         self.cube.map(&file, &self.cube.part_path(part, tile), tile).map(Some)
     }
 
+    /// The weights of a tile of a factored cube.
+    pub(super) fn weights(&self, tile: u32) -> Result<Option<Weights>> {
+        let [main, products] = [TileArray::Weights, TileArray::Products];
+        let paths = [main, products].map(|part| self.cube.part_path(part, tile));
+        for _ in 0..READS {
+            let (Some(mut weights), Some(mut table)) = (self.open(main, tile)?, self.open(products, tile)?) else {
+                return Ok(None);
+            };
+            if let Some(found) = self.cube.weights_from([(&paths[0], &mut weights), (&paths[1], &mut table)])? {
+                return Ok(Some(found));
+            }
+            // A commit has put only one of them into its place.
+            std::thread::sleep(PAUSE);
+        }
+        Err(Error::storage(
+            &paths[0],
+            "is damaged: it does not belong to the products beside it; --resume puts it in order",
+        ))
+    }
+
+    /// All channels of all pixels of a tile.
+    pub fn radiance(&self, tile: u32) -> Result<Option<Chunk>> {
+        if !self.cube.header().is_factored() {
+            return self.chunk(TileArray::Radiance, tile);
+        }
+        let Some(weights) = self.weights(tile)? else { return Ok(None) };
+        let (size, channels, rect) = (self.cube.header().tile, self.cube.channels().len(), self.cube.grid().rect(tile));
+        let rows = self.cube.expander()?.rows(&weights.products);
+        Ok(Some(Chunk::of(weights.expanded(&rows, channels, size, rect), rect, size, channels)))
+    }
+
     /// The K channels of a pixel, in one contiguous read; `None` before the first unit of its tile. The pixel must lie in
     /// the picture.
     pub fn spectrum(&self, x: u32, y: u32) -> Result<Option<Vec<f32>>> {
         let (grid, channels) = (self.cube.grid(), self.cube.channels().len());
         let tile = grid.tile_at(x, y);
         let rect = grid.rect(tile);
-        let pixel = self.cube.layout().pixel(grid.tile, x - rect.x0, y - rect.y0) as u64;
         let mut spectrum = vec![0.0f32; channels];
+        if self.cube.header().is_factored() {
+            let Some(weights) = self.weights(tile)? else { return Ok(None) };
+            let rows = self.cube.expander()?.rows(&weights.products);
+            weights.expand(((y - rect.y0) * grid.tile[0] + x - rect.x0) as usize, &rows, &mut spectrum);
+            return Ok(Some(spectrum));
+        }
+        let pixel = self.cube.layout().pixel(grid.tile, x - rect.x0, y - rect.y0) as u64;
         let there = self.read::<f32>(TileArray::Radiance, tile, pixel * channels as u64 * 4, &mut spectrum)?;
         Ok(there.then_some(spectrum))
     }
@@ -166,7 +208,7 @@ impl<'a> CubeState<'a> {
         self.check_radiance(pixels)?;
         let mut values = vec![0.0; channels.len()];
         for tile in self.cube.grid().tiles_in(pixels) {
-            let Some(chunk) = self.chunk(TileArray::Radiance, tile)? else { continue };
+            let Some(chunk) = self.radiance(tile)? else { continue };
             let Some(shared) = chunk.rect().intersection(&pixels) else { continue };
             for y in shared.y0..shared.y1 {
                 for x in shared.x0..shared.x1 {
@@ -263,7 +305,7 @@ impl<'a> CubeState<'a> {
         let mut radiance = vec![0.0; channels];
         let mut variance = Some(vec![0.0; channels]);
         for tile in self.cube.grid().tiles_in(rect) {
-            let Some(chunk) = self.chunk(TileArray::Radiance, tile)? else { continue };
+            let Some(chunk) = self.radiance(tile)? else { continue };
             let errors = self.standard_errors(tile)?;
             let Some(shared) = chunk.rect().intersection(&rect) else { continue };
             for y in shared.y0..shared.y1 {
@@ -298,8 +340,19 @@ impl<'a> CubeState<'a> {
 
     /// The standard errors of a tile, laid out like its radiance, where the cube has them. They are read as the last commit
     /// left them.
-    fn standard_errors(&self, tile: u32) -> Result<Option<Chunk>> {
-        self.cube.error_chunk(tile)
+    pub(super) fn standard_errors(&self, tile: u32) -> Result<Option<Chunk>> {
+        let cube = self.cube;
+        if !cube.header().has_uncertainty() {
+            return Ok(None);
+        }
+        if !cube.header().is_factored() {
+            return cube.state().chunk(TileArray::StandardError, tile);
+        }
+        let Some(weights) = cube.state().weights(tile)? else { return Ok(None) };
+        let (size, channels, rect) = (cube.header().tile, cube.channels().len(), cube.grid().rect(tile));
+        let rows = cube.expander()?.rows(&weights.products);
+        let errors = weights.standard_errors(&rows, channels, size, rect, &cube.groups(cube.samples(tile)?));
+        Ok(Some(Chunk::of(errors, rect, size, channels)))
     }
 
     /// The standard error of every channel of a pixel, where the cube has them.

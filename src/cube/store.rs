@@ -4,6 +4,7 @@ use std::fs::{self, File};
 use std::io::{ErrorKind, Read};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use serde_json::Value;
 
@@ -13,8 +14,10 @@ use super::journal::Journal;
 use super::lock::{Probe, TileLock};
 use super::map::Chunk;
 use super::metadata::{DERIVED, Header, Layout, Recorded};
+use super::weights::{Groups, Weights, group_after};
 use crate::spectral::Channels;
 use crate::spectral::colour::Projection;
+use crate::spectral::product::Expander;
 use crate::{Error, Result, files};
 
 /// Folder of everything that is not plain Zarr.
@@ -34,16 +37,40 @@ pub(super) enum TileArray {
     Overview,
     /// Only in cubes that have it.
     StandardError,
+    /// Instead of the radiance, and of the standard error, in factored cubes.
+    Weights,
+    Products,
 }
 
 impl TileArray {
     /// In the order in which they are written and take their places.
     pub const ALL: [TileArray; 5] =
         [TileArray::Radiance, TileArray::Samples, TileArray::Preview, TileArray::Overview, TileArray::StandardError];
+    const FACTORED: [TileArray; 5] =
+        [TileArray::Weights, TileArray::Samples, TileArray::Preview, TileArray::Overview, TileArray::Products];
 
-    /// Whether it can be made from the radiance anew.
+    /// Files of a tile at most.
+    pub const MOST: usize = TileArray::ALL.len();
+
+    /// Those that cubes of all kinds have.
+    pub fn all() -> impl Iterator<Item = TileArray> {
+        TileArray::ALL.into_iter().chain([TileArray::Weights, TileArray::Products])
+    }
+
+    /// Its place among a tile's files.
+    pub fn place(self) -> usize {
+        match self {
+            TileArray::Radiance | TileArray::Weights => 0,
+            TileArray::Samples => 1,
+            TileArray::Preview => 2,
+            TileArray::Overview => 3,
+            TileArray::StandardError | TileArray::Products => 4,
+        }
+    }
+
+    /// Whether it can be made anew from the others.
     pub fn is_derived(self) -> bool {
-        !matches!(self, TileArray::Radiance | TileArray::StandardError)
+        matches!(self, TileArray::Samples | TileArray::Preview | TileArray::Overview)
     }
 
     pub fn name(self) -> &'static str {
@@ -53,6 +80,8 @@ impl TileArray {
             TileArray::Preview => "preview",
             TileArray::Overview => "overview",
             TileArray::StandardError => "standard_error",
+            TileArray::Weights => "weights",
+            TileArray::Products => "products",
         }
     }
 }
@@ -64,6 +93,7 @@ pub struct Cube {
     layout: Layout,
     origin: Origin,
     projection: Projection,
+    expander: OnceLock<Expander>,
 }
 
 /// By what a cube is known, which decides whether it can be gone on with.
@@ -140,7 +170,7 @@ impl Cube {
 
     pub(super) fn new(path: &Path, header: Header, layout: Layout, origin: Origin) -> Cube {
         let projection = Projection::new(&header.channels);
-        Cube { path: path.to_owned(), header, layout, origin, projection }
+        Cube { path: path.to_owned(), header, layout, origin, projection, expander: OnceLock::new() }
     }
 
     /// A cube that this version has just made.
@@ -215,10 +245,10 @@ impl Cube {
             return Ok(Some(file));
         }
         let journal = Journal::of(self, tile);
-        let is_orphan = || self.origin == Origin::Copy && self.part_path(TileArray::Radiance, tile).exists();
+        let is_orphan = || self.origin == Origin::Copy && self.part_path(self.main_part(), tile).exists();
         let witness = match part {
             TileArray::Samples if journal.last()?.is_some() => "its journal",
-            TileArray::Samples if is_orphan() => "`radiance`",
+            TileArray::Samples if is_orphan() => "another of its files",
             TileArray::Samples => return Ok(None),
             _ if self.open_part(TileArray::Samples, tile)?.is_none() => return Ok(None),
             _ => "`samples`",
@@ -263,23 +293,58 @@ impl Cube {
         Ok(Progress::of(&self.all_samples()?))
     }
 
-    /// The radiance of a tile, mapped into memory; `None` before its first unit.
+    /// The radiance of a tile, mapped into memory or, in factored cubes, made of its weights; `None` before its first unit.
     pub fn chunk(&self, tile: u32) -> Result<Option<Chunk>> {
-        self.chunk_of(TileArray::Radiance, tile)
+        self.state().radiance(tile)
     }
 
     /// The standard errors of a tile, mapped into memory like [`Cube::chunk`]: NaN below two epochs. `None` before its
     /// first unit, and in cubes without them.
     pub fn error_chunk(&self, tile: u32) -> Result<Option<Chunk>> {
-        match self.header.has_uncertainty() {
-            true => self.chunk_of(TileArray::StandardError, tile),
-            false => Ok(None),
-        }
+        self.state().standard_errors(tile)
     }
 
-    fn chunk_of(&self, part: TileArray, tile: u32) -> Result<Option<Chunk>> {
-        let Some(file) = self.open_part(part, tile)? else { return Ok(None) };
-        self.map(&file, &self.part_path(part, tile), tile).map(Some)
+    /// What makes channels of the products of a factored cube.
+    pub(super) fn expander(&self) -> Result<&Expander> {
+        if let Some(expander) = self.expander.get() {
+            return Ok(expander);
+        }
+        let what = "is a damaged Spectile cube: its attribute `factored` names no spectra";
+        let basis = self.header.basis().ok_or_else(|| Error::storage(&self.path, what))?;
+        Ok(self.expander.get_or_init(|| Expander::new(&basis, self.channels(), self.header.most_factors())))
+    }
+
+    /// The weights of a tile of a factored cube, from its two files; `None` where these are not of the same commit.
+    pub(super) fn weights_from(&self, files: [(&Path, &mut File); 2]) -> Result<Option<Weights>> {
+        let [weights, products] = files.map(|(path, file)| {
+            let mut bytes = Vec::new();
+            let read = file.read_to_end(&mut bytes);
+            read.map(|_| (path, bytes)).map_err(|error| Error::storage(path, format!("cannot be read: {error}")))
+        });
+        let ((path, weights), (products_path, products)) = (weights?, products?);
+        Weights::decode(&self.header, [(path, &weights), (products_path, &products)])
+    }
+
+    /// The weights of a tile with those of one more unit, `n_unit` samples after `n_before`, thinned to what is kept.
+    pub fn merged(
+        &self,
+        tile: u32,
+        old: Option<&Weights>,
+        n_before: u32,
+        unit: Weights,
+        n_unit: u32,
+    ) -> Result<Weights> {
+        let (groups, expander) = (self.header.groups(), self.expander()?);
+        let group = group_after(n_before, self.header.epoch, groups);
+        let merged = Weights::merged(old, n_before, unit, n_unit, group, groups);
+        let importances = merged.importances(expander, &expander.rows(&merged.products));
+        let (rect, [x, y]) = (self.grid().rect(tile), self.header.origin);
+        Ok(merged.thinned(&importances, self.header.tile, [x + rect.x0, y + rect.y0], n_before + n_unit))
+    }
+
+    /// How the samples of a tile are spread over the groups of epochs of a factored cube.
+    pub(super) fn groups(&self, samples: u32) -> Groups {
+        Groups::new(samples, self.header.epoch, self.header.groups())
     }
 
     /// Maps a file of a tile that has all channels of every pixel; `path` is what errors name.
@@ -298,7 +363,16 @@ impl Cube {
 
     /// The parts that each tile of this cube has.
     pub(super) fn parts(&self) -> &'static [TileArray] {
-        if self.header.has_uncertainty() { &TileArray::ALL } else { &TileArray::ALL[..4] }
+        match (self.header.is_factored(), self.header.has_uncertainty()) {
+            (true, _) => &TileArray::FACTORED,
+            (false, true) => &TileArray::ALL,
+            (false, false) => &TileArray::ALL[..4],
+        }
+    }
+
+    /// The one from which all that is derived can be made, with others of [`Cube::parts`] that cannot.
+    pub(super) fn main_part(&self) -> TileArray {
+        self.parts()[0]
     }
 
     /// The K channels of the pixel in column `x` and row `y` from the top left, in one contiguous read; `None` before
@@ -390,6 +464,7 @@ impl Cube {
             }
             TileArray::Samples => format!("{name}/c/{row}/{column}"),
             TileArray::Preview => format!("{name}/c/{row}/{column}/0"),
+            TileArray::Weights | TileArray::Products => format!("{name}/c/{row}/{column}/0/0"),
         })
     }
 

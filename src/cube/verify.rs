@@ -89,7 +89,7 @@ impl Cube {
         let Some(record) = last else {
             return path.exists().then(|| format!("{} is there, but no journal speaks of it", name()));
         };
-        let expected = Some(record.checksums[part as usize]);
+        let expected = Some(record.checksums[part.place()]);
         // A commit that has not come, or never came, to its renames: whoever works on the tile next does them.
         let is_sound = checksum_of(&path) == expected
             || checksum_of(&self.aside_path(part, tile, record.suffix)) == expected

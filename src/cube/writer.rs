@@ -20,6 +20,7 @@ use super::merge::{UnitPass, check_portion, write_standard_errors};
 use super::metadata::{Header, Layout};
 use super::state::Window;
 use super::store::{Cube, TileArray};
+use super::weights::Weights;
 use super::{recover, restore};
 use crate::spectral::tone::Picture;
 use crate::{Error, Result, files};
@@ -71,9 +72,41 @@ struct Pending {
     record: Record,
     /// Suffix of the record before it in the journal.
     previous: Option<u64>,
-    chunk: Chunk,
-    /// In cubes that have them.
-    errors: Option<Chunk>,
+    held: Held,
+}
+
+/// What a unit is, as a device brings it back.
+enum Unit<'a> {
+    /// [tile_h][tile_w][K].
+    Radiance(&'a [f32]),
+    /// Of a tile that has none: [tile_w][tile_h][K], and standard errors.
+    Columns {
+        values: &'a [f32],
+        errors: Option<&'a [f32]>,
+    },
+    Weights(Weights),
+}
+
+impl Unit<'_> {
+    fn is_for(&self, header: &Header) -> bool {
+        match self {
+            Unit::Radiance(unit) | Unit::Columns { values: unit, .. } => {
+                !header.is_factored() && unit.len() == header.grid().tile_pixels() * header.channels.len()
+            }
+            Unit::Weights(unit) => header.is_factored() && unit.pixels() == header.grid().tile_pixels(),
+        }
+    }
+}
+
+/// What is at hand of a tile that was merged.
+enum Held {
+    Radiance {
+        mean: Chunk,
+        /// In cubes that have them.
+        errors: Option<Chunk>,
+    },
+    /// Nothing: they are read again.
+    Weights,
 }
 
 impl Writer {
@@ -174,12 +207,22 @@ impl Writer {
     ///
     /// Waits while the open batch is full. On an error the tile is what it was.
     pub fn merge_unit(&self, tile: u32, n_before: u32, n_unit: u32, unit: &[f32]) -> Result<()> {
-        self.merge(tile, n_before, n_unit, unit, check_portion)
+        self.merge(tile, n_before, n_unit, Unit::Radiance(unit), check_portion)
+    }
+
+    /// As [`Writer::merge_unit`], the weights of a tile of a factored cube.
+    pub fn merge_weights(&self, tile: u32, n_before: u32, n_unit: u32, unit: Weights) -> Result<()> {
+        self.merge(tile, n_before, n_unit, Unit::Weights(unit), check_portion)
     }
 
     /// Stores what was made of another cube's tile, with as many samples per pixel as that has, into one that has none.
     pub fn store(&self, tile: u32, samples: u32, values: &[f32]) -> Result<()> {
-        self.merge(tile, 0, samples, values, |_, samples, _| Ok(samples))
+        self.merge(tile, 0, samples, Unit::Radiance(values), |_, samples, _| Ok(samples))
+    }
+
+    /// The same of values that lie as in a chunk, column by column, with their standard errors in a cube that has them.
+    pub fn store_columns(&self, tile: u32, samples: u32, values: &[f32], errors: Option<&[f32]>) -> Result<()> {
+        self.merge(tile, 0, samples, Unit::Columns { values, errors }, |_, samples, _| Ok(samples))
     }
 
     fn merge(
@@ -187,13 +230,12 @@ impl Writer {
         tile: u32,
         n_before: u32,
         n_unit: u32,
-        unit: &[f32],
+        unit: Unit,
         samples_after: fn(u32, u32, u32) -> Result<u32>,
     ) -> Result<()> {
-        let (cube, grid) = (&self.cube, self.cube.grid());
-        let expected = grid.tile_pixels() * cube.channels().len();
-        if !self.tiles.contains(&tile) || unit.len() != expected {
-            let what = format!("tile {tile} with {} values where {:?} have {expected}", unit.len(), self.tiles);
+        let cube = &self.cube;
+        if !self.tiles.contains(&tile) || !unit.is_for(cube.header()) {
+            let what = format!("a unit of tile {tile} is not what the tiles {:?} of this cube hold", self.tiles);
             return Err(Error::Internal(what));
         }
         let _held = self.merging[tile as usize % self.merging.len()].lock().unwrap_or_else(PoisonError::into_inner);
@@ -207,14 +249,20 @@ impl Writer {
         }
         let samples = samples_after(n_before, n_unit, cube.header().epoch)?;
         let aside = Aside::new(cube, tile);
-        let record = aside.write(base.as_ref(), samples, n_unit, unit)?;
-        let mapped = |part: TileArray| {
-            let path = aside.path(part);
-            cube.mapped(&path, tile)?.ok_or_else(|| Error::storage(&path, "has vanished"))
+        let (record, held) = match unit {
+            Unit::Radiance(_) | Unit::Columns { .. } => {
+                let record = aside.write(base.as_ref(), samples, n_unit, &unit)?;
+                let mapped = |part: TileArray| {
+                    let path = aside.path(part);
+                    cube.mapped(&path, tile)?.ok_or_else(|| Error::storage(&path, "has vanished"))
+                };
+                let mean = mapped(TileArray::Radiance)?;
+                let errors = cube.header().has_uncertainty().then(|| mapped(TileArray::StandardError)).transpose()?;
+                (record, Held::Radiance { mean, errors })
+            }
+            Unit::Weights(unit) => (aside.write_weights(base.as_ref(), samples, n_unit, unit)?, Held::Weights),
         };
-        let chunk = mapped(TileArray::Radiance)?;
-        let errors = cube.header().has_uncertainty().then(|| mapped(TileArray::StandardError)).transpose()?;
-        self.insert(aside, base, record, chunk, errors);
+        self.insert(aside, base, record, held);
         Ok(())
     }
 
@@ -237,17 +285,23 @@ impl Writer {
             let damaged = |what: &str| Error::storage(&path, format!("{what}; --resume puts it in order"));
             let chunk = self.cube.mapped(&path, tile)?;
             let chunk = chunk.ok_or_else(|| damaged("is missing, although the journal has it"))?;
-            if checksums::of(chunk.bytes()) != record.checksums[part as usize] {
+            if checksums::of(chunk.bytes()) != record.checksums[part.place()] {
                 return Err(damaged("is damaged: it is not what the journal says"));
             }
             Ok(chunk)
         };
-        let chunk = sound(TileArray::Radiance)?;
-        let errors = self.cube.header().has_uncertainty().then(|| sound(TileArray::StandardError)).transpose()?;
-        Ok(Some(Base::Committed(Box::new(Committed { record, chunk, errors }))))
+        let held = match self.cube.header().is_factored() {
+            // Read when it is merged, which looks at the checksums too.
+            true => Held::Weights,
+            false => Held::Radiance {
+                mean: sound(TileArray::Radiance)?,
+                errors: self.cube.header().has_uncertainty().then(|| sound(TileArray::StandardError)).transpose()?,
+            },
+        };
+        Ok(Some(Base::Committed(Box::new(Committed { record, held }))))
     }
 
-    fn insert(&self, aside: Aside, base: Option<Base>, record: Record, chunk: Chunk, errors: Option<Chunk>) {
+    fn insert(&self, aside: Aside, base: Option<Base>, record: Record, held: Held) {
         let tile = record.tile;
         let mut state = self.lock();
         let replaced = state.open.remove(&tile);
@@ -258,7 +312,7 @@ impl Writer {
             (Some(base), _) => Some(base.record().suffix),
         };
         state.totals.replace(base.as_ref().map(Base::record), &record);
-        state.open.insert(tile, Arc::new(Pending { record, previous, chunk, errors }));
+        state.open.insert(tile, Arc::new(Pending { record, previous, held }));
         drop(state);
         aside.keep();
         if let Some(replaced) = replaced {
@@ -373,8 +427,7 @@ enum Base {
 /// A tile as its last commit left it.
 struct Committed {
     record: Record,
-    chunk: Chunk,
-    errors: Option<Chunk>,
+    held: Held,
 }
 
 impl Base {
@@ -385,18 +438,48 @@ impl Base {
         }
     }
 
-    fn chunk(&self) -> &Chunk {
+    fn held(&self) -> &Held {
         match self {
-            Base::Committed(committed) => &committed.chunk,
-            Base::Pending(pending) => &pending.chunk,
+            Base::Committed(committed) => &committed.held,
+            Base::Pending(pending) => &pending.held,
+        }
+    }
+
+    fn chunk(&self) -> Option<&Chunk> {
+        match self.held() {
+            Held::Radiance { mean, .. } => Some(mean),
+            Held::Weights => None,
         }
     }
 
     fn errors(&self) -> Option<&Chunk> {
-        match self {
-            Base::Committed(committed) => committed.errors.as_ref(),
-            Base::Pending(pending) => pending.errors.as_ref(),
+        match self.held() {
+            Held::Radiance { errors, .. } => errors.as_ref(),
+            Held::Weights => None,
         }
+    }
+
+    /// The weights of a tile of a factored cube.
+    fn weights(&self, cube: &Cube) -> Result<Weights> {
+        let record = self.record();
+        let place = |part: TileArray| match self {
+            Base::Committed(_) => cube.part_path(part, record.tile),
+            Base::Pending(pending) => cube.aside_path(part, record.tile, pending.record.suffix),
+        };
+        let read = |part: TileArray| {
+            let path = place(part);
+            // A commit may just have put it into its place.
+            let bytes = fs::read(&path).or_else(|_| fs::read(cube.part_path(part, record.tile)));
+            let bytes = bytes.map_err(|error| Error::storage(&path, format!("cannot be read: {error}")))?;
+            if checksums::of(&bytes) != record.checksums[part.place()] {
+                let what = "is damaged: it is not what the journal says; --resume puts it in order";
+                return Err(Error::storage(&path, what));
+            }
+            Ok((path, bytes))
+        };
+        let ((path, weights), (products_path, products)) = (read(TileArray::Weights)?, read(TileArray::Products)?);
+        let weights = Weights::decode(cube.header(), [(&path, &weights), (&products_path, &products)])?;
+        weights.ok_or_else(|| Error::storage(&path, "is damaged: it does not belong to the products beside it"))
     }
 }
 
@@ -422,12 +505,17 @@ impl<'a> Aside<'a> {
     }
 
     /// Writes the tile's new files and says what they are.
-    fn write(&self, base: Option<&Base>, samples: u32, n_unit: u32, unit: &[f32]) -> Result<Record> {
+    fn write(&self, base: Option<&Base>, samples: u32, n_unit: u32, unit: &Unit) -> Result<Record> {
         let (cube, tile) = (self.cube, self.tile);
+        let (unit, layout, known_errors) = match *unit {
+            Unit::Radiance(unit) => (unit, Layout::Rows, None),
+            Unit::Columns { values, errors } => (values, Layout::Columns, errors),
+            Unit::Weights(_) => return Err(Error::Internal("weights are no radiance".into())),
+        };
         let mut pass = UnitPass::new(cube.grid(), cube.grid().rect(tile), cube.channels().len(), cube.projection());
         let weight = f64::from(n_unit) / f64::from(samples);
         let radiance =
-            self.file(TileArray::Radiance, |file| pass.run(base.map(Base::chunk), unit, Layout::Rows, weight, file))?;
+            self.file(TileArray::Radiance, |file| pass.run(base.and_then(Base::chunk), unit, layout, weight, file))?;
         if let Some(k) = pass.square.iter().position(|v| !v.is_finite()) {
             let what = format!("a unit of tile {tile} holds a value in channel {k} that is not finite");
             return Err(Error::Internal(what));
@@ -439,8 +527,11 @@ impl<'a> Aside<'a> {
         let errors = match cube.header().has_uncertainty() {
             false => 0,
             true => self.file(TileArray::StandardError, |file| {
+                if let Some(errors) = known_errors {
+                    return file.write_all(bytemuck::cast_slice(errors));
+                }
                 let (grid, epochs) = (cube.grid(), samples / cube.header().epoch);
-                let old = base.and_then(|base| Some((base.chunk(), base.errors()?)));
+                let old = base.and_then(|base| Some((base.chunk()?, base.errors()?)));
                 write_standard_errors(grid, grid.rect(tile), cube.channels().len(), epochs, old, unit, file)
             })?,
         };
@@ -450,6 +541,51 @@ impl<'a> Aside<'a> {
             epoch: epochs_in(samples, cube.header().epoch).saturating_sub(1),
             suffix: self.suffix,
             checksums: [radiance, samples_sum, preview, overview, errors],
+            spread,
+            square,
+        })
+    }
+
+    /// The same of weights. All that is derived from radiance is derived from that which readers make of them.
+    fn write_weights(&self, base: Option<&Base>, samples: u32, n_unit: u32, unit: Weights) -> Result<Record> {
+        let (cube, tile, expander) = (self.cube, self.tile, self.cube.expander()?);
+        let (grid, channels, epoch) = (cube.grid(), cube.channels().len(), cube.header().epoch);
+        let (size, rect) = (grid.tile, grid.rect(tile));
+        let pass = || UnitPass::new(grid, rect, channels, cube.projection());
+        let in_memory = |error| Error::storage(cube.path(), error);
+        let old = base.map(|base| base.weights(cube)).transpose()?;
+        let radiance = |weights: &Weights| {
+            let rows = expander.rows(&weights.products);
+            weights.expanded(&rows, channels, size, rect)
+        };
+        // How far the unit is from the mean before it, where that is one of whole epochs.
+        let mut distances = pass();
+        if let Some(old) = old.as_ref().filter(|_| samples - n_unit >= epoch) {
+            let before = Chunk::of(radiance(old), rect, size, channels);
+            let run = distances.run(Some(&before), &radiance(&unit), Layout::Columns, 1.0, &mut std::io::sink());
+            run.map_err(in_memory)?;
+        }
+        let weights = cube.merged(tile, old.as_ref(), samples - n_unit, unit, n_unit)?;
+        let mut all = pass();
+        all.run(None, &radiance(&weights), Layout::Columns, 1.0, &mut std::io::sink()).map_err(in_memory)?;
+        if let Some(k) = all.square.iter().position(|v| !v.is_finite()) {
+            let what = format!("a unit of tile {tile} holds a value in channel {k} that is not finite");
+            return Err(Error::Internal(what));
+        }
+        let mut all = all.with_distance(distances);
+        let (spread, square) = all.sums(base.map(Base::record), epoch);
+        let [of_weights, of_products] = weights.encode(cube.header()).map_err(in_memory)?;
+        let weights_sum = self.file(TileArray::Weights, |file| file.write_all(&of_weights))?;
+        let samples_sum = self.file(TileArray::Samples, |file| file.write_all(&samples.to_le_bytes()))?;
+        let preview = self.file(TileArray::Preview, |file| file.write_all(bytemuck::cast_slice(&all.preview)))?;
+        let overview = self.file(TileArray::Overview, |file| file.write_all(bytemuck::cast_slice(&all.overview)))?;
+        let products_sum = self.file(TileArray::Products, |file| file.write_all(&of_products))?;
+        Ok(Record {
+            tile,
+            samples,
+            epoch: epochs_in(samples, epoch).saturating_sub(1),
+            suffix: self.suffix,
+            checksums: [weights_sum, samples_sum, preview, overview, products_sum],
             spread,
             square,
         })

@@ -308,7 +308,7 @@ impl Exhibit {
     }
 
     fn spectrum(&mut self, curve: Curve) -> usize {
-        self.scene.spectra.push(Spectrum { name: "of everything".into(), curve });
+        self.scene.spectra.push(Spectrum { name: "of everything".into(), curve, definition: None });
         self.scene.spectra.len() - 1
     }
 

@@ -70,13 +70,14 @@ pub struct Kernels {
     pub update: Option<Source>,
     /// Chooses the paths that are evaluated, where it is not all of them.
     pub thin: Option<Source>,
-    /// Leaves the means of a wave's pixels: it evaluates all saved paths, or folds what `update` made of them.
-    pub evaluate: Source,
+    /// Leaves the means of a wave's pixels: it evaluates all saved paths, or folds what `update` made of them. None where records are
+    /// all that is wanted.
+    pub evaluate: Option<Source>,
 }
 
 impl Kernels {
     pub fn all(&self) -> impl Iterator<Item = &Source> {
-        [&self.camera, &self.bounce].into_iter().chain(&self.update).chain(&self.thin).chain([&self.evaluate])
+        [&self.camera, &self.bounce].into_iter().chain(&self.update).chain(&self.thin).chain(&self.evaluate)
     }
 }
 
@@ -104,10 +105,11 @@ impl OnDevice<'_> {
             update: (self.evaluator == Evaluator::Pt).then(|| evaluating(UPDATE)),
             thin: self.thinning.is_some().then(|| text(THIN, &try_paths)),
             evaluate: match self.evaluator {
-                Evaluator::Auto | Evaluator::DpeptPixel => evaluating(PIXEL),
-                Evaluator::DpeptPath => evaluating(PATH),
-                Evaluator::DpeptSpectral => evaluating(SPECTRAL),
-                Evaluator::Pt => compose(&self.modules(FOLD_PATHS), &evaluate),
+                Evaluator::Auto | Evaluator::DpeptPixel => Some(evaluating(PIXEL)),
+                Evaluator::DpeptPath => Some(evaluating(PATH)),
+                Evaluator::DpeptSpectral => Some(evaluating(SPECTRAL)),
+                Evaluator::Pt => Some(compose(&self.modules(FOLD_PATHS), &evaluate)),
+                Evaluator::Factored => None,
             },
         }
     }

@@ -12,6 +12,7 @@ pub mod part;
 pub mod parts;
 pub mod prepared;
 pub mod rng;
+pub mod separable;
 mod spectra;
 pub mod text;
 pub mod windows;

@@ -18,6 +18,7 @@ use crate::device::parts::radiators::Radiators;
 use crate::device::parts::scattering::Scattering;
 use crate::device::parts::sky::SkyMap;
 use crate::device::parts::surfaces::{Needed, Surfaces};
+use crate::device::separable::{Separable, Separated};
 use crate::device::spectra::{MAX_REGISTER_SPECTRA, SpectrumIds, daylight, spectral_tables};
 use crate::device::windows::Windows;
 use crate::device::words::{
@@ -33,6 +34,8 @@ use crate::{Error, Result};
 const MAX_RECORDS: u32 = LOOP_LIMIT;
 /// Words of a path's state that every scene has: origin and density; direction, counts of records.
 const STATE_WORDS: u32 = 8;
+/// With which a surface is gone on from whose spectrum may be exchanged after the render.
+pub const LEAST_ALBEDO: f64 = 0.5;
 /// Iterations that one bounce may take beside the voxels on its ways.
 const MOST_STEPS: u32 = 8_192;
 
@@ -104,6 +107,8 @@ pub struct Prepared {
     /// The device id of the spectrum with which a path's throughput begins, where it is not 1: weights of responses and of
     /// wavelengths.
     pub path_weight: Option<u32>,
+    /// What records say of products of spectra, where those are kept instead of channels.
+    pub separable: Option<Separable>,
 }
 
 impl Prepared {
@@ -115,7 +120,7 @@ impl Prepared {
 
     /// As [`Prepared::new`], for the evaluator chosen.
     pub fn for_evaluator(scene: &Scene, seed: u64, evaluator: Evaluator) -> Result<Prepared> {
-        match Integration::of(&scene.channels) {
+        match Integration::of(&scene.channels).filter(|_| evaluator != Evaluator::Factored) {
             None => Prepared::flatten(scene, seed, evaluator, None),
             Some(integration) => {
                 let inner = Scene { channels: integration.inner.clone(), ..scene.clone() };
@@ -149,6 +154,8 @@ impl Prepared {
         let emitted = || Emitted::of(scene, &accel, &picks.lamps, environment).shares(scene, &accel);
         let needed = surfaces.as_ref().map_or(&[][..], |s| &s.spectra);
         let (tables, ids, warp) = spectral_tables(scene, &heat, needed, in_registers, weights, emitted)?;
+        let separable = scene.is_factored().then(|| Separated::new(scene, &heat)).transpose()?;
+        let separable = separable.map(|separated| separated.by_id(&ids, needed, &tables));
         let factor = |s: usize| tables.ids[ids.factors[&s]];
         let source = |s: usize| tables.ids[ids.sources[&s]];
         let id = |position: usize| tables.ids[ids.needed[position]];
@@ -193,6 +200,7 @@ impl Prepared {
             wavelengths_per_channel: scene.integrator.wavelengths_per_channel,
             path_weight: ids.path_weight.map(|position| tables.ids[position]),
             integration,
+            separable,
             thinning: None,
             warp,
             accel,
@@ -397,6 +405,7 @@ fn material(scene: &Scene, m: &crate::scene::Material, factor: impl Fn(usize) ->
         Bsdf::Diffuse { reflectance: Reflectance::Spectrum(reflectance) } => {
             let curve = &scene.spectra[reflectance].curve;
             let albedo = scene.channels.bounds.iter().map(|b| curve.max(b[0], b[1])).fold(0.0, f64::max);
+            let albedo = if scene.is_factored() { albedo.max(LEAST_ALBEDO) } else { albedo };
             // What reflects in no channel is black.
             (if albedo > 0.0 { factor(reflectance) } else { NONE }, albedo)
         }

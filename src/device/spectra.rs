@@ -6,9 +6,9 @@ use crate::device::emission::Share;
 use crate::device::parts::heat;
 use crate::device::parts::surfaces::Needed;
 use crate::scene::{Bsdf, Environment, Reflectance, Scene, Texels, Wavelengths};
-use crate::spectral::Curve;
 use crate::spectral::table::{Exactness, SpectralTables, Tabulated, Wanted};
 use crate::spectral::warp::Warp;
+use crate::spectral::{Channels, Curve};
 use crate::{Error, Result};
 
 /// Spectra that may be held in registers while a pixel is evaluated; with more, each is looked up where it is needed.
@@ -107,6 +107,14 @@ pub fn spectral_tables<'a>(
         let wanted: Vec<Wanted> = wanted.iter().copied().chain(is_weighted.then_some(weights)).collect();
         SpectralTables::warped(&wanted, &scene.channels, warp)
     };
+    if scene.is_factored() {
+        // Ids are all that is needed.
+        let channels = Channels::equal(400.0, 500.0, 1);
+        let none = Wanted::from(Tabulated::Same(&Curve::Constant(1.0)));
+        let tables = SpectralTables::warped(&vec![none; wanted.len()], &channels, &Warp::uniform(&channels));
+        let ids = SpectrumIds { factors, sources, needed: needed_at, path_weight: None, names };
+        return Ok((tables, ids, Warp::uniform(&scene.channels)));
+    }
     let mut warp = Warp::uniform(&scene.channels);
     let mut tables = None;
     if scene.integrator.wavelengths == Wavelengths::Emission {

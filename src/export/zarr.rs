@@ -11,7 +11,7 @@ use zarrs::storage::store::MemoryStore;
 use zarrs::storage::{ReadableStorageTraits, WritableStorageTraits};
 
 use super::{PIECE_BYTES, Progress, check_space, long_name, units};
-use crate::cube::{Quantity, Rect, Strides, View, plain_attributes};
+use crate::cube::{FACTORED, Quantity, Rect, Strides, View, plain_attributes};
 use crate::files::output::{NewFolder, Product, cannot_write, only_holds};
 use crate::{Error, Result, files};
 
@@ -210,6 +210,8 @@ fn group(view: &View, arrays: &[(&str, Value)]) -> Value {
     let mut attributes = header.attributes.clone();
     // Of the cube, which this is no longer.
     attributes.remove("uncertainty");
+    // What is exported is radiance.
+    attributes.remove(FACTORED);
     attributes.extend([
         ("Conventions".into(), json!("CF-1.11")),
         ("title".into(), json!("Spectral image")),

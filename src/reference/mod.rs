@@ -133,7 +133,8 @@ mod tests {
     /// A grey sphere before a sky whose spectrum rises: every random decision matters.
     fn small_scene() -> Scene {
         let rising = Curve::Linear { nm: vec![400.0, 700.0], value: vec![1.0, 2.0], outside: Outside::Zero };
-        let spectra = [Curve::Constant(0.5), rising].map(|curve| Spectrum { name: "test".into(), curve });
+        let spectra =
+            [Curve::Constant(0.5), rising].map(|curve| Spectrum { name: "test".into(), curve, definition: None });
         Scene {
             file: "test".into(),
             camera: Camera {

@@ -2,6 +2,7 @@
 
 #[cfg(test)]
 mod fault_tests;
+mod gather;
 pub mod interrupt;
 pub mod job;
 mod last_bounce;

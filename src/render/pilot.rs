@@ -41,9 +41,10 @@ const LEAST_GAIN: f64 = 1.1;
 /// the very most, and usually nothing.
 const LEAST_COST: f64 = 0.25;
 
-/// Whether there is something to decide: `pt` evaluates while it traces.
+/// Whether there is something to decide: `pt` evaluates while it traces, and factored renders evaluate nothing.
 pub fn is_needed(scene: &Scene, prepared: &Prepared) -> bool {
-    scene.integrator.evaluation != Evaluation::All && prepared.evaluator != Evaluator::Pt
+    let is_deferred = !matches!(prepared.evaluator, Evaluator::Pt | Evaluator::Factored);
+    scene.integrator.evaluation != Evaluation::All && is_deferred
 }
 
 /// `prepared` with what was chosen for `scene`: by the cube that is gone on with (`there`), else by rule, else by samples on the first of

@@ -7,6 +7,7 @@ use crate::device::evaluator;
 use crate::device::facts;
 use crate::device::part::OnDevice;
 use crate::device::prepared::Prepared;
+use crate::device::separable;
 use crate::device::windows::Windows;
 use crate::render::wave::{Budget, DeviceLimits, WavePlan};
 use crate::scene::{Evaluator, Scene};
@@ -52,7 +53,12 @@ pub fn header(scene: &Scene, tile: [u32; 2], seed: u64, uncertainty: bool) -> He
         epoch: scene.integrator.epoch,
         attributes,
     };
-    if uncertainty { header.with_uncertainty() } else { header }
+    let header = if uncertainty { header.with_uncertainty() } else { header };
+    match scene.is_factored() {
+        // What does not separate is refused by `check`.
+        true => header.with_weights(&separable::basis(scene).unwrap_or_default(), scene.integrator.max_bounces),
+        false => header,
+    }
 }
 
 /// The evaluator for `scene` on a software device or a GPU; or the one with which the cube was begun that `there` describes, since
@@ -61,6 +67,9 @@ pub fn evaluator(scene: &Scene, there: Option<&Header>, software: bool) -> Resul
     let Some(recorded) = there.and_then(|header| header.attributes.get(EVALUATOR)) else {
         return Ok(evaluator::resolve(scene, software));
     };
+    if scene.is_factored() {
+        return Ok(Evaluator::Factored);
+    }
     recorded.as_str().and_then(Evaluator::named).ok_or_else(|| {
         Error::Usage(format!("the cube was begun with the evaluator {recorded}, which this version does not have"))
     })
@@ -99,5 +108,5 @@ pub fn check(scene: &Scene) -> Result<()> {
     if width == 0 || height == 0 || scene.channels.is_empty() {
         return Err(Error::input(&scene.file, "there is nothing to render: no pixels or no channels"));
     }
-    Ok(())
+    if scene.is_factored() { separable::basis(scene).map(drop) } else { Ok(()) }
 }

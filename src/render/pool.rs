@@ -10,7 +10,7 @@ use crossbeam_channel::{Sender, unbounded};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use crate::cube::{CubeState, Writer, epoch_samples, merge_means, samples_before};
+use crate::cube::{CubeState, Weights, Writer, epoch_samples, merge_means, samples_before};
 use crate::device::prepared::Prepared;
 use crate::device::words::Counters;
 use crate::files::format_bytes;
@@ -74,6 +74,8 @@ struct Taken {
     collected: u32,
     /// The means of each tile over these, where several epochs are merged at once.
     means: Vec<Vec<f32>>,
+    /// Or their weights, of a factored render.
+    weights: Vec<Weights>,
     tally: Tally,
     bad: Option<[u32; 4]>,
 }
@@ -298,6 +300,10 @@ impl Pool {
         let began = Instant::now();
         oldest.note(counters, epoch, || self.bad_sample(collected));
         let (n_before, samples) = (samples_before(epoch, self.full_epoch), epoch_samples(epoch, self.full_epoch));
+        if self.prepared.separable.is_some() {
+            let merged = self.merge_weights(collected, oldest, [n_before, samples], post.mergers.as_deref())?;
+            return if merged { self.report_merged(began, n_before + samples, collected.idle_s, post) } else { Ok(()) };
+        }
         // With responses the device has rendered parts of the channels.
         let sums = self.prepared.integration.as_ref().map(|integration| integration.sums(collected.means()));
         let means: &[f32] = sums.as_deref().unwrap_or(collected.means());
@@ -322,12 +328,46 @@ impl Pool {
                 self.cube().merge_unit(**tile, n_before, samples, unit)
             })?;
         }
+        self.report_merged(began, n_before + samples, collected.idle_s, post)
+    }
+
+    /// Merges what came back of a factored render; whether the group is done.
+    fn merge_weights(
+        &self,
+        collected: &Collected,
+        oldest: &mut Taken,
+        [n_before, samples]: [u32; 2],
+        mergers: Option<&ThreadPool>,
+    ) -> Result<bool> {
+        let cube = self.cube();
+        let tiles = &oldest.group.tiles;
+        if oldest.group.epochs == 1 {
+            let units: Vec<_> = tiles.iter().zip(&collected.weights).collect();
+            on_all(mergers, &units, |(tile, unit)| cube.merge_weights(**tile, n_before, samples, (*unit).clone()))?;
+            return Ok(true);
+        }
+        // The same arithmetic as in the cube, but nothing is written before the last of these epochs.
+        let before = std::mem::take(&mut oldest.weights);
+        let units = tiles.iter().zip(&collected.weights).enumerate();
+        let merged =
+            units.map(|(i, (&tile, unit))| cube.cube().merged(tile, before.get(i), n_before, unit.clone(), samples));
+        oldest.weights = merged.collect::<Result<_>>()?;
+        if oldest.collected < oldest.group.epochs {
+            return Ok(false);
+        }
+        let all: Vec<_> = tiles.iter().zip(&oldest.weights).collect();
+        on_all(mergers, &all, |(tile, all)| cube.merge_weights(**tile, 0, n_before + samples, (*all).clone()))?;
+        Ok(true)
+    }
+
+    /// Tells that the oldest group is in the cube, which has so many samples of its tiles now.
+    fn report_merged(&self, began: Instant, n_after: u32, idle_s: f64, post: &mut Post) -> Result<()> {
         let Some(Taken { group, tally, bad, .. }) = post.taken.pop_front() else { return Ok(()) };
         self.queue.done(&group);
-        let merged = u64::from(n_before + samples - samples_before(group.epoch, self.full_epoch));
+        let merged = u64::from(n_after - samples_before(group.epoch, self.full_epoch));
         let grid = self.cube().cube().grid();
         let paths = group.tiles.iter().map(|&tile| grid.rect(tile).pixels() * merged).sum();
-        let (merge_s, idle_s) = (began.elapsed().as_secs_f64(), collected.idle_s);
+        let merge_s = began.elapsed().as_secs_f64();
         post.report(Report::Merged(Merged { group, paths, tally, bad, merge_s, idle_s }));
         Ok(())
     }
@@ -343,7 +383,7 @@ impl Pool {
 
 impl Taken {
     fn new(group: Group) -> Taken {
-        Taken { group, collected: 0, means: Vec::new(), tally: Tally::default(), bad: None }
+        Taken { group, collected: 0, means: Vec::new(), weights: Vec::new(), tally: Tally::default(), bad: None }
     }
 
     fn note(&mut self, counters: Counters, epoch: u32, bad_sample: impl FnOnce() -> [u32; 3]) {

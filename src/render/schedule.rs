@@ -18,7 +18,8 @@ use crate::render::last_bounce::LastBounce;
 use crate::render::pool::{Merged, Pool, Report, Tally};
 use crate::render::queue::Queue;
 use crate::render::watch::{Heard, Reports, Requests};
-use crate::render::worker::Profile;
+use crate::render::wave::{Budget, WavePlan};
+use crate::render::worker::{Profile, device_limits};
 use crate::render::{pilot, plan};
 use crate::{Error, Result, preview};
 
@@ -84,6 +85,7 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
     let evaluator = plan::evaluator(&job.scene, there.as_ref(), software)?;
     plan::record_evaluator(&mut header, evaluator);
     let prepared = Prepared::for_evaluator(&job.scene, job.seed, evaluator)?;
+    refuse_too_little(job, &prepared, tile, &gpus)?;
     let there = there.map(|_| Choices::read(&job.output)).transpose()?.flatten();
     let (prepared, choices) =
         pilot::decide(&job.scene, prepared, there, &mut gpus, job.memory, interrupt, &mut |what| {
@@ -185,6 +187,21 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
         tally: render.tally,
         status: render.status,
     })
+}
+
+/// Refuses memory that holds the waves of no device, before a pilot's smaller ones fill it.
+fn refuse_too_little(job: &Job, prepared: &Prepared, tile: [u32; 2], gpus: &[Gpu]) -> Result<()> {
+    let budget = Budget { memory: job.memory, paths: None };
+    let thinned = pilot::is_needed(&job.scene, prepared);
+    let plans = gpus.iter().map(|gpu| WavePlan::with_thinning(prepared, tile, device_limits(gpu), budget, thinned));
+    let mut refusals = Vec::new();
+    for plan in plans {
+        match plan {
+            Ok(_) => return Ok(()),
+            Err(refusal) => refusals.push(refusal),
+        }
+    }
+    refusals.into_iter().next().map_or(Ok(()), Err)
 }
 
 fn no_cube() -> Error {

@@ -22,6 +22,9 @@ const UNIT_BYTES: u64 = 16;
 /// Paths of the smallest waves: a few workgroups. With fewer, dispatches cost more than what they do.
 const LEAST_PATHS: u64 = 256;
 
+/// Waves of which records are on their way to the host, or walked through there, while the next one computes.
+pub const SAVED_WAVES: usize = 2;
+
 /// Most samples per pixel of a wave: those of the longest epoch that is usual.
 const MOST_SAMPLES: u32 = 64;
 
@@ -72,6 +75,8 @@ pub struct WavePlan {
     pub scaled: bool,
     /// Whether roulette decides which paths are evaluated.
     pub thinned: bool,
+    /// Whether records are read back instead of means (factored renders).
+    pub gathered: bool,
     pub limits: DeviceLimits,
     /// The scene on the device, bytes.
     pub scene_bytes: u64,
@@ -81,7 +86,21 @@ impl WavePlan {
     /// The largest waves that are worth it and fit. Errors: a tile whose channels, or a path whose records, exceed what
     /// the device can bind; a scene of more windows than bindings; a budget that does not hold the smallest waves.
     pub fn new(prepared: &Prepared, tile: [u32; 2], limits: DeviceLimits, budget: Budget) -> Result<WavePlan> {
-        let (channels, records) = (prepared.channels as u64, u64::from(prepared.max_records()));
+        WavePlan::with_thinning(prepared, tile, limits, budget, prepared.thinning.is_some())
+    }
+
+    /// The same, whether or not it is decided already that roulette has a say in which paths are evaluated.
+    pub fn with_thinning(
+        prepared: &Prepared,
+        tile: [u32; 2],
+        limits: DeviceLimits,
+        budget: Budget,
+        thinned: bool,
+    ) -> Result<WavePlan> {
+        // Records are all that comes back of factored renders.
+        let gathered = prepared.separable.is_some();
+        let channels = if gathered { 0 } else { prepared.channels as u64 };
+        let records = u64::from(prepared.max_records());
         let tile_pixels = u64::from(tile[0]) * u64::from(tile[1]);
         let tile_bytes = tile_pixels * channels * 4;
         if tile_bytes > limits.binding {
@@ -118,7 +137,8 @@ impl WavePlan {
             spectral_state_size: prepared.spectral_state_bytes(),
             sample_by_sample: prepared.evaluator.takes_one_sample(),
             scaled: prepared.features.roulette || prepared.scattering.is_some(),
-            thinned: prepared.thinning.is_some(),
+            thinned,
+            gathered,
             limits,
             scene_bytes: facts::scene_bytes(&on_device, buffer::allocated),
         };
@@ -142,7 +162,7 @@ impl WavePlan {
         // Means and transfers are aligned once for all units.
         let unit_bytes = UNIT_BYTES + 3 * plan.mean_bytes();
         let left = left.saturating_sub(3 * 16);
-        let shared = (if limits.software { 32 << 20 } else { 128 << 20 }).min(limits.binding) / tile_bytes;
+        let shared = (if limits.software { 32 << 20 } else { 128 << 20 }).min(limits.binding) / tile_bytes.max(1);
         let units = (u64::from(plan.paths) / tile_pixels).min(shared).min(1 + left / unit_bytes);
         plan.units = units.max(1) as u32;
         Ok(plan)
@@ -208,6 +228,11 @@ impl WavePlan {
         u64::from(self.paths) * u64::from(self.spectral_state_size)
     }
 
+    /// A buffer in which the heads and records of a wave are read back, or 0.
+    pub fn saved_bytes(&self) -> u64 {
+        if self.gathered { self.head_bytes() + self.record_bytes() } else { 0 }
+    }
+
     pub fn record_bytes(&self) -> u64 {
         u64::from(self.paths) * u64::from(self.max_records) * u64::from(self.record_size)
     }
@@ -255,8 +280,10 @@ impl WavePlan {
         let throughputs = self.scaled.then(|| self.throughput_bytes());
         let chances = self.thinned.then(|| self.chance_bytes());
         let spectral = (self.spectral_state_size > 0).then(|| self.spectral_state_bytes());
+        let saved = self.gathered.then(|| [self.saved_bytes(); SAVED_WAVES]);
         let sizes = [fixed, by_paths, by_units];
-        sizes.iter().flatten().copied().chain(throughputs).chain(chances).chain(spectral).map(buffer::allocated).sum()
+        let others = throughputs.into_iter().chain(chances).chain(spectral).chain(saved.into_iter().flatten());
+        sizes.iter().flatten().copied().chain(others).map(buffer::allocated).sum()
     }
 
     /// The most that a device holds at any moment: the scene, and then the waves' buffers; before those are there, what
@@ -274,6 +301,7 @@ impl WavePlan {
             + self.throughput_bytes().min(THROUGHPUT_BYTES)
             + self.chance_bytes().min(CHANCE_BYTES)
             + u64::from(self.spectral_state_size)
+            + SAVED_WAVES as u64 * self.saved_bytes() / u64::from(self.paths)
     }
 
     /// How many units to submit together in an epoch of `samples` samples per pixel.
@@ -321,7 +349,7 @@ impl WavePlan {
 /// within about 200 ms: GPU watchdogs end what takes seconds.
 fn wanted_paths(software: bool, channels: u64, records: u64) -> u64 {
     let (most, evaluations) = if software { (1 << 15, 1 << 29) } else { (1 << 20, 1 << 33) };
-    (evaluations / (channels * records)).clamp(LEAST_PATHS, most)
+    (evaluations / (channels * records).max(1)).clamp(LEAST_PATHS, most)
 }
 
 #[cfg(test)]
@@ -350,6 +378,7 @@ mod tests {
             sample_by_sample: false,
             scaled: false,
             thinned: false,
+            gathered: false,
             limits: LIMITS,
             scene_bytes: 0,
         }

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use crate::cube::Weights;
 use crate::device::evaluator::EvaluateShape;
 use crate::device::facts;
 use crate::device::part::OnDevice;
@@ -18,9 +19,11 @@ use crate::gpu::pass::Pass;
 use crate::gpu::source::Source;
 use crate::gpu::timestamps::Timestamps;
 use crate::gpu::upload::NamedBuffers;
+use crate::render::gather::{Gather, Saved};
 use crate::render::interrupt::Interrupt;
+use crate::render::pool::MERGE_THREADS;
 use crate::render::time_limit::TimeLimit;
-use crate::render::wave::{Budget, DeviceLimits, WavePlan};
+use crate::render::wave::{Budget, DeviceLimits, SAVED_WAVES, WavePlan};
 use crate::{Error, Result};
 
 mod path_buffers;
@@ -64,7 +67,8 @@ pub struct Worker {
     update: Option<Stage>,
     /// Before evaluation, where not all paths are evaluated.
     thin: Option<Stage>,
-    evaluate: Stage,
+    /// None where records are read back instead.
+    evaluate: Option<Stage>,
     shape: EvaluateShape,
     path_buffers: PathBuffers,
     frame: wgpu::Buffer,
@@ -74,6 +78,9 @@ pub struct Worker {
     clocked: bool,
     slots: [Slot; SLOTS],
     next_slot: usize,
+    /// Walks through records, in factored renders; where they come back, by turns.
+    gather: Option<Gather>,
+    saved: Vec<wgpu::Buffer>,
     /// The units submitted last, until they are collected.
     pending: Option<Pending>,
     /// Waves under way, the oldest first.
@@ -96,6 +103,8 @@ struct InFlight {
     number: u64,
     paths: u32,
     submission: wgpu::SubmissionIndex,
+    /// The wave and the slot of its units, where its records are read back.
+    saved: Option<(Wave, usize)>,
 }
 
 /// A pass with its bind groups.
@@ -127,6 +136,8 @@ pub struct Collected<'a> {
     pub gpu: &'a Gpu,
     pub units: &'a [UnitRect],
     view: wgpu::BufferView,
+    /// Of each unit, in factored renders: there are no means then.
+    pub weights: Vec<Weights>,
     pub counters: Counters,
     /// Seconds in which the device had nothing to do, so far.
     pub idle_s: f64,
@@ -177,7 +188,13 @@ impl Worker {
         let bounce = stage(&kernels.bounce)?;
         let update = kernels.update.as_ref().map(stage).transpose()?;
         let thin = kernels.thin.as_ref().map(stage).transpose()?;
-        let evaluate = stage(&kernels.evaluate)?;
+        let evaluate = kernels.evaluate.as_ref().map(stage).transpose()?;
+        // The cores of a software device have enough to do.
+        let threads = if gpu.is_software { 1 } else { MERGE_THREADS.min(rayon::current_num_threads()) };
+        let gather = Gather::new(&prepared, plan.tile, SLOTS, threads);
+        let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
+        let saved = gather.iter().flat_map(|_| 0..SAVED_WAVES);
+        let saved = saved.map(|_| buffer::empty(&gpu, "saved", plan.saved_bytes(), usage)).collect();
         gpu.check()?;
         let profile = Profile::default();
         let timestamps = None;
@@ -201,6 +218,8 @@ impl Worker {
             clocked: false,
             slots,
             next_slot: 0,
+            gather,
+            saved,
             pending: None,
             waves: VecDeque::new(),
             submitted: 0,
@@ -245,6 +264,10 @@ impl Worker {
             self.gpu.queue.write_buffer(&self.path_buffers.units, 0, bytemuck::cast_slice(units));
         }
         let ahead = if self.gpu.is_software { WAVES_AHEAD_SOFTWARE } else { WAVES_AHEAD };
+        let ahead = if self.gather.is_some() { SAVED_WAVES } else { ahead };
+        if let Some(gather) = &mut self.gather {
+            gather.begin(slot, units, epoch_samples);
+        }
         for wave in self.plan.waves(units.len() as u32, epoch, epoch_samples) {
             self.interrupt.check()?;
             while self.waves.len() >= ahead {
@@ -252,7 +275,7 @@ impl Worker {
             }
             #[cfg(test)]
             self.gpu.faults.reach(phase(&wave), &self.gpu);
-            self.submit_wave(wave)?;
+            self.submit_wave(wave, slot)?;
         }
 
         let watched = self.gpu.deadline.watch(self.limit());
@@ -298,11 +321,29 @@ impl Worker {
         let mut paths = 0;
         while let Some(wave) = self.waves.pop_front_if(|wave| wave.number <= done) {
             paths += u64::from(wave.paths);
+            if let Some((saved, slot)) = wave.saved {
+                self.walk(wave.number, &saved, slot)?;
+            }
         }
         if paths > 0 {
             self.time_limit.note(paths, self.at_work_since.elapsed());
             self.at_work_since = Instant::now();
         }
+        Ok(())
+    }
+
+    /// Takes the records of a wave that is done.
+    fn walk(&mut self, number: u64, wave: &Wave, slot: usize) -> Result<()> {
+        let (Some(gather), Some(scene)) = (&mut self.gather, &self.prepared.separable) else { return Ok(()) };
+        let buffer = &self.saved[number as usize % SAVED_WAVES];
+        self.gpu.check()?;
+        let lost = |e| Error::DevicesLost(format!("{}: {e}", self.gpu.name));
+        let view = buffer.slice(..).get_mapped_range().map_err(lost)?;
+        let words: &[u32] = bytemuck::cast_slice(&view);
+        let (heads, records) = words.split_at(self.plan.head_bytes() as usize / 4);
+        gather.take(slot, scene, &Saved { wave, heads, records });
+        drop(view);
+        buffer.unmap();
         Ok(())
     }
 
@@ -332,7 +373,8 @@ impl Worker {
             staging.slice(..end).get_mapped_range().map_err(lost)?
         };
         *is_mapped = true;
-        let counters: Counters = bytemuck::pod_read_unaligned(&view[view.len() - size_of::<Counters>()..]);
+        let mut counters: Counters = bytemuck::pod_read_unaligned(&view[view.len() - size_of::<Counters>()..]);
+        let weights = self.gather.as_mut().map(|gather| gather.finish(pending.slot, &mut counters));
         if let Some(what) = counters.missing(&pending.proof) {
             let what = format!("{}: a unit came back incomplete: {what}", self.gpu.name);
             return Err(Error::DevicesLost(what));
@@ -348,6 +390,7 @@ impl Worker {
             gpu: &self.gpu,
             units,
             view,
+            weights: weights.unwrap_or_default(),
             counters,
             idle_s: self.idle_s,
         })
@@ -363,9 +406,10 @@ impl Worker {
         let samples = u64::from(epoch_samples);
         let pixels = |[x0, y0, x1, y1]: &UnitRect| u64::from(x1 - x0) * u64::from(y1 - y0);
         let slots = units.len() as u64 * u64::from(self.plan.tile_pixels());
+        let blocks = if self.gather.is_some() { 1 } else { self.shape.blocks };
         Proof {
             paths: units.iter().map(pixels).sum::<u64>() * samples,
-            folded: slots * samples * u64::from(self.shape.blocks),
+            folded: slots * samples * u64::from(blocks),
             sequence: sequence(self.submitted),
         }
     }
@@ -379,7 +423,7 @@ impl Worker {
     }
 
     /// Generate: camera rays, then a bounce at a time. Evaluate: all channels along the saved paths.
-    fn submit_wave(&mut self, mut wave: Wave) -> Result<()> {
+    fn submit_wave(&mut self, mut wave: Wave, slot: usize) -> Result<()> {
         if self.waves.is_empty() {
             self.at_work_since = Instant::now();
         }
@@ -427,20 +471,34 @@ impl Worker {
         if let Some(thin) = &self.thin {
             thin.dispatch(&mut pass, &[], all, 1);
         }
-        if self.plan.sample_by_sample {
-            for sample in 0..wave.samples {
-                self.evaluate.dispatch(&mut pass, &step(sample), pixels, blocks);
+        if let Some(evaluate) = &self.evaluate {
+            if self.plan.sample_by_sample {
+                for sample in 0..wave.samples {
+                    evaluate.dispatch(&mut pass, &step(sample), pixels, blocks);
+                }
+            } else {
+                evaluate.dispatch(&mut pass, &[], pixels, blocks);
             }
-        } else {
-            self.evaluate.dispatch(&mut pass, &[], pixels, blocks);
         }
         drop(pass);
         self.lap(&mut encoder, 1)?;
         if let Some(timestamps) = &self.timestamps {
             timestamps.resolve(&mut encoder);
         }
+        let saved = self.gather.is_some().then_some((wave, slot));
+        let staging = &self.saved.get(self.submitted as usize % SAVED_WAVES);
+        if let Some(staging) = staging {
+            let (buffers, plan) = (&self.path_buffers, &self.plan);
+            let (heads, head_bytes) = (u64::from(paths) * 8, plan.head_bytes());
+            let records = u64::from(paths) * u64::from(plan.max_records) * u64::from(plan.record_size);
+            encoder.copy_buffer_to_buffer(&buffers.heads, 0, staging, 0, heads);
+            encoder.copy_buffer_to_buffer(&buffers.records, 0, staging, head_bytes, records);
+        }
         let submission = self.gpu.queue.submit([encoder.finish()]);
-        self.waves.push_back(InFlight { number: self.submitted, paths, submission });
+        if let Some(staging) = staging {
+            buffer::map(staging);
+        }
+        self.waves.push_back(InFlight { number: self.submitted, paths, submission, saved });
         if let Some(timestamps) = &self.timestamps {
             let passes = timestamps.read(&self.gpu, self.limit())?;
             passes.into_iter().enumerate().for_each(|(pass, seconds)| self.profile.add(pass, seconds));

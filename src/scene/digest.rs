@@ -40,7 +40,7 @@ pub fn digest(scene: &Scene) -> String {
     hash.film(film);
     hash.channels(channels);
     hash.integrator(integrator);
-    hash.list(spectra, |hash, Spectrum { name: _, curve }| hash.curve(curve));
+    hash.list(spectra, |hash, Spectrum { name: _, curve, definition: _ }| hash.curve(curve));
     hash.list(materials, Hash::material);
     if !textures.is_empty() {
         hash.text("textures");

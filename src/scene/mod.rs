@@ -20,6 +20,7 @@ mod medium;
 mod object;
 mod overrides;
 mod phase;
+mod relight;
 mod sensor;
 mod shape;
 mod spectrum;
@@ -42,6 +43,7 @@ pub use file::{load, parse, read};
 pub use light::{Cone, Light, Profile};
 
 pub use crate::format::phase::PhaseTable;
+pub use relight::{NewChannels, Relit, relight};
 pub use sensor::{Detector, Optics, SensorModel, load_sensor, parse_sensor};
 pub use spectrum::{Quantity, irradiance};
 
@@ -89,6 +91,18 @@ pub struct Scene {
 pub struct Spectrum {
     pub name: String,
     pub curve: Curve,
+    /// What of `[spectra]` it was made of; `None` where it is written in place.
+    pub definition: Option<Definition>,
+}
+
+/// Under a name in `[spectra]`, what a curve was made of: it is `scale` x this, or 1 - this.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Definition {
+    pub name: String,
+    pub quantity: Quantity,
+    pub curve: Arc<Curve>,
+    pub scale: f64,
+    pub is_complement: bool,
 }
 
 /// An orthonormal camera frame and a projection. A ray through film position (x, y), in pixels from the top left of
@@ -205,9 +219,25 @@ pub enum Evaluator {
     DpeptSpectral,
     /// The conventional path tracer: all channels of all paths in memory, updated at every bounce (Hoarau et al. 2018, section 4).
     Pt,
+    /// None: weights of products of spectra are kept, from which any channels follow (`render --factored`).
+    Factored,
+}
+
+impl Scene {
+    /// Whether weights of products of its spectra are kept instead of radiance.
+    pub fn is_factored(&self) -> bool {
+        self.integrator.evaluator == Evaluator::Factored
+    }
+
+    /// The same, with weights of products of its spectra kept instead of radiance.
+    pub fn factored(mut self) -> Scene {
+        self.integrator.evaluator = Evaluator::Factored;
+        self
+    }
 }
 
 impl Evaluator {
+    /// Those that a scene may ask for.
     pub const ALL: [Evaluator; 5] =
         [Evaluator::Auto, Evaluator::DpeptPixel, Evaluator::DpeptPath, Evaluator::DpeptSpectral, Evaluator::Pt];
 
@@ -229,6 +259,7 @@ impl Evaluator {
             Evaluator::DpeptPath => "dpept-path",
             Evaluator::DpeptSpectral => "dpept-spectral",
             Evaluator::Pt => "pt",
+            Evaluator::Factored => "factored",
         }
     }
 }

@@ -28,7 +28,7 @@ pub fn apply(cx: &Context<'_>, root: &mut Vec<Entry>, overrides: &[(String, Stri
 }
 
 /// The parts of a dotted key, by TOML's own rules.
-fn parse_key(key: &str) -> Option<Vec<String>> {
+pub(super) fn parse_key(key: &str) -> Option<Vec<String>> {
     if key.contains(['\n', '=', '#']) {
         return None;
     }

@@ -5,6 +5,7 @@ mod written;
 
 use std::collections::HashMap;
 use std::path::Path;
+use std::sync::Arc;
 
 pub use self::quantity::Quantity;
 pub use self::written::report_in_file;
@@ -12,7 +13,7 @@ use self::written::{Data, Source, TableFile, column_kelvin, source, table_data};
 use super::context::Context;
 use super::decode::{Item, did_you_mean, list};
 use super::tree::{Value, parse_document};
-use super::{Spectrum, SpectrumId};
+use super::{Definition, Spectrum, SpectrumId};
 use crate::error::{Error, Problem};
 use crate::format::noise;
 use crate::format::refractive;
@@ -79,6 +80,7 @@ pub type Handle = usize;
 struct Checked {
     name: String,
     curve: Curve,
+    definition: Option<Definition>,
     warnings: Vec<String>,
     taken: Option<SpectrumId>,
 }
@@ -143,6 +145,12 @@ impl<'a> Spectra<'a> {
             return *known;
         }
         let handle = definition.clone().and_then(|source| self.check(&source, name, item, quantity));
+        if let Some(handle) = handle {
+            let checked = &mut self.checked[handle];
+            let curve = Arc::new(checked.curve.clone());
+            checked.definition =
+                Some(Definition { name: name.clone(), quantity, curve, scale: 1.0, is_complement: false });
+        }
         self.by_name.insert(key, handle);
         handle
     }
@@ -199,16 +207,19 @@ impl<'a> Spectra<'a> {
         Some(found)
     }
 
-    /// The index of a checked spectrum in the scene. Equal curves share one.
+    /// The index of a checked spectrum in the scene. Equal curves of one definition share one.
     pub fn take(&mut self, handle: Handle) -> SpectrumId {
         let spectrum = &mut self.checked[handle];
         if let Some(id) = spectrum.taken {
             return id;
         }
         spectrum.warnings.drain(..).for_each(|warning| self.cx.warn(warning));
-        let same = self.scene.iter().position(|other| other.curve == spectrum.curve);
+        // What has names of its own may be exchanged by itself (factored cubes).
+        let is_same = |other: &Spectrum| other.curve == spectrum.curve && other.definition == spectrum.definition;
+        let same = self.scene.iter().position(is_same);
         let id = same.unwrap_or_else(|| {
-            self.scene.push(Spectrum { name: spectrum.name.clone(), curve: spectrum.curve.clone() });
+            let Checked { name, curve, definition, .. } = spectrum;
+            self.scene.push(Spectrum { name: name.clone(), curve: curve.clone(), definition: definition.clone() });
             self.scene.len() - 1
         });
         spectrum.taken = Some(id);
@@ -217,7 +228,8 @@ impl<'a> Spectra<'a> {
 
     /// A curve that no spectrum of the file describes.
     pub fn add(&mut self, name: &str, curve: Curve) -> Handle {
-        self.checked.push(Checked { name: name.to_owned(), curve, warnings: Vec::new(), taken: None });
+        let (name, warnings) = (name.to_owned(), Vec::new());
+        self.checked.push(Checked { name, curve, definition: None, warnings, taken: None });
         self.checked.len() - 1
     }
 
@@ -245,16 +257,24 @@ impl<'a> Spectra<'a> {
 
     /// `handle` times `factor`.
     pub fn times(&mut self, handle: Handle, factor: f64) -> Handle {
-        let Checked { name, curve, warnings, .. } = &self.checked[handle];
-        let scaled =
-            Checked { name: name.clone(), curve: curve.scaled(factor), warnings: warnings.clone(), taken: None };
+        let Checked { name, curve, definition, warnings, .. } = &self.checked[handle];
+        let definition = definition.as_ref().filter(|definition| !definition.is_complement);
+        let scaled = Checked {
+            name: name.clone(),
+            curve: curve.scaled(factor),
+            definition: definition.map(|of| Definition { scale: of.scale * factor, ..of.clone() }),
+            warnings: warnings.clone(),
+            taken: None,
+        };
         self.checked.push(scaled);
         self.checked.len() - 1
     }
 
     /// One minus `handle`, a share.
     pub fn complement(&mut self, handle: Handle) -> Handle {
-        let Checked { name, curve, warnings, .. } = &self.checked[handle];
+        let Checked { name, curve, definition, warnings, .. } = &self.checked[handle];
+        let definition = definition.as_ref().filter(|definition| definition.scale == 1.0);
+        let definition = definition.map(|of| Definition { is_complement: !of.is_complement, ..of.clone() });
         let curve = match curve {
             Curve::Constant(value) => Curve::Constant(1.0 - value),
             Curve::Linear { nm, value, outside: Outside::Hold } => {
@@ -264,8 +284,8 @@ impl<'a> Spectra<'a> {
                 unreachable!("refused for shares whose complement is asked")
             }
         };
-        let complement = Checked { name: format!("1 - {name}"), curve, warnings: warnings.clone(), taken: None };
-        self.checked.push(complement);
+        let (name, warnings) = (format!("1 - {name}"), warnings.clone());
+        self.checked.push(Checked { name, curve, definition, warnings, taken: None });
         self.checked.len() - 1
     }
 
@@ -365,7 +385,7 @@ impl<'a> Spectra<'a> {
                 self.rgb_outside(curve, source.outside, name, &mut warnings)
             }
         };
-        self.checked.push(Checked { name: name.to_owned(), curve, warnings, taken: None });
+        self.checked.push(Checked { name: name.to_owned(), curve, definition: None, warnings, taken: None });
         Some(self.checked.len() - 1)
     }
 

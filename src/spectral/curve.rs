@@ -1,5 +1,6 @@
 //! A curve: a physical quantity over wavelength, as the scene gives it.
 
+use serde::{Deserialize, Serialize};
 use smallvec::{SmallVec, smallvec};
 
 use super::planck;
@@ -8,7 +9,8 @@ use super::planck;
 pub type Nodes = SmallVec<[(f64, f64); 4]>;
 
 /// What a table means beyond its ends.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Outside {
     Zero,
     /// The end values go on.
@@ -22,7 +24,8 @@ fn between(x: &[f64], y: &[f64], i: usize, at: f64) -> f64 {
 }
 
 /// A function of wavelength (nm). Values carry the unit of what they describe.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Curve {
     Constant(f64),
     /// Piecewise linear through (nm, value), nm ascending; two equal nm make a step. At least one node.

@@ -9,6 +9,7 @@ pub mod hemisphere;
 pub mod kinks;
 pub mod knots;
 pub mod planck;
+pub mod product;
 pub mod skylight;
 pub mod table;
 pub mod temperature;

@@ -3,6 +3,7 @@
 mod against_reference;
 mod convergence;
 mod evaluators;
+mod factored;
 mod invariance;
 mod leaves;
 mod lights;

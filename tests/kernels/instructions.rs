@@ -312,7 +312,7 @@ fn every_instruction_means_what_it_says() {
         let windows = Windows::of(&prepared.accel, device_limits(&gpu).binding).expect("windows");
         let on_device = OnDevice { prepared: &prepared, windows };
         let kernels = on_device.kernels(EvaluateShape::of(&prepared, gpu.is_software));
-        let pass = Pass::new(&gpu, &kernels.evaluate).expect("a kernel");
+        let pass = Pass::new(&gpu, kernels.evaluate.as_ref().expect("channels are evaluated")).expect("a kernel");
         let buffers = upload(&gpu, &on_device).expect("buffers");
 
         let programs = programs(Names::of(&prepared), &scene.channels);

@@ -3,6 +3,7 @@
 
 mod accuracy;
 mod evaluation;
+mod factored;
 mod json;
 mod memory;
 mod out_of_core;

@@ -4,12 +4,15 @@ use std::sync::{Arc, OnceLock};
 
 use spectile::device::parts::paths::Thinning;
 use spectile::device::prepared::Prepared;
+use spectile::device::separable;
 use spectile::device::words::Counters;
 use spectile::gpu::adapter::Gpu;
 use spectile::render::pilot;
 use spectile::render::wave::Budget;
 use spectile::render::worker::{UnitRect, Worker};
 use spectile::scene::Scene;
+use spectile::spectral::Channels;
+use spectile::spectral::product::{Basis, Expander};
 
 use crate::report::{Part, timed};
 use crate::statistics::{Bound, Estimate, assert_agreement, image_estimates};
@@ -86,6 +89,31 @@ fn device(settings: Settings) -> Arc<Gpu> {
 
 /// Renders `epochs` epochs of `samples` samples per pixel (a power of two) of the film's crop.
 pub fn render(scene: &Scene, epochs: u32, samples: u32, settings: Settings) -> Epochs {
+    let basis = scene.is_factored().then(|| separable::basis(scene).expect("a scene that separates"));
+    render_as(scene, basis.as_ref().map(|basis| (basis, &scene.channels)), epochs, samples, settings)
+}
+
+/// As [`render`], a scene as weights of products of spectra; then with the spectra of `basis` in `channels`.
+pub fn render_relit(
+    scene: &Scene,
+    basis: &Basis,
+    channels: &Channels,
+    epochs: u32,
+    samples: u32,
+    settings: Settings,
+) -> Epochs {
+    render_as(&scene.clone().factored(), Some((basis, channels)), epochs, samples, settings)
+}
+
+fn render_as(
+    scene: &Scene,
+    factored: Option<(&Basis, &Channels)>,
+    epochs: u32,
+    samples: u32,
+    settings: Settings,
+) -> Epochs {
+    let expander =
+        factored.map(|(basis, channels)| Expander::new(basis, channels, scene.integrator.max_bounces as usize));
     let [x0, y0, x1, y1] = scene.film.crop;
     let mut prepared = Arc::new(Prepared::new(scene, settings.seed).expect("a scene that fits"));
     if let Some(scale) = settings.scale {
@@ -106,7 +134,8 @@ pub fn render(scene: &Scene, epochs: u32, samples: u32, settings: Settings) -> E
         .step_by(th as usize)
         .flat_map(|y| (x0..x1).step_by(tw as usize).map(move |x| [x, y, (x + tw).min(x1), (y + th).min(y1)]))
         .collect();
-    let (width, height, channels) = ((x1 - x0) as usize, (y1 - y0) as usize, scene.channels.len());
+    let channels = factored.map_or(scene.channels.len(), |(_, channels)| channels.len());
+    let (width, height) = ((x1 - x0) as usize, (y1 - y0) as usize);
     let (mut counters, mut rays) = (Counters::default(), 0);
     let mut means = Vec::new();
     timed(Part::Rendering, || {
@@ -120,7 +149,15 @@ pub fn render(scene: &Scene, epochs: u32, samples: u32, settings: Settings) -> E
                 let unit_size = (tw * th) as usize * channels;
                 // As the renderer does where responses weight.
                 let sums = integration.as_ref().map(|integration| integration.sums(collected.means()));
-                let means: &[f32] = sums.as_deref().unwrap_or(collected.means());
+                let made = expander.as_ref().map(|expander| {
+                    let mut means = vec![0.0f32; unit_size * collected.units.len()];
+                    for (weights, means) in collected.weights.iter().zip(means.chunks_mut(unit_size)) {
+                        let rows = expander.rows(&weights.products);
+                        means.chunks_mut(channels).enumerate().for_each(|(i, out)| weights.expand(i, &rows, out));
+                    }
+                    means
+                });
+                let means: &[f32] = sums.as_deref().or(made.as_deref()).unwrap_or(collected.means());
                 for (unit, means) in collected.units.iter().zip(means.chunks(unit_size)) {
                     for y in unit[1]..unit[3] {
                         for x in unit[0]..unit[2] {

@@ -110,6 +110,15 @@ pub struct Heat<'a> {
     pub radiating: Vec<Radiating>,
     /// For each object.
     pub kinds: Vec<Kind>,
+    /// What spectra that were made here are sums of.
+    pub made: Vec<Made>,
+}
+
+/// A spectrum that a surface sends in all directions: of its lamp, and of its hot parts.
+pub struct Made {
+    pub spectrum: SpectrumId,
+    pub lamp: Option<SpectrumId>,
+    pub parts: Vec<HotLeaf>,
 }
 
 /// How an object emits.
@@ -272,7 +281,8 @@ impl Leaf<'_> {
 /// `scene` with the heat of its surfaces as emission of objects.
 pub fn as_emission(scene: &Scene) -> Heat<'_> {
     let kinds = vec![Kind::Lamp; scene.objects.len()];
-    let mut heat = Heat { scene: Cow::Borrowed(scene), by_angle: Vec::new(), radiating: Vec::new(), kinds };
+    let (by_angle, radiating) = (Vec::new(), Vec::new());
+    let mut heat = Heat { scene: Cow::Borrowed(scene), by_angle, radiating, kinds, made: Vec::new() };
     let is_picture = |emission: &Emission| emission.texture.is_some();
     let pictures = scene.objects.iter().any(|object| object.emission.as_ref().is_some_and(is_picture));
     if scene.materials.iter().all(|material| material.temperature.is_none()) && !pictures {
@@ -305,7 +315,7 @@ pub fn as_emission(scene: &Scene) -> Heat<'_> {
                     emitted.filter(|(_, both, _)| *both || !back).map(|(spectrum, ..)| &scene.spectra[spectrum].curve)
                 };
                 let mut push = |curve: Curve| {
-                    lit.spectra.push(Spectrum { name: name.clone(), curve });
+                    lit.spectra.push(Spectrum { name: name.clone(), curve, definition: None });
                     lit.spectra.len() - 1
                 };
                 let of_all = leaves();
@@ -315,7 +325,10 @@ pub fn as_emission(scene: &Scene) -> Heat<'_> {
                     heat.radiating.push(Radiating { parts, lamp: emitted });
                     (push(typical), Kind::ByPlace(heat.radiating.len() - 1))
                 } else if even {
-                    (push(radiance(of_lamp(false), &of_all, 1.0, false, &scene.channels)), Kind::Lamp)
+                    let spectrum = push(radiance(of_lamp(false), &of_all, 1.0, false, &scene.channels));
+                    let lamp = emitted.map(|(lamp, ..)| lamp);
+                    heat.made.push(Made { spectrum, lamp, parts });
+                    (spectrum, Kind::Lamp)
                 } else {
                     let row = |back: bool| -> Vec<Curve> {
                         let cosine = |j: usize| (j as f64 / (COSINES - 1) as f64).powi(3);
@@ -340,8 +353,8 @@ pub fn as_emission(scene: &Scene) -> Heat<'_> {
             }
         };
         heat.kinds[index] = kind;
-        // A white surface is hot in vain.
-        if lit.spectra[radiance].curve != Curve::Constant(0.0) {
+        // A white surface is hot in vain, unless its paint may be exchanged.
+        if scene.is_factored() || lit.spectra[radiance].curve != Curve::Constant(0.0) {
             lit.objects[index].emission = Some(Emission { radiance, sides: Sides::Both, texture: None });
         }
     }

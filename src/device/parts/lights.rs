@@ -149,7 +149,12 @@ pub fn light_picks(scene: &Scene, accel: &Accel, environment: Option<&Curve>) ->
         .chain(emitted.environment.iter().map(|(flux, factor)| (&**flux, *factor)))
         .map(|(curve, factor)| scene.channels.bounds.iter().map(|b| factor * curve.mean(b[0], b[1])).collect())
         .collect();
-    let shares = probabilities(&powers);
+    let mut shares = probabilities(&powers);
+    if scene.is_factored() {
+        // No source is left out that other spectra could make bright.
+        let each = LEAST_SHARE / shares.len() as f64;
+        shares.iter_mut().for_each(|share| *share = (1.0 - LEAST_SHARE) * *share + each);
+    }
 
     let environment = match environment {
         Some(_) if groups.is_empty() => 1.0,
@@ -165,6 +170,9 @@ pub fn light_picks(scene: &Scene, accel: &Accel, environment: Option<&Curve>) ->
     let (cdf, emitters) = intervals(environment, &weights);
     LightPicks { environment, cdf, emitters, lamps }
 }
+
+/// Of an even share, what every source has at least where its spectrum may be exchanged after the render.
+const LEAST_SHARE: f64 = 0.25;
 
 /// Upper ends of the intervals in which a random number chooses each emitter, above the environment's [0, environment),
 /// and their widths. All are multiples of 2⁻²⁴, like the random numbers, so that the widths are the probabilities.

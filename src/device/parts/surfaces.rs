@@ -8,6 +8,7 @@ use crate::device::part::{Part, Place, Records, SceneBuffer};
 use crate::device::parts::geometry::{FEWER_MATERIALS, MATERIALS};
 use crate::device::parts::lights::STEPS;
 use crate::device::parts::textures::{self, Share, Textures};
+use crate::device::prepared::LEAST_ALBEDO;
 use crate::device::text::{Module, module};
 use crate::device::words::{
     ALBEDO_ROW, COSINE_INTERVALS, LOBE_BASE, LOBE_BEYOND_AGAIN, LOBE_BOUNDARY_AGAIN, LOBE_CONDUCTOR,
@@ -402,6 +403,8 @@ impl Surfaces {
             Reflectance::Spectrum(spectrum) => channel_means(scene, spectrum),
             Reflectance::Texture(texture) => textures::bound(scene, &scene.textures[texture]),
         };
+        let least = if scene.is_factored() { LEAST_ALBEDO } else { 0.0 };
+        let means: Vec<f64> = means.into_iter().map(|mean| mean.max(least)).collect();
         // What reflects in no channel is black.
         if means.iter().all(|m| *m <= 0.0) {
             return Vec::new();

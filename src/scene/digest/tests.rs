@@ -98,7 +98,7 @@ fn full() -> Scene {
             evaluator: Evaluator::Auto,
             epoch: 64,
         },
-        spectra: curves.map(|curve| Spectrum { name: "s".into(), curve }).to_vec(),
+        spectra: curves.map(|curve| Spectrum { name: "s".into(), curve, definition: None }).to_vec(),
         materials,
         textures: vec![
             texture(TextureKind::Colour, &[0.5, 0.25, 0.125, 0.0, 1.0, 0.75]),

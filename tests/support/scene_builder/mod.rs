@@ -250,7 +250,7 @@ impl Builder {
 
     fn spectrum(&mut self, curve: impl IntoCurve) -> usize {
         let name = format!("spectrum {}", self.0.spectra.len());
-        self.0.spectra.push(Spectrum { name, curve: curve.into_curve() });
+        self.0.spectra.push(Spectrum { name, curve: curve.into_curve(), definition: None });
         self.0.spectra.len() - 1
     }
 

@@ -1,0 +1,113 @@
+//! `spectile relight`: other lamps, paints, temperatures and channels for a factored cube.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::json;
+
+use super::Output;
+use super::scene::parse_override;
+use crate::cube::{self, Cube, Existing};
+use crate::files::shown;
+use crate::scene::{self, NewChannels};
+use crate::{Error, Result};
+
+/// A cube under other lamps, paints, temperatures or channels, without rendering it again
+///
+/// CUBE was made with `spectile render --factored`: it holds numbers that know no wavelength, by which spectra are multiplied. So
+/// other spectra and channels make another cube in seconds, with no other error than the noise that the numbers have. What has a name
+/// under [spectra] in the scene can be changed, in any form that a scene file allows: `--set spectra.lamp.blackbody=6500`, `--set
+/// spectra.paint='{ file = "paint.csv" }'`; a key below a spectrum changes what the cube has (`spectra.lamp.scale=2` makes it twice
+/// as bright). Temperatures of materials, too: `--set materials.wall.temperature=310`. Files are looked for from where you are.
+///
+/// Geometry, which material is where, lights that were not there: all that needs paths is refused. The cube gets standard errors where
+/// CUBE was rendered with --uncertainty. Noise is that of the paths: where other lamps or paints give weight to paths that hardly
+/// mattered before, it is larger, which is told.
+#[derive(Debug, clap::Args)]
+#[command(after_long_help = "\
+Examples:
+  spectile render scene.toml -o room.zarr --factored --spp 1024
+  spectile relight room.zarr -o evening.zarr --set spectra.lamp.blackbody=2700
+  spectile relight room.zarr -o fine.zarr --channels equal.count=2000
+  spectile relight room.zarr -o camera.zarr --responses camera.csv")]
+pub struct Args {
+    /// The factored cube, a folder
+    pub cube: PathBuf,
+
+    /// What changes: a key such as spectra.NAME or materials.NAME.temperature, and its value as in a scene file (repeatable)
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = parse_override)]
+    pub sets: Vec<(String, String)>,
+
+    /// Other channels: those of a scene, or keys of [channels] set, such as equal.count=1000 (repeatable)
+    #[arg(long, value_name = "SCENE.toml|KEY=VALUE", conflicts_with = "responses")]
+    pub channels: Vec<String>,
+
+    /// Channels that are the bands of a sensor, a CSV file: means weighted by each response, exact in wavelength
+    #[arg(long, value_name = "S.csv")]
+    pub responses: Option<PathBuf>,
+
+    /// The cube to make, a folder
+    #[arg(short, long, value_name = "OUT.zarr")]
+    pub output: PathBuf,
+
+    /// Replace OUT.zarr if it exists
+    ///
+    /// Only a Spectile cube that nobody works on is ever replaced; any other folder or file is refused.
+    #[arg(long)]
+    pub overwrite: bool,
+
+    /// One JSON object a line on stdout, instead of text
+    #[arg(long)]
+    pub json: bool,
+}
+
+pub fn run(args: &Args, output: &Output) -> Result<()> {
+    let cube = Cube::open(&args.cube)?;
+    if std::fs::canonicalize(&args.cube).ok().is_some_and(|cube| std::fs::canonicalize(&args.output).ok() == Some(cube))
+    {
+        let what = "a cube cannot be relit into itself; choose another name";
+        return Err(Error::Usage(format!("{}: {what}", args.output.display())));
+    }
+    let basis = cube.header().basis().ok_or_else(|| {
+        let what = "holds radiance, not weights of products of spectra: only cubes of `spectile render --factored` can be relit";
+        Error::Usage(format!("{} {what}", args.cube.display()))
+    })?;
+    let keys: Vec<(String, String)> =
+        args.channels.iter().filter_map(|channels| parse_override(channels).ok()).collect();
+    let wanted = match (&args.responses, &args.channels[..]) {
+        (Some(file), _) => NewChannels::Responses(file),
+        (None, []) => NewChannels::Same,
+        (None, all) if keys.len() == all.len() => NewChannels::Set(&keys),
+        (None, [file]) => NewChannels::Scene(Path::new(file)),
+        (None, _) => return Err(Error::Usage("--channels: give one scene, or keys such as equal.count=1000".into())),
+    };
+    let relit = scene::relight(&basis, cube.channels(), &args.sets, wanted)?;
+    for warning in &relit.warnings {
+        output.warn(warning)?;
+    }
+    let existing = if args.overwrite { Existing::Replace } else { Existing::Refuse };
+    let found = super::progress::watched(output, |progress| {
+        cube::relight(&cube, &relit.basis, &relit.channels, &relit.changed, &args.output, existing, progress)
+    })?;
+    let known = found.error_estimate.iter().copied().filter(|error| !error.is_nan());
+    let largest = known.fold(None, |most: Option<f64>, error| Some(most.map_or(error, |most| most.max(error))));
+    let mut text = format!("{}: {} channels", args.output.display(), relit.channels.len());
+    text += &match relit.changed.len() {
+        0 => ", spectra as they were".to_owned(),
+        _ => format!(", changed: {}", relit.changed.join(", ")),
+    };
+    text += &match largest {
+        Some(error) => format!("; error estimate at most {:.3} %\n", 100.0 * error),
+        None => "; error unknown below two epochs\n".to_owned(),
+    };
+    output.event(
+        "done",
+        json!({
+            "cube": shown(&args.output),
+            "channels": relit.channels.len(),
+            "changed": relit.changed,
+            "error_estimate": largest,
+            "entries_per_pixel": found.entries as f64 / found.pixels.max(1) as f64,
+        }),
+    )?;
+    output.text(&text)
+}

@@ -1,0 +1,402 @@
+//! What factored renders make of records: for each pixel the weights of the products of spectra that its paths bring
+//! ([`crate::spectral::product`]). A path's records are read as `common/records.wgsl` reads them, with products in the place of
+//! channels; nothing here knows a wavelength.
+//!
+//! Products are numbered as they are met, by each thread for itself; what a unit returns is in an order of its own, so that no bit
+//! depends on who met what first.
+
+use std::collections::HashMap;
+
+use rayon::prelude::*;
+use smallvec::{SmallVec, smallvec};
+
+use crate::cube::{Weights, random_of, systematic};
+use crate::device::instructions::{
+    MODE_ADD, MODE_ADVANCE, MODE_GATHER, MODE_ON_F, MODE_START, OP_ONE, OP_PLAIN, OP_SPECTRUM,
+};
+use crate::device::prepared::Prepared;
+use crate::device::separable::Separable;
+use crate::device::words::{Counters, Wave};
+use crate::render::worker::UnitRect;
+use crate::spectral::product::Product;
+
+/// Not met yet.
+const UNKNOWN: u32 = u32::MAX;
+/// Terms that a path's throughput may be a sum of; of more (mixtures upon mixtures) some are chosen by their weights.
+const MOST_TERMS: usize = 16;
+
+type Factors = SmallVec<[u16; 8]>;
+
+/// The products that a thread has met. A state is a set of factors, each as often as it multiplies; few are ever met.
+struct Met {
+    factors: usize,
+    sources: usize,
+    sets: Vec<Factors>,
+    known: HashMap<Factors, u32>,
+    /// [state][factor]: the state behind one more factor.
+    next: Vec<u32>,
+    /// [state][source]: the number of a product.
+    numbers: Vec<u32>,
+    /// Of each product: state, source.
+    products: Vec<(u32, u16)>,
+}
+
+/// A thread that walks records: what it has met, and the weights of the pixel that it is at.
+struct Walker {
+    met: Met,
+    /// By product; those of `touched` are not zero, or were.
+    weights: Vec<f64>,
+    touched: Vec<u32>,
+    // Of general scenes: T, P and F (`device::instructions`) as sums of weights times factors.
+    throughput: Vec<(f64, u32)>,
+    product: (f64, Factors),
+    factor: Vec<(f64, Factors)>,
+    tally: Tally,
+}
+
+/// What a thread has seen beside weights.
+#[derive(Debug, Clone, Copy, Default)]
+struct Tally {
+    /// Paths that ended in this wave.
+    ended: u32,
+    non_finite: u32,
+    /// Slot and sample of a weight that is not finite.
+    bad: Option<(u32, u32)>,
+}
+
+/// Units that are rendered together.
+#[derive(Default)]
+struct Group {
+    units: Vec<UnitRect>,
+    samples: u32,
+    /// Of each pixel slot, numbers of products, of the walker that has the slot, and sums of weights.
+    pixels: Vec<Vec<(u32, f64)>>,
+    tally: Tally,
+    last_wave: u32,
+}
+
+/// Reads what the waves of a device leave.
+pub struct Gather {
+    walkers: Vec<Walker>,
+    groups: Vec<Group>,
+    tile: [u32; 2],
+    max_records: usize,
+    is_general: bool,
+}
+
+/// A wave as it came back.
+pub struct Saved<'a> {
+    pub wave: &'a Wave,
+    /// Two words a path.
+    pub heads: &'a [u32],
+    /// [path][record], of 2 or 4 words.
+    pub records: &'a [u32],
+}
+
+impl Met {
+    fn new(scene: &Separable) -> Met {
+        let past = |most: Option<&u16>| most.map_or(0, |most| usize::from(*most) + 1);
+        let mut met = Met {
+            factors: past(scene.factors.iter().flatten().max()),
+            sources: past(scene.sources.iter().flatten().max()),
+            sets: Vec::new(),
+            known: HashMap::new(),
+            next: Vec::new(),
+            numbers: Vec::new(),
+            products: Vec::new(),
+        };
+        met.state(Factors::new());
+        met
+    }
+
+    /// The state of a set, which ascends.
+    fn state(&mut self, set: Factors) -> u32 {
+        if let Some(&known) = self.known.get(&set) {
+            return known;
+        }
+        let state = self.sets.len() as u32;
+        self.sets.push(set.clone());
+        self.known.insert(set, state);
+        self.next.resize(self.next.len() + self.factors, UNKNOWN);
+        self.numbers.resize(self.numbers.len() + self.sources, UNKNOWN);
+        state
+    }
+
+    fn behind(&mut self, state: u32, factor: u16) -> u32 {
+        let at = state as usize * self.factors + usize::from(factor);
+        if self.next[at] == UNKNOWN {
+            let mut set = self.sets[state as usize].clone();
+            set.insert(set.partition_point(|&other| other <= factor), factor);
+            self.next[at] = self.state(set);
+        }
+        self.next[at]
+    }
+
+    fn number(&mut self, state: u32, source: u16) -> u32 {
+        let at = state as usize * self.sources + usize::from(source);
+        if self.numbers[at] == UNKNOWN {
+            self.numbers[at] = self.products.len() as u32;
+            self.products.push((state, source));
+        }
+        self.numbers[at]
+    }
+
+    fn product(&self, number: u32) -> Product {
+        let (state, source) = self.products[number as usize];
+        Product { factors: self.sets[state as usize].clone(), source }
+    }
+}
+
+impl Walker {
+    fn add(&mut self, weight: f64, state: u32, sources: &[u16]) {
+        for &source in sources {
+            let number = self.met.number(state, source);
+            if number as usize >= self.weights.len() {
+                self.weights.resize(number as usize + 1, 0.0);
+            }
+            let sum = &mut self.weights[number as usize];
+            if *sum == 0.0 {
+                self.touched.push(number);
+            }
+            *sum += weight;
+        }
+    }
+
+    /// A path of a plain scene: records of factor, source and weight. False where a weight is not finite.
+    fn plain(&mut self, scene: &Separable, records: &[u32]) -> bool {
+        let mut state = 0;
+        for record in records.chunks_exact(2) {
+            let (factor, source) = ((record[0] & 0xffff) as usize, (record[0] >> 16) as usize);
+            if let Some(factor) = scene.factors[factor] {
+                state = self.met.behind(state, factor);
+            }
+            let weight = f32::from_bits(record[1]);
+            if !weight.is_finite() {
+                return false;
+            }
+            if weight != 0.0 {
+                self.add(f64::from(weight), state, &scene.sources[source]);
+            }
+        }
+        true
+    }
+
+    /// A path of a general scene: a small program on sums of products.
+    fn general(&mut self, scene: &Separable, records: &[u32], random: u64) -> bool {
+        self.throughput.clear();
+        self.throughput.push((1.0, 0));
+        self.factor.clear();
+        for (place, record) in records.chunks_exact(4).enumerate() {
+            let (word, weight) = (record[0], f32::from_bits(record[2]));
+            if !weight.is_finite() {
+                return false;
+            }
+            let (operation, weight) = (word & 0x3f, f64::from(weight));
+            let value = match operation {
+                OP_ONE => None,
+                OP_PLAIN | OP_SPECTRUM => scene.factors[(record[1] & 0xffff) as usize],
+                _ => unreachable!("scenes with other instructions are refused: operation {operation}"),
+            };
+            let sources = (word >> 16) as usize;
+            if operation == OP_PLAIN {
+                if let Some(factor) = value {
+                    for (_, state) in &mut self.throughput {
+                        *state = self.met.behind(*state, factor);
+                    }
+                }
+                if weight != 0.0 {
+                    for i in 0..self.throughput.len() {
+                        let (through, state) = self.throughput[i];
+                        self.add(weight * through, state, &scene.sources[sources]);
+                    }
+                }
+                continue;
+            }
+            if word & MODE_ON_F != 0 {
+                for (share, factors) in &mut self.factor {
+                    *share *= weight;
+                    factors.extend(value);
+                }
+            } else {
+                if word & MODE_START != 0 {
+                    self.product = (1.0, Factors::new());
+                }
+                self.product.0 *= weight;
+                self.product.1.extend(value);
+            }
+            if word & MODE_ADD != 0 {
+                self.factor.push(self.product.clone());
+            }
+            if word & MODE_GATHER != 0 {
+                self.multiply_out(|walker, weight, state| walker.add(weight, state, &scene.sources[sources]));
+            }
+            if word & MODE_ADVANCE != 0 {
+                let mut through = Vec::with_capacity(self.throughput.len());
+                self.multiply_out(|_, weight, state| through.push((weight, state)));
+                self.throughput = choose(through, random ^ place as u64);
+            }
+        }
+        true
+    }
+
+    /// Calls `each` with every term of T F, and leaves F = 0.
+    fn multiply_out(&mut self, mut each: impl FnMut(&mut Walker, f64, u32)) {
+        let (factor, throughput) = (std::mem::take(&mut self.factor), std::mem::take(&mut self.throughput));
+        for &(through, state) in &throughput {
+            for (share, factors) in &factor {
+                let weight = through * share;
+                if weight != 0.0 {
+                    let state = factors.iter().fold(state, |state, &factor| self.met.behind(state, factor));
+                    each(self, weight, state);
+                }
+            }
+        }
+        (self.factor, self.throughput) = (factor, throughput);
+        self.factor.clear();
+    }
+
+    /// The samples of a pixel in a wave, added to what it has.
+    fn pixel(
+        &mut self,
+        scene: &Separable,
+        gather: &Layout,
+        saved: &Saved,
+        slot: u32,
+        of_pixel: &mut Vec<(u32, f64)>,
+        at: [u32; 2],
+    ) {
+        for (number, weight) in of_pixel.drain(..) {
+            if number as usize >= self.weights.len() {
+                self.weights.resize(number as usize + 1, 0.0);
+            }
+            self.weights[number as usize] = weight;
+            self.touched.push(number);
+        }
+        let wave = saved.wave;
+        for sample in 0..wave.samples {
+            let path = ((slot - wave.pixel_begin) * wave.samples + sample) as usize;
+            let head = saved.heads[2 * path + 1];
+            if head >> 16 != wave.sequence {
+                continue;
+            }
+            self.tally.ended += 1;
+            let records = &saved.records[path * gather.path_words..][..(head & 0xffff) as usize * gather.record_words];
+            let index = wave.sample_begin + sample;
+            let is_finite = match gather.is_general {
+                false => self.plain(scene, records),
+                true => self.general(scene, records, random_of([at[0], at[1], wave.epoch, index])),
+            };
+            if !is_finite {
+                self.tally.non_finite += 1;
+                self.tally.bad.get_or_insert((slot, index));
+            }
+        }
+        // In the order in which they were met, which is that of the paths.
+        for number in self.touched.drain(..) {
+            let weight = std::mem::take(&mut self.weights[number as usize]);
+            if weight != 0.0 {
+                of_pixel.push((number, weight));
+            }
+        }
+    }
+}
+
+/// How records lie.
+struct Layout {
+    path_words: usize,
+    record_words: usize,
+    is_general: bool,
+}
+
+impl Gather {
+    /// For as many groups of units under way, walked through by `threads` threads.
+    pub fn new(prepared: &Prepared, tile: [u32; 2], groups: usize, threads: usize) -> Option<Gather> {
+        let separable = prepared.separable.as_ref()?;
+        let walker = || Walker {
+            met: Met::new(separable),
+            weights: Vec::new(),
+            touched: Vec::new(),
+            throughput: Vec::new(),
+            product: (0.0, smallvec![]),
+            factor: Vec::new(),
+            tally: Tally::default(),
+        };
+        Some(Gather {
+            walkers: (0..threads).map(|_| walker()).collect(),
+            groups: (0..groups).map(|_| Group::default()).collect(),
+            tile,
+            max_records: prepared.max_records() as usize,
+            is_general: prepared.is_general(),
+        })
+    }
+
+    /// Forgets what group number `group` was; now it is these units.
+    pub fn begin(&mut self, group: usize, units: &[UnitRect], samples: u32) {
+        let slots = units.len() * (self.tile[0] * self.tile[1]) as usize;
+        let pixels = vec![Vec::new(); slots];
+        self.groups[group] = Group { units: units.to_vec(), samples, pixels, ..Group::default() };
+    }
+
+    /// Reads a wave of a group.
+    pub fn take(&mut self, group: usize, scene: &Separable, saved: &Saved) {
+        let words = if self.is_general { 4 } else { 2 };
+        let layout = Layout { path_words: self.max_records * words, record_words: words, is_general: self.is_general };
+        let Group { units, pixels, tally, last_wave, .. } = &mut self.groups[group];
+        let [width, height] = self.tile;
+        let place = |slot: u32| {
+            let in_tile = slot % (width * height);
+            let [x, y, ..] = units[(slot / (width * height)) as usize];
+            [x + in_tile % width, y + in_tile / width]
+        };
+        let each = pixels.len().div_ceil(self.walkers.len());
+        let of_wave = saved.wave.pixel_begin..saved.wave.pixel_begin + saved.wave.pixel_count;
+        // A slot is always with the same walker, whose numbers its products have.
+        self.walkers.par_iter_mut().zip(pixels.par_chunks_mut(each)).enumerate().for_each(|(w, (walker, pixels))| {
+            let first = (w * each) as u32;
+            let from = of_wave.start.max(first);
+            let to = of_wave.end.min(first + pixels.len() as u32);
+            for slot in from..to {
+                walker.pixel(scene, &layout, saved, slot, &mut pixels[(slot - first) as usize], place(slot));
+            }
+        });
+        for walker in &mut self.walkers {
+            let seen = std::mem::take(&mut walker.tally);
+            tally.ended = tally.ended.wrapping_add(seen.ended);
+            tally.non_finite += seen.non_finite;
+            tally.bad = tally.bad.or(seen.bad);
+        }
+        *last_wave = saved.wave.sequence;
+    }
+
+    /// What came of the units of a group, and what evaluation would have counted.
+    pub fn finish(&mut self, group: usize, counters: &mut Counters) -> Vec<Weights> {
+        let Group { units, samples, pixels, tally, last_wave } = std::mem::take(&mut self.groups[group]);
+        counters.folded = tally.ended;
+        counters.sequence = last_wave;
+        counters.non_finite += tally.non_finite;
+        if let Some((slot, sample)) = tally.bad {
+            (counters.bad_slot, counters.bad_sample) = (slot, sample + 1);
+        }
+        let each = pixels.len().div_ceil(self.walkers.len());
+        let slots = (self.tile[0] * self.tile[1]) as usize;
+        let of_unit = |unit: usize| {
+            let own = &pixels[unit * slots..(unit + 1) * slots];
+            let entries = own.iter().enumerate().map(|(i, entries)| {
+                let met = &self.walkers[(unit * slots + i) / each].met;
+                entries.iter().map(move |&(number, sum)| (met.product(number), sum / f64::from(samples)))
+            });
+            Weights::of_pixels(entries)
+        };
+        (0..units.len()).into_par_iter().map(of_unit).collect()
+    }
+}
+
+/// Of terms, no more than [`MOST_TERMS`] with the same mean: each stays with a chance by its weight.
+fn choose(terms: Vec<(f64, u32)>, random: u64) -> Vec<(f64, u32)> {
+    if terms.len() <= MOST_TERMS {
+        return terms;
+    }
+    let weights: Vec<f64> = terms.iter().map(|term| term.0.abs()).collect();
+    let kept = systematic(&weights, MOST_TERMS, random_of([random as u32, (random >> 32) as u32, 0, 1]));
+    kept.into_iter().map(|(i, factor)| (terms[i].0 * factor, terms[i].1)).collect()
+}

@@ -1,0 +1,343 @@
+//! Other spectra, temperatures and channels for the products of a factored cube, written as in a scene file.
+
+use std::path::Path;
+
+use super::context::Context;
+use super::decode::{Item, did_you_mean, list};
+use super::spectrum::{Quantity, Spectra};
+use super::tree::{Entry, Node, Origin, Value};
+use super::{channels, overrides};
+use crate::error::Error;
+use crate::format::response::{self, Responses};
+use crate::spectral::product::{Basis, Leaf, Term};
+use crate::spectral::{Channels, Curve, Outside};
+use crate::{Result, files};
+
+/// The channels that are wanted.
+#[derive(Debug, Clone, PartialEq)]
+pub enum NewChannels<'a> {
+    /// The cube's.
+    Same,
+    /// The cube's, with keys of `[channels]` set, such as `equal.count`.
+    Set(&'a [(String, String)]),
+    /// Those of another scene.
+    Scene(&'a Path),
+    /// The bands of a sensor.
+    Responses(&'a Path),
+}
+
+/// What a cube is made anew of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Relit {
+    pub basis: Basis,
+    pub channels: Channels,
+    /// Keys of what is not as it was.
+    pub changed: Vec<String>,
+    pub warnings: Vec<String>,
+}
+
+/// Where mistakes of an option are said to stand.
+const OPTION: &str = "--set";
+
+/// `basis` and `channels` with what `sets` changes: `spectra.NAME` and what may stand below it in a scene file, and
+/// `materials.NAME.temperature`.
+///
+/// # Errors
+/// What a cube cannot change, and mistakes as in scene files.
+pub fn relight(basis: &Basis, channels: &Channels, sets: &[(String, String)], wanted: NewChannels) -> Result<Relit> {
+    let mut warnings = Vec::new();
+    let channels = new_channels(channels, wanted, &mut warnings)?;
+    let (names, materials) = (names(basis), materials(basis));
+    let mut spectra: Vec<&str> = Vec::new();
+    let mut hot: Vec<&str> = Vec::new();
+    for (key, _) in sets {
+        let path = overrides::parse_key(key).unwrap_or_default();
+        let path: Vec<&str> = path.iter().map(String::as_str).collect();
+        match path[..] {
+            ["spectra", name, ..] if names.contains(&name) => spectra.extend(names.iter().find(|n| **n == name)),
+            ["materials", name, "temperature"] if materials.contains(&name) => {
+                hot.extend(materials.iter().find(|n| **n == name));
+            }
+            _ => return Err(refusal(key, &path, &names, &materials)),
+        }
+    }
+    [&mut spectra, &mut hot].into_iter().for_each(|all| {
+        all.sort_unstable();
+        all.dedup();
+    });
+
+    let text = document(basis, &spectra, &hot);
+    // What uses each of them.
+    let users: Vec<(&str, Node)> = spectra
+        .iter()
+        .map(|name| (*name, Node { value: Value::String((*name).to_owned()), origin: Origin::Whole }))
+        .collect();
+    let cx = Context::new(Path::new(OPTION), &text, sets);
+    let Some(mut root) = cx.document() else { return Err(Error::Input(cx.finish().0)) };
+    overrides::apply(&cx, &mut root, sets);
+    let mut relit = basis.clone();
+    decode(&cx, &root, &channels, &users, &hot, &mut relit);
+    let (problems, more) = cx.finish();
+    if !problems.is_empty() {
+        return Err(Error::Input(problems));
+    }
+    warnings.extend(more);
+    let changed = spectra.iter().map(|name| format!("spectra.{name}"));
+    let changed = changed.chain(hot.iter().map(|name| format!("materials.{name}.temperature"))).collect();
+    Ok(Relit { basis: relit, channels, changed, warnings })
+}
+
+/// The named spectra of a basis, each once.
+fn names(basis: &Basis) -> Vec<&str> {
+    let mut names: Vec<&str> =
+        basis.spectra.iter().filter(|leaf| leaf.is_named).map(|leaf| leaf.name.as_str()).collect();
+    names.sort_unstable();
+    names.dedup();
+    names
+}
+
+/// The hot materials of a basis.
+fn materials(basis: &Basis) -> Vec<&str> {
+    let terms = basis.factors.iter().chain(&basis.sources).flat_map(|expression| &expression.terms);
+    let mut materials: Vec<&str> = terms
+        .filter_map(|term| match term {
+            Term::Planck { material, .. } => Some(material.as_str()),
+            _ => None,
+        })
+        .collect();
+    materials.sort_unstable();
+    materials.dedup();
+    materials
+}
+
+fn refusal(key: &str, path: &[&str], names: &[&str], materials: &[&str]) -> Error {
+    let what = match path {
+        ["spectra", name, ..] => {
+            let hint = did_you_mean(name, names.iter().copied());
+            let known = || format!("the cube has {}", list(names.iter().copied()));
+            format!("no spectrum of the cube is named \"{name}\"; {}", hint.unwrap_or_else(known))
+        }
+        ["materials", name, "temperature"] => {
+            let known = if materials.is_empty() { "none".to_owned() } else { list(materials.iter().copied()) };
+            format!("\"{name}\" is no hot material of the cube, which are: {known}")
+        }
+        _ => "a cube is relit by spectra.NAME and materials.NAME.temperature; what else changes needs a new render"
+            .to_owned(),
+    };
+    Error::Usage(format!("--set {key}: {what}"))
+}
+
+/// What is going to be changed, as a scene file would have it.
+fn document(basis: &Basis, spectra: &[&str], hot: &[&str]) -> String {
+    let mut text = String::new();
+    for name in spectra {
+        let leaf = basis.spectra.iter().find(|leaf| leaf.is_named && leaf.name == *name).expect("found before");
+        text += &format!("[spectra.\"{}\"]\n{}\n", name.escape_default(), written(&leaf.curve));
+    }
+    for name in hot {
+        let terms = basis.sources.iter().flat_map(|source| &source.terms);
+        let kelvin = terms.filter_map(|term| match term {
+            Term::Planck { material, kelvin } if material == name => Some(*kelvin),
+            _ => None,
+        });
+        let kelvin = kelvin.max_by(f64::total_cmp).unwrap_or_default();
+        text += &format!("[materials.\"{}\"]\ntemperature = {kelvin:?}\n", name.escape_default());
+    }
+    text
+}
+
+/// A curve in the words of a scene file.
+fn written(curve: &Curve) -> String {
+    match curve {
+        Curve::Constant(value) => format!("constant = {value:?}\n"),
+        Curve::Blackbody { kelvin, scale } => format!("blackbody = {kelvin:?}\nscale = {scale:?}\n"),
+        Curve::Linear { nm, value, outside } => {
+            let nodes: Vec<String> = nm.iter().zip(value).map(|(nm, value)| format!("[{nm:?}, {value:?}]")).collect();
+            let outside = if *outside == Outside::Hold { "hold" } else { "zero" };
+            format!("samples = [{}]\noutside = \"{outside}\"\n", nodes.join(", "))
+        }
+    }
+}
+
+/// Puts what the tree says of the spectra that `users` name and of the temperatures of `hot` into `basis`; mistakes are recorded.
+fn decode<'a>(
+    cx: &'a Context<'a>,
+    root: &'a [Entry],
+    channels: &Channels,
+    users: &'a [(&str, Node)],
+    hot: &[&str],
+    basis: &mut Basis,
+) {
+    let top = |key: &str| root.iter().find(|entry| entry.key == key);
+    let item = |entry: &'a Entry| Item { cx, node: &entry.node, path: entry.key.clone(), at: &entry.node.origin };
+    let mut all = Spectra::new(cx, top("spectra").map(item), Some(channels.clone()));
+    let mut found = Vec::new();
+    for (name, node) in users {
+        for (i, leaf) in basis.spectra.iter().enumerate().filter(|(_, leaf)| leaf.is_named && leaf.name == *name) {
+            let Some(quantity) = quantity(leaf) else { continue };
+            let user = Item { cx, node, path: format!("spectra.{name}"), at: &node.origin };
+            if let Some(handle) = all.resolve(&user, quantity) {
+                found.push((i, all.take(handle)));
+            }
+        }
+    }
+    let curves = all.finish();
+    found.into_iter().for_each(|(i, id)| basis.spectra[i].curve = curves[id].curve.clone());
+
+    for name in hot {
+        let Some(materials) = top("materials").map(item) else { continue };
+        let of_material = |entries: &'a [Entry], key: &str| entries.iter().find(|entry| entry.key == key);
+        let Value::Table(entries) = &materials.node.value else { continue };
+        let Some(Value::Table(keys)) = of_material(entries, name).map(|entry| &entry.node.value) else { continue };
+        let Some(entry) = of_material(keys, "temperature") else { continue };
+        let path = format!("materials.{name}.temperature");
+        let Some(value) = (Item { cx, node: &entry.node, path, at: &entry.node.origin }).positive() else { continue };
+        for term in basis.sources.iter_mut().flat_map(|source| &mut source.terms) {
+            if let Term::Planck { material, kelvin } = term
+                && material == name
+            {
+                *kelvin = value;
+            }
+        }
+    }
+}
+
+fn quantity(leaf: &Leaf) -> Option<Quantity> {
+    Quantity::ALL.into_iter().find(|quantity| quantity.noun() == leaf.quantity)
+}
+
+fn new_channels(channels: &Channels, wanted: NewChannels, warnings: &mut Vec<String>) -> Result<Channels> {
+    let (file, text, sets) = match wanted {
+        NewChannels::Same => return Ok(channels.clone()),
+        NewChannels::Responses(file) => {
+            let read = response::read_responses(file).map_err(|problem| Error::Input(vec![*problem]))?;
+            let Responses { named, warnings: more } = read;
+            warnings.extend(more);
+            return Ok(Channels::from_responses(named, None));
+        }
+        NewChannels::Scene(file) => {
+            let text = std::fs::read_to_string(file)
+                .map_err(|error| Error::Usage(format!("--channels {}: {error}", files::shown(file))))?;
+            (file, text, Vec::new())
+        }
+        NewChannels::Set(sets) => {
+            let key = |key: &str| format!("channels.{}", key.strip_prefix("channels.").unwrap_or(key));
+            let sets = sets.iter().map(|(name, value)| (key(name), value.clone())).collect();
+            (Path::new("--channels"), channels_document(channels), sets)
+        }
+    };
+    let cx = Context::new(file, super::file::without_mark(&text), &sets);
+    let Some(mut root) = cx.document() else { return Err(Error::Input(cx.finish().0)) };
+    overrides::apply(&cx, &mut root, &sets);
+    let entry = root.iter().find(|entry| entry.key == "channels");
+    if entry.is_none() {
+        cx.error(&Origin::Whole, "channels", "`[channels]` is missing", Some("name a scene that has it".into()));
+    }
+    let found = entry.and_then(|entry| {
+        channels::decode(&Item { cx: &cx, node: &entry.node, path: entry.key.clone(), at: &entry.node.origin })
+    });
+    let (problems, more) = cx.finish();
+    warnings.extend(more);
+    match found {
+        Some(found) if problems.is_empty() => Ok(found),
+        _ => Err(Error::Input(problems)),
+    }
+}
+
+/// The channels of a cube in the words of a scene file: equal ones as such. Responses are left out: they come from files.
+fn channels_document(channels: &Channels) -> String {
+    let bounds = &channels.bounds;
+    if let ([from, _], [_, to]) = (bounds[0], bounds[bounds.len() - 1])
+        && Channels::equal(from, to, bounds.len()).bounds == *bounds
+    {
+        return format!("[channels]\nequal = {{ from = {from:?}, to = {to:?}, count = {} }}\n", bounds.len());
+    }
+    let each: Vec<String> = bounds.iter().map(|[from, to]| format!("[{from:?}, {to:?}]")).collect();
+    format!("[channels]\nintervals = [{}]\n", each.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spectral::product::Expression;
+
+    fn basis() -> Basis {
+        let leaf = |name: &str, quantity: Quantity, curve: Curve| Leaf {
+            name: name.into(),
+            is_named: true,
+            quantity: quantity.noun().into(),
+            curve,
+        };
+        let table = Curve::Linear { nm: vec![400.0, 700.0], value: vec![0.1, 0.7], outside: Outside::Hold };
+        let of = |terms: Vec<Term>| Expression { scale: 1.0, terms };
+        Basis {
+            spectra: vec![
+                leaf("lamp", Quantity::Radiance, Curve::Blackbody { kelvin: 3000.0, scale: 0.5 }),
+                leaf("paint", Quantity::Reflectance, table),
+            ],
+            factors: vec![of(vec![Term::Spectrum(1)])],
+            sources: vec![
+                of(vec![Term::Spectrum(0)]),
+                of(vec![Term::Complement(1), Term::Planck { material: "wall".into(), kelvin: 290.0 }]),
+            ],
+        }
+    }
+
+    fn set(sets: &[(&str, &str)]) -> Result<Relit> {
+        let sets: Vec<_> = sets.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+        relight(&basis(), &Channels::equal(400.0, 700.0, 3), &sets, NewChannels::Same)
+    }
+
+    #[test]
+    fn what_is_set_changes_and_nothing_else() {
+        let relit = set(&[
+            ("spectra.lamp.blackbody", "6500"),
+            ("spectra.paint", "{ samples = [[400, 0.2], [500, 0.4]], outside = \"hold\" }"),
+            ("materials.wall.temperature", "350"),
+        ])
+        .expect("changes");
+        let mut want = basis();
+        want.spectra[0].curve = Curve::Blackbody { kelvin: 6500.0, scale: 0.5 };
+        want.spectra[1].curve = Curve::Linear { nm: vec![400.0, 500.0], value: vec![0.2, 0.4], outside: Outside::Hold };
+        want.sources[1].terms[1] = Term::Planck { material: "wall".into(), kelvin: 350.0 };
+        assert_eq!(relit.basis, want);
+        assert_eq!(relit.changed, ["spectra.lamp", "spectra.paint", "materials.wall.temperature"]);
+        // Half of what the cube has.
+        let half = set(&[("spectra.paint.scale", "0.5")]).expect("a change").basis.spectra[1].curve.clone();
+        assert_eq!(half, Curve::Linear { nm: vec![400.0, 700.0], value: vec![0.05, 0.35], outside: Outside::Hold });
+        assert_eq!(set(&[]).expect("nothing").basis, basis());
+    }
+
+    #[test]
+    fn what_cannot_be_changed_is_refused_by_name() {
+        for (key, value, words) in [
+            ("spectra.lmap", "1", "lamp"),
+            ("spectra.sky", "1", "lamp, paint"),
+            ("objects.0.material", "\"x\"", "needs a new render"),
+            ("materials.floor.temperature", "300", "wall"),
+            ("materials.wall.temperature", "-3", "greater than 0"),
+            ("spectra.paint", "1.5", "in [0, 1]"),
+            ("spectra.paint.blackbody", "3000", "spectra.paint"),
+            ("spectra.lamp", "{ file = \"no-such.csv\" }", "no-such.csv"),
+            ("camera.fov", "3", "needs a new render"),
+        ] {
+            let said = set(&[(key, value)]).expect_err(key).to_string();
+            assert!(said.contains(words), "{key}: {said}");
+        }
+    }
+
+    #[test]
+    fn channels_are_written_as_in_scenes() {
+        let of = |channels: &Channels, key: &str, value: &str| {
+            let sets = [(key.to_owned(), value.to_owned())];
+            relight(&basis(), channels, &[], NewChannels::Set(&sets)).map(|relit| relit.channels)
+        };
+        let equal = Channels::equal(400.0, 700.0, 3);
+        assert_eq!(of(&equal, "equal.count", "6").expect("six").bounds, Channels::equal(400.0, 700.0, 6).bounds);
+        assert_eq!(of(&equal, "channels.equal.count", "6").expect("six").len(), 6);
+        let uneven = Channels::from_bounds(vec![[400.0, 410.0], [420.0, 700.0]], None);
+        assert_eq!(of(&uneven, "intervals", "[[500, 510]]").expect("one").bounds, [[500.0, 510.0]]);
+        assert!(of(&equal, "equal.count", "0").expect_err("none").to_string().contains("equal.count"));
+        assert!(of(&equal, "evenly", "3").is_err());
+    }
+}

@@ -1,0 +1,324 @@
+//! Weights of products of spectra: closed forms, the f64 reference under spectra that the render never saw, and the same paths as
+//! without.
+
+use glam::{DVec2, DVec3};
+use spectile::device::separable;
+use spectile::render::wave::Budget;
+use spectile::scene::{Bsdf, Cone, Filter, Profile, Projection, Reflectance, Scene, Sides, Weight};
+use spectile::spectral::{Channels, Curve, Outside};
+
+use crate::device::{Settings, render, render_relit};
+use crate::scene_builder::heat::infrared;
+use crate::scene_builder::*;
+use crate::size;
+use crate::statistics::{Bound, Estimate, assert_agreement, assert_estimates, image_estimates};
+use crate::truth;
+
+fn basis(scene: &Scene) -> spectile::spectral::product::Basis {
+    separable::basis(scene).expect("a scene that separates")
+}
+
+/// A ball under a uniform sky, which is sampled as the surface reflects: each path brings half by aiming and half by meeting it, so that
+/// the weight of sky times paint is 1, of each.
+#[test]
+fn a_ball_under_the_sky_weighs_one() {
+    let scene = Builder::new().channels(Channels::equal(400.0, 700.0, 4));
+    let scene = scene.diffuse(sphere(DVec3::ZERO, 0.5), 0.5).sky(2.0).build();
+    let mut other = basis(&scene);
+    assert_eq!((other.factors.len(), other.sources.len()), (1, 1));
+    let paint = table(&[400.0, 700.0], &[0.1, 0.7]);
+    for leaf in &mut other.spectra {
+        leaf.curve = if leaf.curve == Curve::Constant(2.0) { Curve::Constant(3.0) } else { paint.clone() };
+    }
+    let rendered = render_relit(&scene, &other, &scene.channels, 1, 64, Settings::default());
+    rendered.assert_clean();
+    for (k, value) in rendered.means[0].iter().enumerate() {
+        let [from, to] = scene.channels.bounds[k];
+        let want = 3.0 * paint.mean(from, to);
+        assert!((f64::from(*value) / want - 1.0).abs() < 1e-6, "{k}: {value}, not {want}");
+    }
+}
+
+/// In a closed room whose walls are black and whose lamps are off, relit: E (1 + ρ + ρ² + … ρ^B). What has no power while rendering must
+/// have its share of the paths all the same.
+#[test]
+fn furnaces_are_series_of_powers() {
+    const BOUNCES: u32 = 6;
+    let scene = Builder::new()
+        .camera(look(0.5 * DVec3::ONE, DVec3::new(0.9, 0.8, 0.0), DVec3::Y, narrow()))
+        .film(8, 8, Filter::Box)
+        .bounces(BOUNCES)
+        .roulette(2)
+        .glowing(
+            room(DVec3::ZERO, DVec3::ONE),
+            0.0,
+            Curve::Linear { nm: vec![1.0, 2.0], value: vec![1.0, 1.0], outside: Outside::Zero },
+            Sides::Front,
+        )
+        .build();
+    let dark = basis(&scene);
+    let settings = Settings { seed: 3, ..Settings::default() };
+    for (rho, emission) in [(0.0, 1.0), (0.3, 1.0), (0.9, 2.5)] {
+        let mut lit = dark.clone();
+        for leaf in &mut lit.spectra {
+            let is_paint = leaf.curve == Curve::Constant(0.0);
+            leaf.curve = Curve::Constant(if is_paint { rho } else { emission });
+        }
+        let rendered = render_relit(&scene, &lit, &scene.channels, 32, 64, settings);
+        rendered.assert_clean();
+        let want = emission * (0..=BOUNCES).map(|n| f64::powi(rho, n as i32)).sum::<f64>();
+        assert_estimates(&format!("{rho}"), &rendered.replicas(), &[want], Bound { resolution: 0.01, allowance: 1e-6 });
+    }
+}
+
+/// Spectra for a scene: three of surfaces, three of lights.
+struct Paints {
+    surfaces: [Curve; 3],
+    lights: [Curve; 3],
+}
+
+impl Paints {
+    fn dull() -> Paints {
+        let flat = |a: f64, b: f64| table(&[400.0, 700.0], &[a, b]);
+        Paints {
+            surfaces: [flat(0.5, 0.4), flat(0.3, 0.35), flat(0.6, 0.2)],
+            lights: [flat(3.0, 4.0), flat(1.0, 2.0), flat(0.5, 0.25)],
+        }
+    }
+
+    /// Steps, lines and colours, bright where the others are dark.
+    fn vivid() -> Paints {
+        let hold = |nm: &[f64], value: &[f64]| Curve::Linear {
+            nm: nm.to_vec(),
+            value: value.to_vec(),
+            outside: Outside::Hold,
+        };
+        Paints {
+            surfaces: [
+                hold(&[400.0, 500.0, 500.0, 700.0], &[0.05, 0.05, 0.95, 0.9]),
+                hold(&[400.0, 480.0, 700.0], &[0.9, 0.8, 0.02]),
+                Curve::Constant(0.85),
+            ],
+            lights: [
+                table(
+                    &[400.0, 435.0, 436.0, 437.0, 545.0, 546.0, 547.0, 700.0],
+                    &[0.1, 0.1, 60.0, 0.1, 0.1, 80.0, 0.1, 0.2],
+                ),
+                Curve::Blackbody { kelvin: 2700.0, scale: 2e-5 },
+                Curve::Constant(2.0),
+            ],
+        }
+    }
+}
+
+/// A corner with a ball, a lamp and a sky: a plain scene.
+fn plain(paints: Paints) -> Scene {
+    let ([a, b, c], [lamp, glow, sky]) = (paints.surfaces, paints.lights);
+    corner()
+        .diffuse(quad(DVec3::new(-2.0, -1.0, 2.0), 4.0 * DVec3::X, 4.0 * DVec3::NEG_Z), a)
+        .diffuse(quad(DVec3::new(-2.0, -1.0, -1.0), 4.0 * DVec3::X, 3.0 * DVec3::Y), b)
+        .glowing(sphere(DVec3::new(0.4, -0.6, 0.2), 0.3), c, glow, Sides::Front)
+        .lamp(icosphere(DVec3::new(-0.5, 1.2, 0.4), 0.2, 1), lamp, Sides::Front)
+        .sky(sky)
+        .build()
+}
+
+fn corner() -> Builder {
+    let projection = Projection::Perspective { tan_half: DVec2::new(0.7, 0.5) };
+    Builder::new()
+        .camera(look(DVec3::new(0.2, 0.3, 2.2), DVec3::ZERO, DVec3::Y, projection))
+        .film(7, 5, Filter::Box)
+        .channels(Channels::equal(400.0, 700.0, 6))
+        .bounces(4)
+        .roulette(3)
+}
+
+/// What makes a scene general and separates still: endmembers, a blend, a leaf, an opacity, a point, a spot and a sun.
+fn general(paints: Paints) -> Scene {
+    let ([a, b, c], [point, sun, sky]) = (paints.surfaces, paints.lights);
+    let mut builder = corner();
+    let shares = [0.7, 0.1, 0.1, 0.1, 0.5, 0.4, 0.3, 0.3, 0.3, 0.0, 0.2, 0.8];
+    let mixture = builder.mixture([2, 2], &shares, &[a.clone(), b.clone(), c.clone()]);
+    let floor = quad(DVec3::new(-2.0, -1.0, 2.0), 4.0 * DVec3::X, 4.0 * DVec3::NEG_Z);
+    let cone = Cone { half_angle: 0.6, falloff: 0.3, profile: Profile::Smooth };
+    builder
+        .textured(floor, mixture)
+        .attributes(quad_uv())
+        .diffuse(quad(DVec3::new(-2.0, -1.0, -1.0), 4.0 * DVec3::X, 3.0 * DVec3::Y), b)
+        .opacity(Weight::Constant(0.8))
+        .diffuse(sphere(DVec3::new(0.4, -0.6, 0.2), 0.3), c.clone())
+        .translucent(disk(DVec3::new(-0.5, 0.2, 0.3), DVec3::new(0.3, 0.2, 1.0), 0.5), half(&c), half(&a))
+        .point(DVec3::new(0.5, 1.0, 1.0), point.clone())
+        .spot(DVec3::new(-1.0, 1.5, 1.0), DVec3::new(0.5, -1.0, -0.5), point, cone)
+        .sun(DVec3::new(-0.3, -1.0, -0.2), 0.05, sun)
+        .sky(sky)
+        .build()
+}
+
+fn half(curve: &Curve) -> Curve {
+    curve.scaled(0.5)
+}
+
+/// Rendered under one set of spectra, relit to the other: the picture of the reference under that one.
+fn relit_is_as_reference(what: &str, scene: impl Fn(Paints) -> Scene, epochs: u32, bound: Bound) {
+    let (rendered, wanted) = (scene(Paints::dull()), scene(Paints::vivid()));
+    let other = basis(&wanted);
+    assert_eq!(other.factors.len(), basis(&rendered).factors.len());
+    let channels = Channels::from_bounds(vec![[400.0, 450.0], [540.0, 550.0], [550.0, 700.0]], None);
+    let relit = render_relit(&rendered, &other, &channels, epochs, 64, Settings { seed: 4, ..Settings::default() });
+    relit.assert_clean();
+    let wanted = Scene { channels: channels.clone(), ..wanted };
+    let truth = truth::render_image(&wanted, 64 * epochs, 6);
+    let (channels, freedom) = (channels.len(), f64::from(truth.samples - 1));
+    let of_image = image_estimates(&truth.mean, &truth.standard_error, channels, freedom);
+    let means: Vec<f64> = of_image.iter().map(|e| e.mean).collect();
+    let scale: Vec<f64> = truth.mean.iter().enumerate().map(|(i, value)| value.max(means[i % channels])).collect();
+    let truth: Vec<Estimate> = (truth.mean.iter().zip(&truth.standard_error))
+        .map(|(&mean, &error)| Estimate { mean, error, freedom })
+        .collect();
+    assert_agreement(what, &relit.values(), &truth, &scale, bound);
+    let bound = Bound { resolution: 0.2 * bound.resolution, ..bound };
+    assert_agreement(&format!("{what}, image"), &relit.image_means(), &of_image, &means, bound);
+}
+
+#[test]
+fn plain_scenes_relit_are_as_the_reference() {
+    relit_is_as_reference(
+        "plain",
+        plain,
+        size::either(64, 256),
+        Bound { resolution: size::either(0.2, 0.1), allowance: 1e-6 },
+    );
+}
+
+#[test]
+fn general_scenes_relit_are_as_the_reference() {
+    relit_is_as_reference(
+        "general",
+        general,
+        size::either(64, 256),
+        Bound { resolution: size::either(0.2, 0.1), allowance: 1e-6 },
+    );
+}
+
+/// Hot walls, relit to other paints and temperatures: 1 - ρ follows.
+#[test]
+fn heat_follows_its_paint_and_temperature() {
+    let scene = |paint: Curve, kelvin: [f64; 2]| {
+        corner()
+            .channels(infrared())
+            .diffuse(quad(DVec3::new(-2.0, -1.0, 2.0), 4.0 * DVec3::X, 4.0 * DVec3::NEG_Z), paint)
+            .at_kelvin(kelvin[0])
+            .black(sphere(DVec3::new(0.4, -0.6, 0.2), 0.3))
+            .at_kelvin(kelvin[1])
+            .diffuse(quad(DVec3::new(-2.0, -1.0, -1.0), 4.0 * DVec3::X, 3.0 * DVec3::Y), 0.6)
+            .build()
+    };
+    let steps =
+        Curve::Linear { nm: vec![3e3, 9e3, 9e3, 20e3], value: vec![0.9, 0.9, 0.1, 0.2], outside: Outside::Hold };
+    let (rendered, wanted) = (scene(Curve::Constant(0.2), [300.0, 320.0]), scene(steps, [350.0, 500.0]));
+    let settings = Settings { seed: 7, ..Settings::default() };
+    let relit = render_relit(&rendered, &basis(&wanted), &wanted.channels, 32, 64, settings);
+    relit.assert_clean();
+    let truth = truth::render_image(&wanted, 4096, 8);
+    let channels = wanted.channels.len();
+    let truth = image_estimates(&truth.mean, &truth.standard_error, channels, f64::from(truth.samples - 1));
+    let means: Vec<f64> = truth.iter().map(|e| e.mean).collect();
+    assert_agreement("heat", &relit.image_means(), &truth, &means, Bound { resolution: 0.02, allowance: 2e-6 });
+}
+
+/// Where spectra are the same all over each channel, the very same paths bring what they bring without weights.
+#[test]
+fn the_paths_are_those_of_channels() {
+    let channels = Channels::equal(400.0, 700.0, 6);
+    let steps = |values: [f64; 6]| {
+        let nm = channels.bounds.iter().flatten().copied().collect();
+        Curve::Linear { nm, value: values.iter().flat_map(|v| [*v; 2]).collect(), outside: Outside::Hold }
+    };
+    let paints = || Paints {
+        surfaces: [
+            steps([0.5, 0.6, 0.7, 0.8, 0.55, 0.9]),
+            steps([0.9, 0.5, 0.8, 0.6, 0.7, 0.5]),
+            steps([0.6, 0.8, 0.6, 0.9, 0.5, 0.7]),
+        ],
+        lights: [steps([10.0, 20.0, 30.0, 40.0, 50.0, 60.0]), steps([6.0, 5.0, 4.0, 3.0, 2.0, 1.0]), steps([0.1; 6])],
+    };
+    // One light, which has all of the choice either way, and surfaces that reflect a half at least.
+    let of = |paints: Paints| {
+        let ([a, b, c], [lamp, ..]) = (paints.surfaces, paints.lights);
+        corner()
+            .diffuse(quad(DVec3::new(-2.0, -1.0, 2.0), 4.0 * DVec3::X, 4.0 * DVec3::NEG_Z), a)
+            .diffuse(quad(DVec3::new(-2.0, -1.0, -1.0), 4.0 * DVec3::X, 3.0 * DVec3::Y), b)
+            .diffuse(sphere(DVec3::new(0.4, -0.6, 0.2), 0.3), c)
+            .lamp(sphere(DVec3::new(-0.5, 1.2, 0.4), 0.2), lamp, Sides::Front)
+            .build()
+    };
+    let scene = of(paints());
+    let channels_of = render(&scene, 2, 64, Settings::default());
+    let weights = render(&scene.clone().factored(), 2, 64, Settings::default());
+    assert_eq!(channels_of.rays, weights.rays);
+    let peak = channels_of.means.iter().flatten().copied().fold(0.0, f32::max);
+    assert!(peak > 0.1);
+    for (a, b) in channels_of.means.iter().flatten().zip(weights.means.iter().flatten()) {
+        assert!((a - b).abs() <= 1e-5 * peak, "{a} {b}");
+    }
+}
+
+/// Waves of any size, and tiles: the same bits.
+#[test]
+fn waves_and_tiles_change_no_bit() {
+    for scene in [plain(Paints::vivid()), general(Paints::vivid())] {
+        let scene = scene.factored();
+        let usual = render(&scene, 2, 64, Settings::default());
+        for settings in [
+            Settings { budget: Budget { memory: None, paths: Some(777) }, ..Settings::default() },
+            Settings { tile: [8, 8], units: 1, ..Settings::default() },
+            Settings { checked: true, ..Settings::default() },
+        ] {
+            let other = render(&scene, 2, 64, settings);
+            assert!(usual.means == other.means, "{settings:?}");
+        }
+    }
+}
+
+/// Mixtures seen in mixtures are more terms than a path carries: some are chosen, and the mean stays.
+#[test]
+fn mixtures_of_mixtures_keep_their_mean() {
+    let scene = |paints: Paints| {
+        let [a, b, c] = paints.surfaces;
+        let mut builder = corner().bounces(5);
+        let shares = [0.3, 0.4, 0.3, 0.5, 0.2, 0.3, 0.2, 0.2, 0.6, 0.4, 0.4, 0.2];
+        let mixture = builder.mixture([2, 2], &shares, &[a, b, c]);
+        let wall = |builder: Builder, corner: DVec3, u: DVec3, v: DVec3| {
+            builder.textured(quad(corner, u, v), mixture).attributes(quad_uv())
+        };
+        let (x, y, z) = (4.0 * DVec3::X, 3.0 * DVec3::Y, 4.0 * DVec3::NEG_Z);
+        let builder = wall(builder, DVec3::new(-2.0, -1.0, 2.5), x, z);
+        let builder = wall(builder, DVec3::new(-2.0, -1.0, -1.5), x, y);
+        let builder = wall(builder, DVec3::new(-2.0, -1.0, 2.5), z, y);
+        builder.point(DVec3::new(0.5, 1.0, 1.0), paints.lights[0].clone()).build()
+    };
+    let bound = Bound { resolution: size::either(0.2, 0.1), allowance: 1e-6 };
+    relit_is_as_reference("mixtures", scene, size::either(64, 256), bound);
+}
+
+/// What does not separate is named.
+#[test]
+fn what_does_not_separate_is_named() {
+    let refused = |scene: Scene, words: &str| {
+        let said = separable::basis(&scene).expect_err(words).to_string();
+        assert!(said.contains("--factored") && said.contains(words), "{words}: {said}");
+    };
+    let ball = || sphere(DVec3::ZERO, 0.5);
+    refused(Builder::new().plastic(ball(), 0.5, 1.5, 0.2).build(), "plastic");
+    refused(Builder::new().dielectric(ball(), 1.5, 0.0).build(), "dielectric");
+    refused(Builder::new().conductor(ball(), 0.2, 3.0, [0.0; 2]).build(), "conductor");
+    refused(Builder::new().gas(1.0).build(), "media");
+    refused(Builder::new().rgb_map([2, 1], vec![1.0; 6]).build(), "environment map");
+    refused(Builder::new().bounces(65).diffuse(ball(), 0.5).build(), "integrator.max_bounces");
+    let mut one_sided = Builder::new().one_sided(ball(), 0.5).at_kelvin(300.0).build();
+    refused(one_sided.clone(), "heat");
+    one_sided.materials[0].bsdf = Bsdf::Diffuse { reflectance: Reflectance::Spectrum(0) };
+    one_sided.materials[0].two_sided = true;
+    assert!(separable::basis(&one_sided).is_ok());
+}
