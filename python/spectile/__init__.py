@@ -31,7 +31,7 @@ from ._errors import (
 from ._render import Epoch, epochs, render
 from ._scene import Scene, load
 from ._spectile import __version__
-from ._tools import compare, devices, illuminant, plan, sensor, to_colour
+from ._tools import compare, devices, illuminant, plan, relight, sensor, to_colour
 
 if TYPE_CHECKING:
     from ._cube import Cube, open_cube, rgb, tone
@@ -65,6 +65,7 @@ __all__ = [
     "plan",
     "render",
     "rgb",
+    "relight",
     "sensor",
     "to_colour",
     "tone",

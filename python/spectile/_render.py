@@ -69,6 +69,7 @@ def render(
     error: float | None = None,
     seed: int = 0,
     uncertainty: bool = False,
+    factored: bool = False,
     resume: bool = False,
     overwrite: bool = False,
     tiles: tuple[int, int] | range | None = None,
@@ -89,6 +90,7 @@ def render(
     spp, time, error: stop after so many samples per pixel, so many seconds (or text such as "10m"), or when the estimated relative error
         of every channel is so small; the first that is reached, at the end of an epoch. Without any, 64 samples (512 with `uncertainty`).
     uncertainty: also store the standard error of every value.
+    factored: keep weights of products of spectra instead of radiance, of which `relight` makes cubes under other lamps and paints.
     resume: go on with a cube that an earlier render of the same scene has begun. overwrite: replace a cube that is there.
     tiles: (a, b), the tiles a to b - 1 alone. size: (width, height) in place of the film's. tile: side of the tiles in pixels.
     devices: "all", a number, or positions as `devices` lists them. memory: bytes of each device that may be used, or text such as "2GiB".
@@ -156,7 +158,7 @@ def _arguments(path: str, settings: Mapping[str, Any]) -> list[str]:
         "size": _work.pair(settings["size"]),
         "tiles": tiles,
         "preview": None if preview is None else os.fspath(preview),
-        **{name: bool(settings[name]) for name in ("uncertainty", "resume", "overwrite")},
+        **{name: bool(settings[name]) for name in ("uncertainty", "factored", "resume", "overwrite")},
         **{name: settings[name] for name in ("spp", "error", "tile", "memory", "exposure")},
     }
     for name, value in options.items():

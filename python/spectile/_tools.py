@@ -178,6 +178,58 @@ def sensor(
     return opened(path)
 
 
+def relight(
+    cube: Any,
+    out: str | os.PathLike[str] | None = None,
+    *,
+    spectra: Mapping[str, Any] | None = None,
+    temperatures: Mapping[str, float] | None = None,
+    channels: Mapping[str, Any] | None = None,
+    responses: Any = None,
+    overwrite: bool = False,
+) -> Cube:
+    """A factored cube (`render(…, factored=True)`) under other spectra, temperatures or channels; no path is traced.
+
+    spectra: by their names in the scene, each as a scene takes it: a number, a mapping such as {"blackbody": 2700}, wavelengths and
+        values in any form of which `Scene` makes spectra.
+    temperatures: of materials by name, K. channels: as in a scene, such as {"equal": {"from": 400, "to": 700, "count": 30}}.
+    responses: channels that are bands of a sensor, as `sensor` takes them.
+    out: the cube to make; None for a temporary one.
+    """
+    import shutil
+
+    from ._cube import opened, path_of, temporary
+
+    if channels is not None and responses is not None:
+        raise UsageError("relight: give `channels` or `responses`, and not both")
+    reader = _Reader("spectra")
+    folder = tempfile.mkdtemp(prefix="spectile-")
+    path = os.path.join(folder, "relit.zarr") if out is None else os.fspath(out)
+    try:
+        arguments = ["relight", f"--output={path}", *_work.option("overwrite", bool(overwrite))]
+        for name, spectrum in (spectra or {}).items():
+            samples = reader.samples(spectrum, (str(name),))
+            value = spectrum if samples is None else {"samples": samples}
+            arguments.append(f"--set=spectra.{_work.toml(str(name))}={_work.toml(value)}")
+        for name, kelvin in (temperatures or {}).items():
+            arguments.append(f"--set=materials.{_work.toml(str(name))}.temperature={_work.toml(kelvin)}")
+        arguments += [f"--channels={key}={_work.toml(value)}" for key, value in (channels or {}).items()]
+        if isinstance(responses, (str, os.PathLike)):
+            arguments.append(f"--responses={os.fspath(responses)}")
+        elif responses is not None:
+            file = os.path.join(folder, "responses.csv")
+            _write_responses(file, responses)
+            arguments.append(f"--responses={file}")
+        _work.run([*arguments, "--json", "--", path_of(cube, "relight")])
+        if out is None:
+            return temporary(folder, path)
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    shutil.rmtree(folder, ignore_errors=True)
+    return opened(path)
+
+
 def _write_responses(file: str, responses: Any) -> None:
     """A CSV file of bands; each keeps its own wavelengths."""
     if hasattr(responses, "wavelengths") and hasattr(responses, "labels"):
@@ -187,7 +239,7 @@ def _write_responses(file: str, responses: Any) -> None:
         bands = dict(responses)
     else:
         raise TypeError(
-            f"sensor: responses are a file, a mapping of names to spectra, or colour-science's, not {type(responses).__name__}"
+            f"responses are a file, a mapping of names to spectra, or colour-science's, not {type(responses).__name__}"
         )
     reader = _Reader("responses")
     with open(file, "w", newline="", encoding="utf-8") as text:
@@ -196,7 +248,7 @@ def _write_responses(file: str, responses: Any) -> None:
         for name, spectrum in bands.items():
             samples = reader.samples(spectrum, (str(name),))
             if samples is None:
-                raise UsageError(f"sensor: the response of band {name!r} is no spectrum; give an array [n, 2] of nm and response")
+                raise UsageError(f"the response of band {name!r} is no spectrum; give an array [n, 2] of nm and response")
             rows.writerows([str(name), repr(nm), repr(value)] for nm, value in samples)
 
 

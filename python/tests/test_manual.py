@@ -15,10 +15,11 @@ def test_programs_run(toml, monkeypatch, capsys):
     toml.rename(folder / "scene.toml")
     (folder / "camera.csv").write_text((ROOT / "scenes/cornell/camera.csv").read_text())
     programs = re.findall(r"^```python\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
-    assert len(programs) == 6
+    assert len(programs) == 7
     names = {}
     for program in programs:
         exec(compile(program, "docs/python.md", "exec"), names)
+    assert names["fine"].sizes["wavelength"] == 90 and names["red"].radiance.notnull().all()
     assert names["camera"].sizes["wavelength"] == 3 and names["picture"].shape == (32, 32, 3)
     said = capsys.readouterr().out
     assert said.count("(32, 32, 3)") == 8 and "film.width" in said

@@ -120,6 +120,61 @@ fn the_page_is_what_renders_write() {
     choices_have_the_fields_of_the_page(&cubes);
 }
 
+/// The two arrays of factored cubes are as the chapter on them says, and nothing else differs from other cubes.
+#[test]
+fn factored_cubes_are_as_the_page_says() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("scene.toml"), SCENE).expect("written");
+    for (name, more) in [("factored", ""), ("uncertainty", " --uncertainty")] {
+        let render = format!("render scene.toml -o {name}.zarr --spp 64 --tile 16 --quiet --factored{more}");
+        let output = spectile(folder.path(), &render.split(' ').collect::<Vec<_>>(), true);
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        let path = folder.path().join(format!("{name}.zarr"));
+        let group = json(&path.join("zarr.json"));
+        let arrays = group["consolidated_metadata"]["metadata"].as_object().expect("arrays");
+        let of_others: BTreeSet<String> = rows("Arrays").iter().map(|row| code(&row[0]).to_owned()).collect();
+        let instead = ["radiance".to_owned(), "standard_error".to_owned()];
+        let documented = rows("Factored cubes");
+        let expected = of_others.into_iter().filter(|array| !instead.contains(array));
+        let expected: BTreeSet<String> =
+            expected.chain(documented.iter().map(|row| code(&row[0]).to_owned())).collect();
+        assert_eq!(arrays.keys().cloned().collect::<BTreeSet<_>>(), expected);
+        let groups = if name == "uncertainty" { 8 } else { 2 };
+        let factored: Value =
+            serde_json::from_str(group["attributes"]["factored"].as_str().expect("JSON as text")).expect("JSON");
+        let most = factored["most_factors"].as_u64().expect("a number");
+        let size = |word: &str| -> u64 {
+            match word.trim() {
+                "⌈H/h⌉" | "⌈W/w⌉" => 2,
+                "1" => 1,
+                "2 + G" => 2 + groups,
+                "1 + F" => 1 + most.max(1),
+                "80 w h" => 80 * TILE * TILE,
+                word => panic!("`{word}` is no size"),
+            }
+        };
+        for row in documented {
+            let found = &arrays[code(&row[0])];
+            let sizes = |cell: &str| cell.split(',').map(|word| size(word).to_string()).collect::<Vec<_>>().join(", ");
+            let codecs: Vec<String> = (found["codecs"].as_array().expect("codecs").iter())
+                .map(|codec| format!("{} {}", plain(&codec["name"]), plain(&codec["configuration"]["endian"])))
+                .collect();
+            let written = [
+                list(&found["dimension_names"]),
+                list(&found["shape"]),
+                plain(&found["data_type"]),
+                list(&found["chunk_grid"]["configuration"]["chunk_shape"]),
+                codecs.join(", ").replace(" null", ""),
+                plain(&found["fill_value"]),
+            ];
+            let page = [row[1].clone(), sizes(&row[2]), row[3].clone(), sizes(&row[4]), row[5].clone(), row[6].clone()];
+            assert_eq!(written, page, "{}", row[0]);
+            let file = code(&row[7]).replace("ROW", "1").replace("COLUMN", "0");
+            assert!(path.join(&file).exists(), "{file}");
+        }
+    }
+}
+
 fn choices_have_the_fields_of_the_page(cubes: &Cubes) {
     let found = json(&cubes.path("plain").join(".spectile/choices.json"));
     let documented = rows("Choices");
