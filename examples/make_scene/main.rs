@@ -12,6 +12,7 @@ mod gases;
 mod haze;
 mod image;
 mod isosurface;
+mod lounge;
 pub mod matter;
 mod mesh;
 mod plume;
@@ -24,7 +25,7 @@ use std::io;
 use std::path::Path;
 use std::process::ExitCode;
 
-pub const NAMES: [&str; 5] = ["conference", "aircraft", "statues", "haze", "cloud"];
+pub const NAMES: [&str; 6] = ["conference", "aircraft", "statues", "haze", "cloud", "lounge"];
 
 /// Makes what the scene in the folder `scene` needs, in its folder `generated`; or, named `matter`, what several have in common and the
 /// repository holds.
@@ -40,6 +41,7 @@ pub fn make(name: &str, scene: &Path) -> io::Result<()> {
         "statues" => statues::make(scene, folder),
         "haze" => haze::make(folder),
         "cloud" => cloud::make(folder),
+        "lounge" => lounge::make(folder),
         _ => Err(io::Error::other(format!("there is no scene `{name}` to make"))),
     }
 }

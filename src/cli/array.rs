@@ -65,7 +65,7 @@ fn scene_of(job: &Job) -> Result<Scene> {
             node_name()
         )));
     }
-    Ok(scene)
+    Ok(if job.factored { scene.factored() } else { scene })
 }
 
 /// An error that names the node where it came up.

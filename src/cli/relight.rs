@@ -107,6 +107,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
             "changed": relit.changed,
             "error_estimate": largest,
             "entries_per_pixel": found.entries as f64 / found.pixels.max(1) as f64,
+            "expand_s": found.expand_s,
         }),
     )?;
     output.text(&text)

@@ -56,6 +56,10 @@ pub struct Args {
     #[arg(long)]
     pub uncertainty: bool,
 
+    /// Keep weights of products of spectra instead of radiance, as `spectile render --factored` does
+    #[arg(long)]
+    pub factored: bool,
+
     #[command(flatten)]
     pub scene: SceneArgs,
 
@@ -159,6 +163,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         }
     }
     let scene = args.scene.load()?;
+    let scene = if args.factored { scene.factored() } else { scene };
     for warning in &scene.warnings {
         say(&format!("warning: {warning}"));
         output.event("warning", json!({ "message": warning }))?;
@@ -191,6 +196,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         tile: args.scene.tile,
         seed: args.seed,
         uncertainty: args.uncertainty,
+        factored: args.factored,
         memory: args.memory,
         allow_software: args.allow_software || args.gpus_per_task == 0,
         samples,

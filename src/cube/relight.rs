@@ -1,6 +1,7 @@
 //! An ordinary cube from a factored one, under other spectra and in other channels: no path is traced.
 
 use std::path::Path;
+use std::time::Instant;
 
 use rayon::prelude::*;
 use serde_json::json;
@@ -25,6 +26,8 @@ pub struct Relighted {
     /// Entries of all pixels, and pixels that have some.
     pub entries: u64,
     pub pixels: u64,
+    /// Seconds that threads spent multiplying weights by spectra, in all: without reading, standard errors and writing.
+    pub expand_s: f64,
 }
 
 /// A tile under the new spectra: rows of pixels, and standard errors, column by column.
@@ -36,6 +39,7 @@ struct Tile {
     /// Per channel Σ variance and Σ mean².
     sums: Vec<[f64; 2]>,
     entries: u64,
+    expand_s: f64,
 }
 
 /// Makes at `path` the cube that `cube`, a factored one, is in `channels` where its products are made of `basis`; `changed` says what of
@@ -64,7 +68,7 @@ pub fn relight(
     let writer = Writer::open(aside.path(), &header, Existing::Refuse, 0..count, &mut |_| {});
     let writer = writer.map_err(|error| aside.error(error))?;
     let mut sums = vec![[0.0f64; 2]; channels.len()];
-    let (mut entries, mut pixels) = (0, 0);
+    let (mut entries, mut pixels, mut expand_s) = (0, 0, 0.0);
     let at_once = 2 * rayon::current_num_threads() as u32;
     let mut since_commit = 0;
     for first in (0..count).step_by(at_once as usize) {
@@ -89,6 +93,7 @@ pub fn relight(
                 sum[1] += of_tile[1];
             });
             entries += made.entries;
+            expand_s += made.expand_s;
             pixels += cube.grid().rect(made.tile).pixels();
         }
         since_commit += at_once;
@@ -103,7 +108,7 @@ pub fn relight(
     aside.put()?;
     let estimate = |[variance, square]: &[f64; 2]| if *square > 0.0 { (variance / square).sqrt() } else { 0.0 };
     let error_estimate = sums.iter().map(|sums| if sums[0].is_nan() { f64::NAN } else { estimate(sums) }).collect();
-    Ok(Relighted { error_estimate, entries, pixels })
+    Ok(Relighted { error_estimate, entries, pixels, expand_s })
 }
 
 /// A tile under other spectra; `None` before its first unit.
@@ -112,7 +117,9 @@ fn expand(cube: &Cube, expander: &Expander, tile: u32) -> Result<Option<Tile>> {
     let (Some(weights), 1..) = (cube.state().weights(tile)?, samples) else { return Ok(None) };
     let (size, rect, channels) = (cube.header().tile, cube.grid().rect(tile), expander.channels());
     let rows = expander.rows(&weights.products);
+    let began = Instant::now();
     let values = weights.expanded(&rows, channels, size, rect);
+    let expand_s = began.elapsed().as_secs_f64();
     let errors = weights.standard_errors(&rows, channels, size, rect, &cube.groups(samples));
     let mut sums = vec![[0.0f64; 2]; channels];
     for (values, errors) in
@@ -123,5 +130,5 @@ fn expand(cube: &Cube, expander: &Expander, tile: u32) -> Result<Option<Tile>> {
             sums[1] += f64::from(*value) * f64::from(*value);
         }
     }
-    Ok(Some(Tile { tile, samples, values, errors, sums, entries: weights.len() as u64 }))
+    Ok(Some(Tile { tile, samples, values, errors, sums, entries: weights.len() as u64, expand_s }))
 }

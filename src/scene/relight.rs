@@ -50,13 +50,19 @@ pub fn relight(basis: &Basis, channels: &Channels, sets: &[(String, String)], wa
     let (names, materials) = (names(basis), materials(basis));
     let mut spectra: Vec<&str> = Vec::new();
     let mut hot: Vec<&str> = Vec::new();
-    for (key, _) in sets {
+    let mut normal = Vec::new();
+    for (key, value) in sets {
         let path = overrides::parse_key(key).unwrap_or_default();
         let path: Vec<&str> = path.iter().map(String::as_str).collect();
         match path[..] {
-            ["spectra", name, ..] if names.contains(&name) => spectra.extend(names.iter().find(|n| **n == name)),
-            ["materials", name, "temperature"] if materials.contains(&name) => {
+            ["spectra", name, ..] if names.contains(&name) => {
+                spectra.extend(names.iter().find(|n| **n == name));
+                normal.push((key.clone(), value.clone()));
+            }
+            // With the kind of the material between, as it stands in scenes, or without.
+            ["materials", name, "temperature"] | ["materials", name, _, "temperature"] if materials.contains(&name) => {
                 hot.extend(materials.iter().find(|n| **n == name));
+                normal.push((format!("materials.\"{}\".temperature", name.escape_default()), value.clone()));
             }
             _ => return Err(refusal(key, &path, &names, &materials)),
         }
@@ -72,9 +78,9 @@ pub fn relight(basis: &Basis, channels: &Channels, sets: &[(String, String)], wa
         .iter()
         .map(|name| (*name, Node { value: Value::String((*name).to_owned()), origin: Origin::Whole }))
         .collect();
-    let cx = Context::new(Path::new(OPTION), &text, sets);
+    let cx = Context::new(Path::new(OPTION), &text, &normal);
     let Some(mut root) = cx.document() else { return Err(Error::Input(cx.finish().0)) };
-    overrides::apply(&cx, &mut root, sets);
+    overrides::apply(&cx, &mut root, &normal);
     let mut relit = basis.clone();
     decode(&cx, &root, &channels, &users, &hot, &mut relit);
     let (problems, more) = cx.finish();
@@ -117,7 +123,7 @@ fn refusal(key: &str, path: &[&str], names: &[&str], materials: &[&str]) -> Erro
             let known = || format!("the cube has {}", list(names.iter().copied()));
             format!("no spectrum of the cube is named \"{name}\"; {}", hint.unwrap_or_else(known))
         }
-        ["materials", name, "temperature"] => {
+        ["materials", name, "temperature"] | ["materials", name, _, "temperature"] => {
             let known = if materials.is_empty() { "none".to_owned() } else { list(materials.iter().copied()) };
             format!("\"{name}\" is no hot material of the cube, which are: {known}")
         }
@@ -293,7 +299,7 @@ mod tests {
         let relit = set(&[
             ("spectra.lamp.blackbody", "6500"),
             ("spectra.paint", "{ samples = [[400, 0.2], [500, 0.4]], outside = \"hold\" }"),
-            ("materials.wall.temperature", "350"),
+            ("materials.wall.diffuse.temperature", "350"),
         ])
         .expect("changes");
         let mut want = basis();

@@ -46,6 +46,9 @@ pub struct Job {
     /// Whether the cube has standard errors.
     #[serde(default)]
     pub uncertainty: bool,
+    /// Whether weights of products of spectra are kept instead of radiance.
+    #[serde(default)]
+    pub factored: bool,
     pub memory: Option<u64>,
     /// Whether tasks may use software devices where no GPU is found.
     #[serde(default)]
@@ -207,6 +210,7 @@ impl Job {
         words.extend(self.tile.map(|tile| format!("--tile {tile}")));
         words.extend((self.seed != 0).then(|| format!("--seed {}", self.seed)));
         words.extend(self.uncertainty.then(|| "--uncertainty".into()));
+        words.extend(self.factored.then(|| "--factored".into()));
         words.extend(self.memory.map(|memory| format!("--memory {memory}")));
         words.join(" ")
     }
@@ -266,6 +270,7 @@ pub(crate) mod tests {
             tile: Some(32),
             seed: 7,
             uncertainty: false,
+            factored: false,
             memory: None,
             allow_software: false,
             samples: 256,

@@ -242,6 +242,13 @@ fn an_array_job_makes_standard_errors_too() {
 
 /// The script and what would be typed, to the letter. If this has to change, look at it, and write it anew by hand.
 #[test]
+fn an_array_job_keeps_weights() {
+    let Some(place) = Place::new(2, 1) else { return };
+    place.submit(&["--spp", "64", "--factored", "--tasks", "4"]);
+    place.ends_with_the_bytes_of(&["--spp", "64", "--factored"]);
+}
+
+#[test]
 fn a_dry_run_shows_everything_and_changes_nothing() {
     let folder = folder_with_scene();
     let path = folder.path().canonicalize().expect("a folder");
