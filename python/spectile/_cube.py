@@ -78,10 +78,12 @@ def path_of(cube: Any, what: str) -> str:
     if not isinstance(cube, xarray.Dataset):
         raise TypeError(f"{what}: a cube is the name of one or a Dataset, not {type(cube).__name__}")
     source = cube.encoding.get("source")
-    if source is None or "radiance" not in cube:
+    # Factored cubes hold weights of products of spectra.
+    values = next((name for name in ("radiance", "weights") if name in cube), None)
+    if source is None or values is None:
         raise UsageError(f"{what}: this Dataset does not come from a cube on disk; give one as `render` or `open_cube` made it")
     there = opened(source)
-    whole = cube["radiance"].encoding.get("source") == source and all(
+    whole = cube[values].encoding.get("source") == source and all(
         name in cube.coords and cube.coords[name].equals(there.coords[name]) for name in ("wavelength", "y", "x")
     )
     if not whole or cube.attrs.get("scene_digest") != there.attrs.get("scene_digest"):

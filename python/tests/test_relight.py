@@ -12,7 +12,7 @@ def weights(tmp_path_factory):
     scene = ball()
     scene["spectra"]["lamp"] = {"blackbody": 2856}
     scene["objects"][2]["emission"] = "lamp"
-    scene["materials"]["floor"]["temperature"] = 300
+    scene["materials"]["floor"]["diffuse"]["temperature"] = 300
     return sp.render(scene, tmp_path_factory.mktemp("cube") / "weights.zarr", spp=16, factored=True)
 
 
@@ -42,9 +42,15 @@ def test_spectra_are_taken_as_scenes_take_them(weights):
 
 def test_channels_bands_and_temperatures(weights):
     infrared = {"equal": {"from": 8000, "to": 12000, "count": 4}}
-    cold = sp.relight(weights, channels=infrared)
-    warm = sp.relight(weights, channels=infrared, temperatures={"floor": 330})
-    assert cold.sizes["wavelength"] == 4 and (warm.radiance.mean() / cold.radiance.mean()) > 1.3
+    cold, warm = (
+        sp.relight(weights, channels=infrared, spectra={"lamp": 0.0}, temperatures={"floor": kelvin}) for kelvin in (300, 330)
+    )
+    assert cold.sizes["wavelength"] == 4
+    # All light is the floor's: as Planck's law has it, hc/k = 14387.769 um K.
+    um = cold.wavelength.values / 1000
+    law = [1 / numpy.expm1(14387.769 / (um * kelvin)) for kelvin in (300, 330)]
+    ratio = warm.radiance.mean(("x", "y")) / cold.radiance.mean(("x", "y"))
+    assert numpy.allclose(ratio, law[1] / law[0], rtol=3e-3)
     green = sp.relight(weights, responses={"green": (numpy.array([500.0, 550.0, 600.0]), numpy.array([0.0, 1.0, 0.0]))})
     assert green.sizes["wavelength"] == 1 and float(green.wavelength[0]) == pytest.approx(550)
 

@@ -6,6 +6,7 @@ use super::grid::Rect;
 use super::journal::Record;
 use super::map::Chunk;
 use super::metadata::Layout;
+use super::weights::Shape;
 use super::{BLOCK, Grid};
 use crate::spectral::colour::Projection;
 use crate::{Error, Result};
@@ -47,7 +48,11 @@ pub fn merge_bytes(header: &super::Header) -> u64 {
     let buffer = (BUFFER_BYTES as u64).max(4 * channels);
     // Error sums and a spectrum of squares: two f64 a channel as they were, and two as they become.
     let sums = 4 * 8 * channels;
-    buffer + sums + 12 * grid.tile_pixels() as u64 + (8 * blocks_y + 4 * blocks_x * blocks_y) * channels
+    // Of factored cubes: radiance of the tile before and after, and of the unit; what both files hold.
+    let shape = Shape::of(header);
+    let weights = 3 * header.chunk_bytes() + (shape.entries * (4 * shape.columns + 2 * shape.width)) as u64;
+    let weights = if header.is_factored() { weights } else { 0 };
+    weights + buffer + sums + 12 * grid.tile_pixels() as u64 + (8 * blocks_y + 4 * blocks_x * blocks_y) * channels
 }
 
 /// One pass over the pixels of a unit, in the order of the file: the new chunk streams out, and all that is derived from it is

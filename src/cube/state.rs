@@ -145,14 +145,13 @@ impl<'a> CubeState<'a> {
         let (grid, channels) = (self.cube.grid(), self.cube.channels().len());
         let tile = grid.tile_at(x, y);
         let rect = grid.rect(tile);
-        let mut spectrum = vec![0.0f32; channels];
         if self.cube.header().is_factored() {
             let Some(weights) = self.weights(tile)? else { return Ok(None) };
-            let rows = self.cube.expander()?.rows(&weights.products);
-            weights.expand(((y - rect.y0) * grid.tile[0] + x - rect.x0) as usize, &rows, &mut spectrum);
-            return Ok(Some(spectrum));
+            let pixel = ((y - rect.y0) * grid.tile[0] + x - rect.x0) as usize;
+            return Ok(Some(weights.spectrum(pixel, self.cube.expander()?)));
         }
         let pixel = self.cube.layout().pixel(grid.tile, x - rect.x0, y - rect.y0) as u64;
+        let mut spectrum = vec![0.0f32; channels];
         let there = self.read::<f32>(TileArray::Radiance, tile, pixel * channels as u64 * 4, &mut spectrum)?;
         Ok(there.then_some(spectrum))
     }

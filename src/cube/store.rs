@@ -14,7 +14,7 @@ use super::journal::Journal;
 use super::lock::{Probe, TileLock};
 use super::map::Chunk;
 use super::metadata::{DERIVED, Header, Layout, Recorded};
-use super::weights::{Groups, Weights, group_after};
+use super::weights::{Groups, Merging, Weights};
 use crate::spectral::Channels;
 use crate::spectral::colour::Projection;
 use crate::spectral::product::Expander;
@@ -325,21 +325,30 @@ impl Cube {
         Weights::decode(&self.header, [(path, &weights), (products_path, &products)])
     }
 
+    /// As [`Merging::new`].
+    pub(super) fn merging(
+        &self,
+        tile: u32,
+        old: Option<Weights>,
+        n_before: u32,
+        unit: Weights,
+        n_unit: u32,
+    ) -> Result<Merging> {
+        let (rect, [x, y]) = (self.grid().rect(tile), self.header.origin);
+        let at = [x + rect.x0, y + rect.y0];
+        Ok(Merging::new(&self.header, self.expander()?, at, old, n_before, unit, n_unit))
+    }
+
     /// The weights of a tile with those of one more unit, `n_unit` samples after `n_before`, thinned to what is kept.
     pub fn merged(
         &self,
         tile: u32,
-        old: Option<&Weights>,
+        old: Option<Weights>,
         n_before: u32,
         unit: Weights,
         n_unit: u32,
     ) -> Result<Weights> {
-        let (groups, expander) = (self.header.groups(), self.expander()?);
-        let group = group_after(n_before, self.header.epoch, groups);
-        let merged = Weights::merged(old, n_before, unit, n_unit, group, groups);
-        let importances = merged.importances(expander, &expander.rows(&merged.products));
-        let (rect, [x, y]) = (self.grid().rect(tile), self.header.origin);
-        Ok(merged.thinned(&importances, self.header.tile, [x + rect.x0, y + rect.y0], n_before + n_unit))
+        Ok(self.merging(tile, old, n_before, unit, n_unit)?.merged.compacted())
     }
 
     /// How the samples of a tile are spread over the groups of epochs of a factored cube.

@@ -3,6 +3,7 @@
 
 use std::path::Path;
 
+use pulp::Arch;
 use smallvec::SmallVec;
 
 use super::checksums;
@@ -12,15 +13,15 @@ use crate::spectral::product::{Expander, Product};
 use crate::{Error, Result};
 
 /// Entries of a pixel that are kept, and for which a tile's file has room. Of more, the least are thinned out by chance.
-const MOST_ENTRIES: usize = 79;
-const ROOM: usize = 80;
+const MOST_ENTRIES: usize = 71;
+const ROOM: usize = 72;
 
 /// Parts of the epochs whose weights are told apart: odd and even ones, or where standard errors are wanted eight.
 pub const GROUPS: usize = 2;
 pub const GROUPS_WITH_UNCERTAINTY: usize = 8;
 
 /// A share of a weight is a multiple of this: enough for a spread, and what is 0 below compresses well.
-const SHARE_STEPS: f64 = 65_536.0;
+const SHARE_STEPS: f64 = 16_384.0;
 
 /// No product, or no factor.
 const NONE: u16 = u16::MAX;
@@ -120,19 +121,14 @@ impl Weights {
     pub fn merged(
         base: Option<&Weights>,
         n_before: u32,
-        unit: Weights,
+        unit: &Weights,
         n_unit: u32,
         group: usize,
         groups: usize,
     ) -> Weights {
-        let Some(base) = base else { return unit.alone(groups) };
-        let mut products = [&base.products[..], &unit.products[..]].concat();
-        products.sort_unstable();
-        products.dedup();
-        let places = |of: &[Product]| -> Vec<u32> {
-            of.iter().map(|product| products.binary_search(product).expect("merged above") as u32).collect()
-        };
-        let (of_base, of_unit) = (places(&base.products), places(&unit.products));
+        let Some(base) = base else { return unit.clone().alone(groups) };
+        let products = union(&base.products, &unit.products);
+        let (of_base, of_unit) = (places(&base.products, &products), places(&unit.products, &products));
         let (before, added) = (f64::from(n_before), f64::from(n_unit));
         let after = before + added;
         let others = groups - 1;
@@ -186,45 +182,55 @@ impl Weights {
         merged
     }
 
+    /// The same among `products`, which must hold all of its own.
+    fn over(mut self, products: &[Product]) -> Weights {
+        let places = places(&self.products, products);
+        self.product.iter_mut().for_each(|product| *product = places[*product as usize]);
+        Weights { products: products.to_vec(), ..self }
+    }
+
     /// Thins out pixels of more entries than are kept: those that matter least, with the same mean, by numbers that depend on the
-    /// pixel and its samples only. Without what is not needed any more.
+    /// pixel and its samples only.
     pub fn thinned(self, importances: &[f64], tile: [u32; 2], at: [u32; 2], samples: u32) -> Weights {
         let others = self.groups - 1;
         let is_full = |pixel: usize| self.entries(pixel).len() > MOST_ENTRIES;
-        let mut thinned = if (0..self.pixels()).any(is_full) {
-            let mut thinned = Weights {
-                products: Vec::new(),
-                starts: vec![0],
-                product: Vec::with_capacity(self.len()),
-                weight: Vec::with_capacity(self.len()),
-                shares: Vec::with_capacity(self.shares.len()),
-                groups: self.groups,
-            };
-            for pixel in 0..self.pixels() {
-                let entries = self.entries(pixel);
-                let first = entries.start;
-                let matters = |i: usize| f64::from(self.weight[i]).abs() * importances[self.product[i] as usize];
-                let kept = if is_full(pixel) {
-                    let column = at[0] + pixel as u32 % tile[0];
-                    let row = at[1] + pixel as u32 / tile[0];
-                    let random = super::random_of([column, row, samples, 2]);
-                    systematic(&entries.map(matters).collect::<Vec<f64>>(), MOST_ENTRIES, random)
-                } else {
-                    (0..entries.len()).map(|i| (i, 1.0)).collect()
-                };
-                for (i, factor) in kept {
-                    thinned.product.push(self.product[first + i]);
-                    thinned.weight.push((f64::from(self.weight[first + i]) * factor) as f32);
-                    thinned.shares.extend(&self.shares[(first + i) * others..(first + i + 1) * others]);
-                }
-                thinned.starts.push(thinned.weight.len() as u32);
-            }
-            Weights { products: self.products, ..thinned }
-        } else {
-            self
+        if !(0..self.pixels()).any(is_full) {
+            return self;
+        }
+        let mut thinned = Weights {
+            products: Vec::new(),
+            starts: vec![0],
+            product: Vec::with_capacity(self.len()),
+            weight: Vec::with_capacity(self.len()),
+            shares: Vec::with_capacity(self.shares.len()),
+            groups: self.groups,
         };
-        let mut is_used = vec![false; thinned.products.len()];
-        thinned.product.iter().for_each(|&product| is_used[product as usize] = true);
+        for pixel in 0..self.pixels() {
+            let entries = self.entries(pixel);
+            let first = entries.start;
+            let matters = |i: usize| f64::from(self.weight[i]).abs() * importances[self.product[i] as usize];
+            let kept = if is_full(pixel) {
+                let column = at[0] + pixel as u32 % tile[0];
+                let row = at[1] + pixel as u32 / tile[0];
+                let random = super::random_of([column, row, samples, 2]);
+                systematic(&entries.map(matters).collect::<Vec<f64>>(), MOST_ENTRIES, random)
+            } else {
+                (0..entries.len()).map(|i| (i, 1.0)).collect()
+            };
+            for (i, factor) in kept {
+                thinned.product.push(self.product[first + i]);
+                thinned.weight.push((f64::from(self.weight[first + i]) * factor) as f32);
+                thinned.shares.extend(&self.shares[(first + i) * others..(first + i + 1) * others]);
+            }
+            thinned.starts.push(thinned.weight.len() as u32);
+        }
+        Weights { products: self.products, ..thinned }
+    }
+
+    /// Without products of which there is no entry.
+    pub fn compacted(mut self) -> Weights {
+        let mut is_used = vec![false; self.products.len()];
+        self.product.iter().for_each(|&product| is_used[product as usize] = true);
         let mut place = 0;
         let places: Vec<u32> = is_used
             .iter()
@@ -233,18 +239,20 @@ impl Weights {
                 place.wrapping_sub(1)
             })
             .collect();
-        thinned.product.iter_mut().for_each(|product| *product = places[*product as usize]);
+        self.product.iter_mut().for_each(|product| *product = places[*product as usize]);
         let mut used = is_used.iter();
-        thinned.products.retain(|_| *used.next().expect("one for each"));
-        thinned
+        self.products.retain(|_| *used.next().expect("one for each"));
+        self
     }
 
     /// The radiance of a pixel, Σ weight x row of its product; `rows` as [`Expander::rows`] makes them.
+    #[inline(always)]
     pub fn expand(&self, pixel: usize, rows: &[f32], out: &mut [f32]) {
         self.sum(pixel, rows, |i| self.weight[i], out);
     }
 
     /// Σ over the entries of a pixel, each with the weight that `weight` gives it.
+    #[inline(always)]
     fn sum(&self, pixel: usize, rows: &[f32], weight: impl Fn(usize) -> f32, out: &mut [f32]) {
         out.fill(0.0);
         let channels = out.len();
@@ -265,9 +273,27 @@ impl Weights {
         }
     }
 
+    /// The radiance of one pixel alone, with no more spectra made than it has.
+    pub fn spectrum(&self, pixel: usize, expander: &Expander) -> Vec<f32> {
+        let own: Vec<Product> = self.entries(pixel).map(|i| self.products[self.product[i] as usize].clone()).collect();
+        let rows = expander.rows(&own);
+        let of_pixel = Weights {
+            starts: vec![0, own.len() as u32],
+            product: (0..own.len() as u32).collect(),
+            weight: self.weight[self.entries(pixel)].to_vec(),
+            products: own,
+            shares: Vec::new(),
+            groups: 1,
+        };
+        let mut out = vec![0.0; expander.channels()];
+        of_pixel.expand(0, &rows, &mut out);
+        out
+    }
+
     /// The radiance of all pixels, in the order of a chunk's files: column by column. Beyond `rect` NaN.
     pub fn expanded(&self, rows: &[f32], channels: usize, tile: [u32; 2], rect: Rect) -> Vec<f32> {
-        self.each(channels, tile, rect, |pixel, out| self.expand(pixel, rows, out))
+        // Compiled for every width of vectors, of which the machine's is taken; what is computed is the same.
+        Arch::new().dispatch(|| self.each(channels, tile, rect, |pixel, out| self.expand(pixel, rows, out)))
     }
 
     /// Standard errors of the means of all pixels, by the spread of the groups; NaN below two epochs.
@@ -280,10 +306,13 @@ impl Weights {
         groups: &Groups,
     ) -> Vec<f32> {
         let mut scratch = vec![0.0; channels];
-        self.each(channels, tile, rect, |pixel, out| self.standard_error(pixel, rows, groups, &mut scratch, out))
+        Arch::new().dispatch(|| {
+            self.each(channels, tile, rect, |pixel, out| self.standard_error(pixel, rows, groups, &mut scratch, out))
+        })
     }
 
     /// Of one pixel. Var = Σ b_g (m_g - m)² / ((G - 1) B): b_g of B epochs are of group g, whose mean is m_g.
+    #[inline(always)]
     pub fn standard_error(&self, pixel: usize, rows: &[f32], groups: &Groups, mean: &mut [f32], out: &mut [f32]) {
         let all: u32 = groups.epochs.iter().sum();
         let spread_over = groups.epochs.iter().filter(|&&n| n > 0).count();
@@ -310,6 +339,7 @@ impl Weights {
         out.iter_mut().zip(variance).for_each(|(out, variance)| *out = (variance / divisor).sqrt() as f32);
     }
 
+    #[inline(always)]
     fn each(&self, channels: usize, tile: [u32; 2], rect: Rect, mut fill: impl FnMut(usize, &mut [f32])) -> Vec<f32> {
         let mut values = vec![f32::NAN; self.pixels() * channels];
         for x in 0..rect.width() {
@@ -397,9 +427,11 @@ impl Weights {
         let pixels = header.grid().tile_pixels();
         let mut starts = vec![0u32; pixels + 1];
         let product: Vec<u32> = column(1)[..count].iter().map(|&place| place as u32).collect();
-        let ascend =
-            column(0)[..count].is_sorted() && column(0)[..count].last().is_none_or(|&last| last < pixels as f32);
-        if !ascend || product.iter().any(|&place| place as usize >= products.len()) {
+        let are_places = |column: &[f32], end: usize| {
+            column[..count].iter().all(|place| place.fract() == 0.0 && (0.0..end as f32).contains(place))
+        };
+        let ascend = column(0)[..count].is_sorted() && are_places(column(0), pixels);
+        if !ascend || !are_places(column(1), products.len()) {
             return Err(damaged(path, "an entry is of no pixel or no product"));
         }
         column(0)[..count].iter().for_each(|&pixel| starts[pixel as usize + 1] += 1);
@@ -409,6 +441,50 @@ impl Weights {
             (0..count).flat_map(|i| (0..groups - 1).map(move |group| column(FIRST_SHARE + group)[i])).collect();
         let weight = column(2)[..count].to_vec();
         Ok(Some(Weights { products, starts, product, weight, shares, groups }))
+    }
+}
+
+/// All of both, ascending.
+fn union(a: &[Product], b: &[Product]) -> Vec<Product> {
+    let mut all = [a, b].concat();
+    all.sort_unstable();
+    all.dedup();
+    all
+}
+
+/// Where those of `own` are among `all`, which has them.
+fn places(own: &[Product], all: &[Product]) -> Vec<u32> {
+    own.iter().map(|product| all.binary_search(product).expect("all has it") as u32).collect()
+}
+
+/// A tile before and after a unit, all among the same products, and their means over the cube's channels.
+pub struct Merging {
+    pub old: Option<Weights>,
+    pub unit: Weights,
+    pub merged: Weights,
+    /// As [`Expander::rows`] makes them.
+    pub rows: Vec<f32>,
+}
+
+impl Merging {
+    /// `unit`, of `n_unit` samples after `n_before`, with what is there; `at`: column and row of the tile on the full film.
+    pub fn new(
+        header: &Header,
+        expander: &Expander,
+        at: [u32; 2],
+        old: Option<Weights>,
+        n_before: u32,
+        unit: Weights,
+        n_unit: u32,
+    ) -> Merging {
+        let (groups, group) = (header.groups(), group_after(n_before, header.epoch, header.groups()));
+        let products = union(old.as_ref().map_or(&[], |old| &old.products), &unit.products);
+        let rows = expander.rows(&products);
+        let (old, unit) = (old.map(|old| old.over(&products)), unit.over(&products));
+        let merged = Weights::merged(old.as_ref(), n_before, &unit, n_unit, group, groups);
+        let importances = merged.importances(expander, &rows);
+        let merged = merged.thinned(&importances, header.tile, at, n_before + n_unit);
+        Merging { old, unit, merged, rows }
     }
 }
 
@@ -536,9 +612,9 @@ mod tests {
         let (a, b, c) = (product(0, &[]), product(1, &[0, 2]), product(0, &[1]));
         let first = pixel(&[(b.clone(), 3.0), (a.clone(), 1.0)]);
         assert_eq!(first.products, [a.clone(), b.clone()]);
-        let mut all = Weights::merged(None, 0, first, 64, 0, 2);
+        let mut all = Weights::merged(None, 0, &first, 64, 0, 2);
         for (n, unit) in [(1u32, pixel(&[(c.clone(), 8.0), (a.clone(), 3.0)])), (2, pixel(&[(a.clone(), 2.0)]))] {
-            all = Weights::merged(Some(&all), 64 * n, unit, 64, group_after(64 * n, 64, 2), 2);
+            all = Weights::merged(Some(&all), 64 * n, &unit, 64, group_after(64 * n, 64, 2), 2);
         }
         let rows = [1.0f32, 10.0, 100.0];
         assert_eq!(all.products, [a, b, c]);

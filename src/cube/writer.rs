@@ -20,7 +20,7 @@ use super::merge::{UnitPass, check_portion, write_standard_errors};
 use super::metadata::{Header, Layout};
 use super::state::Window;
 use super::store::{Cube, TileArray};
-use super::weights::Weights;
+use super::weights::{Merging, Weights};
 use super::{recover, restore};
 use crate::spectral::tone::Picture;
 use crate::{Error, Result, files};
@@ -548,16 +548,14 @@ impl<'a> Aside<'a> {
 
     /// The same of weights. All that is derived from radiance is derived from that which readers make of them.
     fn write_weights(&self, base: Option<&Base>, samples: u32, n_unit: u32, unit: Weights) -> Result<Record> {
-        let (cube, tile, expander) = (self.cube, self.tile, self.cube.expander()?);
+        let (cube, tile) = (self.cube, self.tile);
         let (grid, channels, epoch) = (cube.grid(), cube.channels().len(), cube.header().epoch);
         let (size, rect) = (grid.tile, grid.rect(tile));
         let pass = || UnitPass::new(grid, rect, channels, cube.projection());
         let in_memory = |error| Error::storage(cube.path(), error);
         let old = base.map(|base| base.weights(cube)).transpose()?;
-        let radiance = |weights: &Weights| {
-            let rows = expander.rows(&weights.products);
-            weights.expanded(&rows, channels, size, rect)
-        };
+        let Merging { old, unit, merged, rows } = cube.merging(tile, old, samples - n_unit, unit, n_unit)?;
+        let radiance = |weights: &Weights| weights.expanded(&rows, channels, size, rect);
         // How far the unit is from the mean before it, where that is one of whole epochs.
         let mut distances = pass();
         if let Some(old) = old.as_ref().filter(|_| samples - n_unit >= epoch) {
@@ -565,16 +563,15 @@ impl<'a> Aside<'a> {
             let run = distances.run(Some(&before), &radiance(&unit), Layout::Columns, 1.0, &mut std::io::sink());
             run.map_err(in_memory)?;
         }
-        let weights = cube.merged(tile, old.as_ref(), samples - n_unit, unit, n_unit)?;
         let mut all = pass();
-        all.run(None, &radiance(&weights), Layout::Columns, 1.0, &mut std::io::sink()).map_err(in_memory)?;
+        all.run(None, &radiance(&merged), Layout::Columns, 1.0, &mut std::io::sink()).map_err(in_memory)?;
         if let Some(k) = all.square.iter().position(|v| !v.is_finite()) {
             let what = format!("a unit of tile {tile} holds a value in channel {k} that is not finite");
             return Err(Error::Internal(what));
         }
         let mut all = all.with_distance(distances);
         let (spread, square) = all.sums(base.map(Base::record), epoch);
-        let [of_weights, of_products] = weights.encode(cube.header()).map_err(in_memory)?;
+        let [of_weights, of_products] = merged.compacted().encode(cube.header()).map_err(in_memory)?;
         let weights_sum = self.file(TileArray::Weights, |file| file.write_all(&of_weights))?;
         let samples_sum = self.file(TileArray::Samples, |file| file.write_all(&samples.to_le_bytes()))?;
         let preview = self.file(TileArray::Preview, |file| file.write_all(bytemuck::cast_slice(&all.preview)))?;

@@ -347,10 +347,10 @@ impl Pool {
             return Ok(true);
         }
         // The same arithmetic as in the cube, but nothing is written before the last of these epochs.
-        let before = std::mem::take(&mut oldest.weights);
-        let units = tiles.iter().zip(&collected.weights).enumerate();
+        let mut before = std::mem::take(&mut oldest.weights).into_iter();
+        let units = tiles.iter().zip(&collected.weights);
         let merged =
-            units.map(|(i, (&tile, unit))| cube.cube().merged(tile, before.get(i), n_before, unit.clone(), samples));
+            units.map(|(&tile, unit)| cube.cube().merged(tile, before.next(), n_before, unit.clone(), samples));
         oldest.weights = merged.collect::<Result<_>>()?;
         if oldest.collected < oldest.group.epochs {
             return Ok(false);

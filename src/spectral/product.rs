@@ -81,14 +81,19 @@ pub struct Expander {
     brightest: Vec<f64>,
 }
 
-impl Expression {
+impl Term {
     fn eval(&self, basis: &Basis, nm: f64) -> f64 {
-        let term = |term: &Term| match term {
+        match self {
             Term::Spectrum(i) => basis.spectra[*i].curve.eval(nm),
             Term::Complement(i) => 1.0 - basis.spectra[*i].curve.eval(nm),
             Term::Planck { kelvin, .. } => planck::radiance(nm, *kelvin),
-        };
-        self.scale * self.terms.iter().map(term).product::<f64>()
+        }
+    }
+}
+
+impl Expression {
+    fn eval(&self, basis: &Basis, nm: f64) -> f64 {
+        self.scale * self.terms.iter().map(|term| term.eval(basis, nm)).product::<f64>()
     }
 
     fn is_smooth(&self, basis: &Basis) -> bool {
@@ -100,10 +105,41 @@ impl Expression {
 }
 
 impl Basis {
+    /// By how much a product of so many factors changes over an interval in which spectra are lines, over its largest value: the sum of what
+    /// each of its terms does.
+    fn slope(&self, from: f64, to: f64, degree: usize) -> f64 {
+        let inside = 1e-6 * (to - from);
+        let change = |term: &Term| {
+            let [a, b] = [from + inside, to - inside].map(|nm| term.eval(self, nm).abs());
+            if a.max(b) > 0.0 { (a - b).abs() / a.max(b) } else { 0.0 }
+        };
+        let of_expression = |expression: &Expression| expression.terms.iter().map(change).sum::<f64>();
+        let most = |all: &[Expression]| all.iter().map(of_expression).fold(0.0, f64::max);
+        degree as f64 * most(&self.factors) + most(&self.sources)
+    }
+
     fn all(&self) -> impl Iterator<Item = &Expression> {
         self.factors.iter().chain(&self.sources)
     }
 }
+
+/// Points that make the mean of a function over an interval right to [`BOUND`] of its largest value, where its derivatives are at most
+/// `slope` to their order, relative to that value: (n!)⁴ / ((2n + 1) (2n)!³) slope²ⁿ (Abramowitz and Stegun 25.4.30). At most `most`.
+fn points_for(slope: f64, most: usize) -> usize {
+    let mut error = 1.0;
+    (1..most)
+        .find(|&n| {
+            let n = n as f64;
+            // From n - 1 points to n.
+            error *=
+                n.powi(4) * (2.0 * n - 1.0) / ((2.0 * n + 1.0) * (2.0 * n * (2.0 * n - 1.0)).powi(3)) * slope * slope;
+            error <= BOUND
+        })
+        .unwrap_or(most)
+}
+
+/// Relative error of means that fewer points than are exact may make.
+const BOUND: f64 = 1e-9;
 
 impl Expander {
     /// For products of up to `degree` factors, in `channels`: means over their bounds, or by their responses.
@@ -113,7 +149,7 @@ impl Expander {
         // Of the integrand, a response included: n points are exact up to 2 n - 1.
         let polynomial = degree * most_terms(&basis.factors) + most_terms(&basis.sources) + 1;
         let points = (polynomial / 2 + 1).max(if smooth { SMOOTH_POINTS } else { 1 }).min(MOST_POINTS);
-        let rule = gauss_legendre(points);
+        let rules: Vec<Vec<(f64, f64)>> = (1..=points).map(gauss_legendre).collect();
         let mut knots: Vec<f64> = basis.spectra.iter().flat_map(|leaf| knots(&leaf.curve)).copied().collect();
         knots.sort_by(f64::total_cmp);
         knots.dedup();
@@ -133,7 +169,9 @@ impl Expander {
                 let width = (piece[1] - piece[0]) / panels as f64;
                 for panel in 0..panels {
                     let begin = piece[0] + width * panel as f64;
-                    for &(place, share) in &rule {
+                    // A response falls from its peak to nothing at most.
+                    let slope = basis.slope(begin, begin + width, degree) + f64::from(u8::from(response.is_some()));
+                    for &(place, share) in &rules[points_for(slope, points) - 1] {
                         let nm = begin + width * place;
                         let seen = response.map_or(1.0, |response| response.curve().eval(nm));
                         nodes.push(nm);
@@ -163,6 +201,7 @@ impl Expander {
     }
 
     /// Σ over the nodes of each channel.
+    #[inline(always)]
     fn means<'a>(&'a self, weighted: &'a [f64], values: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
         let mut begin = 0;
         self.ends.iter().map(move |&end| {
@@ -175,6 +214,12 @@ impl Expander {
     /// The mean of each product over each channel, [product][channel]. Fast where `products` ascend: what two have in common is
     /// multiplied once.
     pub fn rows(&self, products: &[Product]) -> Vec<f32> {
+        // Compiled for every width of vectors, of which the machine's is taken; what is computed is the same.
+        pulp::Arch::new().dispatch(|| self.rows_of(products))
+    }
+
+    #[inline(always)]
+    fn rows_of(&self, products: &[Product]) -> Vec<f32> {
         let mut rows = Vec::with_capacity(products.len() * self.channels);
         // Weights times the first so many factors of the last product.
         let mut partial: Vec<Vec<f64>> = vec![self.weights.clone()];

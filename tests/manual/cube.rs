@@ -149,7 +149,7 @@ fn factored_cubes_are_as_the_page_says() {
                 "1" => 1,
                 "2 + G" => 2 + groups,
                 "1 + F" => 1 + most.max(1),
-                "80 w h" => 80 * TILE * TILE,
+                "72 w h" => 72 * TILE * TILE,
                 word => panic!("`{word}` is no size"),
             }
         };
