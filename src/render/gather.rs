@@ -22,6 +22,8 @@ use crate::spectral::product::Product;
 
 /// Not met yet.
 const UNKNOWN: u32 = u32::MAX;
+/// Numbers in a thread's tables, beyond which it forgets what it has met: rooms of many paints have millions of sets.
+const MOST_KNOWN: usize = 1 << 24;
 /// Terms that a path's throughput may be a sum of; of more (mixtures upon mixtures) some are chosen by their weights.
 const MOST_TERMS: usize = 16;
 
@@ -96,9 +98,17 @@ pub struct Saved<'a> {
 impl Met {
     fn new(scene: &Separable) -> Met {
         let past = |most: Option<&u16>| most.map_or(0, |most| usize::from(*most) + 1);
+        Met::of(past(scene.factors.iter().flatten().max()), past(scene.sources.iter().flatten().max()))
+    }
+
+    fn empty(&self) -> Met {
+        Met::of(self.factors, self.sources)
+    }
+
+    fn of(factors: usize, sources: usize) -> Met {
         let mut met = Met {
-            factors: past(scene.factors.iter().flatten().max()),
-            sources: past(scene.sources.iter().flatten().max()),
+            factors,
+            sources,
             sets: Vec::new(),
             known: HashMap::new(),
             next: Vec::new(),
@@ -139,6 +149,12 @@ impl Met {
             self.products.push((state, source));
         }
         self.numbers[at]
+    }
+
+    /// The number of a product, met or not.
+    fn number_of(&mut self, product: Product) -> u32 {
+        let state = self.state(product.factors);
+        self.number(state, product.source)
     }
 
     fn product(&self, number: u32) -> Product {
@@ -378,6 +394,12 @@ impl Gather {
             (counters.bad_slot, counters.bad_sample) = (slot, sample + 1);
         }
         let each = pixels.len().div_ceil(self.walkers.len());
+        let weights = self.weights_of(&units, samples, &pixels, each);
+        self.forget();
+        weights
+    }
+
+    fn weights_of(&self, units: &[UnitRect], samples: u32, pixels: &[Vec<(u32, f64)>], each: usize) -> Vec<Weights> {
         let slots = (self.tile[0] * self.tile[1]) as usize;
         let of_unit = |unit: usize| {
             let own = &pixels[unit * slots..(unit + 1) * slots];
@@ -388,6 +410,26 @@ impl Gather {
             Weights::of_pixels(entries)
         };
         (0..units.len()).into_par_iter().map(of_unit).collect()
+    }
+
+    /// Where a thread has met too much, numbers begin anew, for the groups under way too.
+    fn forget(&mut self) {
+        for w in 0..self.walkers.len() {
+            let met = &self.walkers[w].met;
+            if met.next.len() + met.numbers.len() <= MOST_KNOWN {
+                continue;
+            }
+            let mut anew = met.empty();
+            for group in &mut self.groups {
+                let each = group.pixels.len().div_ceil(self.walkers.len()).max(1);
+                for (number, _) in group.pixels.iter_mut().skip(w * each).take(each).flatten() {
+                    *number = anew.number_of(met.product(*number));
+                }
+            }
+            let walker = &mut self.walkers[w];
+            walker.met = anew;
+            walker.weights.clear();
+        }
     }
 }
 
