@@ -568,7 +568,7 @@ mod memory {
     fn of_a_sparse_cube_of_twenty_gibibytes_is_below_500_mib() {
         let formats: &[&[&str]] = &[
             &["-o", "bands.bsq", "--bands", "4990..5000"],
-            &["-o", "bands.bil", "--bands", "4990..5000"],
+            &["-o", "lines.bil", "--bands", "4990..5000"],
             &["-o", "bands.zarr", "--bands", "400nm..402nm"],
             &["-o", "bands.exr", "--bands", "700nm..702nm"],
         ];
