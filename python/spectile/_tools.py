@@ -162,12 +162,8 @@ def sensor(
         if model is not None:
             arguments += [f"--model={os.fspath(model)}", f"--seed={seed}", f"--noise={'on' if noise else 'off'}"]
             arguments += _work.option("electrons", bool(electrons)) + _work.option("partial", bool(partial))
-        elif isinstance(responses, (str, os.PathLike)):
-            arguments.append(f"--responses={os.fspath(responses)}")
         else:
-            file = os.path.join(folder, "responses.csv")
-            _write_responses(file, responses)
-            arguments.append(f"--responses={file}")
+            arguments.append(_of_responses(folder, responses))
         _work.run([*arguments, "--json", "--", path_of(cube, "sensor")])
         if out is None:
             return temporary(folder, path)
@@ -214,12 +210,8 @@ def relight(
         for name, kelvin in (temperatures or {}).items():
             arguments.append(f"--set=materials.{_work.toml(str(name))}.temperature={_work.toml(kelvin)}")
         arguments += [f"--channels={key}={_work.toml(value)}" for key, value in (channels or {}).items()]
-        if isinstance(responses, (str, os.PathLike)):
-            arguments.append(f"--responses={os.fspath(responses)}")
-        elif responses is not None:
-            file = os.path.join(folder, "responses.csv")
-            _write_responses(file, responses)
-            arguments.append(f"--responses={file}")
+        if responses is not None:
+            arguments.append(_of_responses(folder, responses))
         _work.run([*arguments, "--json", "--", path_of(cube, "relight")])
         if out is None:
             return temporary(folder, path)
@@ -228,6 +220,15 @@ def relight(
         raise
     shutil.rmtree(folder, ignore_errors=True)
     return opened(path)
+
+
+def _of_responses(folder: str, responses: Any) -> str:
+    """The argument that names responses: their file, or one that is made of them in `folder`."""
+    if isinstance(responses, (str, os.PathLike)):
+        return f"--responses={os.fspath(responses)}"
+    file = os.path.join(folder, "responses.csv")
+    _write_responses(file, responses)
+    return f"--responses={file}"
 
 
 def _write_responses(file: str, responses: Any) -> None:

@@ -13,7 +13,6 @@ use crate::device::evaluator::EvaluateShape;
 use crate::device::facts;
 use crate::device::part::OnDevice;
 use crate::device::prepared::Prepared;
-use crate::device::separable;
 use crate::device::windows::Windows;
 use crate::files::{format_bytes, shown};
 use crate::gpu::adapter::{Gpu, Selection};
@@ -243,7 +242,7 @@ impl Plan<'_> {
             "choices": self.choices,
             "features": features.collect::<Vec<_>>(),
             "spectra": facts::table_bounds(self.prepared),
-            "factored_obstacles": separable::obstacles(self.scene),
+            "factored_obstacles": self.prepared.obstacles,
             "storage_buffers": self.storage_buffers(),
             "primitives": self.prepared.accel.primitives.len(),
             "bvh_nodes": self.prepared.accel.nodes.len(),
@@ -318,7 +317,7 @@ impl Plan<'_> {
         text += &self.describe_spectra();
         text += &wrapped(
             "factored",
-            &match &separable::obstacles(self.scene)[..] {
+            &match &self.prepared.obstacles[..] {
                 [] => "the scene separates: render --factored keeps weights, so that spectra and channels can be changed afterwards".to_owned(),
                 obstacles => format!("the scene does not separate (render --factored): {}", obstacles.join(", ")),
             },

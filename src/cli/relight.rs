@@ -6,6 +6,7 @@ use serde_json::json;
 
 use super::Output;
 use super::scene::parse_override;
+use super::sensor::refuse_itself;
 use crate::cube::{self, Cube, Existing};
 use crate::files::shown;
 use crate::scene::{self, NewChannels};
@@ -62,15 +63,8 @@ pub struct Args {
 
 pub fn run(args: &Args, output: &Output) -> Result<()> {
     let cube = Cube::open(&args.cube)?;
-    if std::fs::canonicalize(&args.cube).ok().is_some_and(|cube| std::fs::canonicalize(&args.output).ok() == Some(cube))
-    {
-        let what = "a cube cannot be relit into itself; choose another name";
-        return Err(Error::Usage(format!("{}: {what}", args.output.display())));
-    }
-    let basis = cube.header().basis().ok_or_else(|| {
-        let what = "holds radiance, not weights of products of spectra: only cubes of `spectile render --factored` can be relit";
-        Error::Usage(format!("{} {what}", args.cube.display()))
-    })?;
+    refuse_itself(&args.cube, &args.output, "relit")?;
+    let basis = cube.basis()?;
     let keys: Vec<(String, String)> =
         args.channels.iter().filter_map(|channels| parse_override(channels).ok()).collect();
     let wanted = match (&args.responses, &args.channels[..]) {

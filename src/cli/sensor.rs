@@ -154,19 +154,25 @@ fn warn_left_out(left_out: &[(String, f64)], output: &Output) -> Result<()> {
     output.warn(&format!("bands of which the cube does not cover 99 % are left out: {}", each.join(", ")))
 }
 
+/// Refuses a cube that would take its own place.
+pub(super) fn refuse_itself(cube: &Path, output: &Path, done: &str) -> Result<()> {
+    let there = std::fs::canonicalize(cube).ok();
+    match there.is_some_and(|there| std::fs::canonicalize(output).ok() == Some(there)) {
+        true => {
+            let what = format!("a cube cannot be {done} into itself; choose another name");
+            Err(Error::Usage(format!("{}: {what}", output.display())))
+        }
+        false => Ok(()),
+    }
+}
+
 fn integrate_with(args: &Args, file: &Path, output: &Output) -> Result<()> {
     let cube = Cube::open(&args.cube)?;
     let responses = response::read_responses(file).map_err(|problem| Error::Input(vec![*problem]))?;
     for warning in &responses.warnings {
         output.warn(warning)?;
     }
-    let is_itself = |a: &std::path::Path, b: &std::path::Path| {
-        std::fs::canonicalize(a).ok().is_some_and(|a| std::fs::canonicalize(b).ok() == Some(a))
-    };
-    if is_itself(&args.cube, &args.output) {
-        let what = "a cube cannot be integrated into itself; choose another name";
-        return Err(Error::Usage(format!("{}: {what}", args.output.display())));
-    }
+    refuse_itself(&args.cube, &args.output, "integrated")?;
     let about = file.file_name().unwrap_or_default().to_string_lossy();
     let existing = if args.overwrite { Existing::Replace } else { Existing::Refuse };
     let findings = super::progress::watched(output, |progress| {

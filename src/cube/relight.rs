@@ -10,9 +10,9 @@ use super::create::{Aside, Existing};
 use super::metadata::{DERIVED, FACTORED, Header};
 use super::store::Cube;
 use super::writer::Writer;
+use crate::Result;
 use crate::spectral::Channels;
 use crate::spectral::product::{Basis, Expander};
-use crate::{Error, Result};
 
 /// Tiles between commits.
 const TOGETHER: u32 = 64;
@@ -54,10 +54,6 @@ pub fn relight(
     existing: Existing,
     progress: &mut dyn FnMut(u64, u64) -> Result<()>,
 ) -> Result<Relighted> {
-    if !cube.header().is_factored() {
-        let what = "holds radiance, whose lamps and paints cannot be changed any more; `spectile render --factored` makes cubes that can";
-        return Err(Error::Usage(format!("{} {what}", cube.path().display())));
-    }
     let expander = Expander::new(basis, channels, cube.header().most_factors());
     let mut attributes = cube.header().attributes.clone();
     attributes.remove(FACTORED);

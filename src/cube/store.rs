@@ -17,7 +17,7 @@ use super::metadata::{DERIVED, Header, Layout, Recorded};
 use super::weights::{Groups, Merging, Weights};
 use crate::spectral::Channels;
 use crate::spectral::colour::Projection;
-use crate::spectral::product::Expander;
+use crate::spectral::product::{Basis, Expander};
 use crate::{Error, Result, files};
 
 /// Folder of everything that is not plain Zarr.
@@ -304,13 +304,18 @@ impl Cube {
         self.state().standard_errors(tile)
     }
 
+    /// What the products of a factored cube are made of. Errors: a cube that is none.
+    pub fn basis(&self) -> Result<Basis> {
+        let what = "holds radiance, not weights of products of spectra: only cubes of `spectile render --factored` can be relit";
+        self.header.basis().ok_or_else(|| Error::Usage(format!("{} {what}", self.path.display())))
+    }
+
     /// What makes channels of the products of a factored cube.
     pub(super) fn expander(&self) -> Result<&Expander> {
         if let Some(expander) = self.expander.get() {
             return Ok(expander);
         }
-        let what = "is a damaged Spectile cube: its attribute `factored` names no spectra";
-        let basis = self.header.basis().ok_or_else(|| Error::storage(&self.path, what))?;
+        let basis = self.basis()?;
         Ok(self.expander.get_or_init(|| Expander::new(&basis, self.channels(), self.header.most_factors())))
     }
 
@@ -326,7 +331,7 @@ impl Cube {
     }
 
     /// As [`Merging::new`].
-    pub(super) fn merging(
+    pub fn merging(
         &self,
         tile: u32,
         old: Option<Weights>,
@@ -337,18 +342,6 @@ impl Cube {
         let (rect, [x, y]) = (self.grid().rect(tile), self.header.origin);
         let at = [x + rect.x0, y + rect.y0];
         Ok(Merging::new(&self.header, self.expander()?, at, old, n_before, unit, n_unit))
-    }
-
-    /// The weights of a tile with those of one more unit, `n_unit` samples after `n_before`, thinned to what is kept.
-    pub fn merged(
-        &self,
-        tile: u32,
-        old: Option<Weights>,
-        n_before: u32,
-        unit: Weights,
-        n_unit: u32,
-    ) -> Result<Weights> {
-        Ok(self.merging(tile, old, n_before, unit, n_unit)?.merged.compacted())
     }
 
     /// How the samples of a tile are spread over the groups of epochs of a factored cube.

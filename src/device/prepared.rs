@@ -18,7 +18,7 @@ use crate::device::parts::radiators::Radiators;
 use crate::device::parts::scattering::Scattering;
 use crate::device::parts::sky::SkyMap;
 use crate::device::parts::surfaces::{Needed, Surfaces};
-use crate::device::separable::{Separable, Separated};
+use crate::device::separable::{self, Separable, Separated};
 use crate::device::spectra::{MAX_REGISTER_SPECTRA, SpectrumIds, daylight, spectral_tables};
 use crate::device::windows::Windows;
 use crate::device::words::{
@@ -109,6 +109,8 @@ pub struct Prepared {
     pub path_weight: Option<u32>,
     /// What records say of products of spectra, where those are kept instead of channels.
     pub separable: Option<Separable>,
+    /// What keeps the scene from being rendered so, in words.
+    pub obstacles: Vec<String>,
 }
 
 impl Prepared {
@@ -201,6 +203,7 @@ impl Prepared {
             path_weight: ids.path_weight.map(|position| tables.ids[position]),
             integration,
             separable,
+            obstacles: separable::obstacles(scene, &heat),
             thinning: None,
             warp,
             accel,

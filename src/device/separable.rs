@@ -179,15 +179,9 @@ impl Maker<'_> {
     }
 }
 
-/// What of `scene` keeps its light transport from separating, in words: nothing where it does.
-pub fn obstacles(scene: &Scene) -> Vec<String> {
-    let heat = heat::as_emission(scene);
-    found(&heat.scene, &heat)
-}
-
 /// Refuses what does not separate.
 fn check(scene: &Scene, heat: &Heat) -> Result<()> {
-    let found = found(scene, heat);
+    let found = obstacles(scene, heat);
     if found.is_empty() {
         return Ok(());
     }
@@ -198,7 +192,8 @@ fn check(scene: &Scene, heat: &Heat) -> Result<()> {
     Err(Error::input(&scene.file, message))
 }
 
-fn found(scene: &Scene, heat: &Heat) -> Vec<String> {
+/// What of `scene`, whose heat is emission already, keeps its light transport from separating, in words: nothing where it does.
+pub fn obstacles(scene: &Scene, heat: &Heat) -> Vec<String> {
     let mut found: Vec<String> = Vec::new();
     for material in &scene.materials {
         let kind = match &material.bsdf {

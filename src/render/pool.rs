@@ -349,8 +349,10 @@ impl Pool {
         // The same arithmetic as in the cube, but nothing is written before the last of these epochs.
         let mut before = std::mem::take(&mut oldest.weights).into_iter();
         let units = tiles.iter().zip(&collected.weights);
-        let merged =
-            units.map(|(&tile, unit)| cube.cube().merged(tile, before.next(), n_before, unit.clone(), samples));
+        let merged = units.map(|(&tile, unit)| {
+            let merging = cube.cube().merging(tile, before.next(), n_before, unit.clone(), samples)?;
+            Ok(merging.merged.compacted())
+        });
         oldest.weights = merged.collect::<Result<_>>()?;
         if oldest.collected < oldest.group.epochs {
             return Ok(false);

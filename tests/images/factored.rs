@@ -7,11 +7,11 @@ use spectile::render::wave::Budget;
 use spectile::scene::{Bsdf, Cone, Filter, Profile, Projection, Reflectance, Scene, Sides, Weight};
 use spectile::spectral::{Channels, Curve, Outside};
 
-use crate::device::{Settings, render, render_relit};
+use crate::device::{Settings, assert_rendered_as_reference, render, render_relit};
 use crate::scene_builder::heat::infrared;
 use crate::scene_builder::*;
 use crate::size;
-use crate::statistics::{Bound, Estimate, assert_agreement, assert_estimates, image_estimates};
+use crate::statistics::{Bound, assert_agreement, assert_estimates, image_estimates};
 use crate::truth;
 
 fn basis(scene: &Scene) -> spectile::spectral::product::Basis {
@@ -166,19 +166,8 @@ fn relit_is_as_reference(what: &str, scene: impl Fn(Paints) -> Scene, epochs: u3
     assert_eq!(other.factors.len(), basis(&rendered).factors.len());
     let channels = Channels::from_bounds(vec![[400.0, 450.0], [540.0, 550.0], [550.0, 700.0]], None);
     let relit = render_relit(&rendered, &other, &channels, epochs, 64, Settings { seed: 4, ..Settings::default() });
-    relit.assert_clean();
-    let wanted = Scene { channels: channels.clone(), ..wanted };
-    let truth = truth::render_image(&wanted, 64 * epochs, 6);
-    let (channels, freedom) = (channels.len(), f64::from(truth.samples - 1));
-    let of_image = image_estimates(&truth.mean, &truth.standard_error, channels, freedom);
-    let means: Vec<f64> = of_image.iter().map(|e| e.mean).collect();
-    let scale: Vec<f64> = truth.mean.iter().enumerate().map(|(i, value)| value.max(means[i % channels])).collect();
-    let truth: Vec<Estimate> = (truth.mean.iter().zip(&truth.standard_error))
-        .map(|(&mean, &error)| Estimate { mean, error, freedom })
-        .collect();
-    assert_agreement(what, &relit.values(), &truth, &scale, bound);
-    let bound = Bound { resolution: 0.2 * bound.resolution, ..bound };
-    assert_agreement(&format!("{what}, image"), &relit.image_means(), &of_image, &means, bound);
+    let wanted = Scene { channels, ..wanted };
+    assert_rendered_as_reference(what, &relit, &wanted, 64 * epochs, bound);
 }
 
 #[test]

@@ -193,6 +193,11 @@ pub fn measure(mut scene: Scene, epochs: u32, seed: u64) -> Vec<Estimate> {
 /// times as sharply. `samples`: epochs and samples of each.
 pub fn assert_as_reference(what: &str, scene: &Scene, samples: [u32; 2], of_reference: u32, bound: Bound) {
     let rendered = render(scene, samples[0], samples[1], Settings { seed: 5, ..Settings::default() });
+    assert_rendered_as_reference(what, &rendered, scene, of_reference, bound);
+}
+
+/// The same of what is rendered already.
+pub fn assert_rendered_as_reference(what: &str, rendered: &Epochs, scene: &Scene, of_reference: u32, bound: Bound) {
     rendered.assert_clean();
     let truth = truth::render_image(scene, of_reference, 6);
     let (channels, freedom) = (scene.channels.len(), f64::from(truth.samples - 1));
