@@ -87,6 +87,12 @@ need_slurm() {
   export SPECTILE_SLURM=required
 }
 
+# What installs another Debian beside this one, for the test with its driver.
+need_debootstrap() {
+  command -v apt-get >/dev/null || return 0
+  PATH=$PATH:/usr/sbin command -v debootstrap >/dev/null || install "what installs another Debian" debootstrap
+}
+
 # The readers that cubes are tested with, in .venv; sets SPECTILE_PYTHON for the tests.
 need_python() {
   local wanted=$root/tests/python/requirements.txt venv=$root/.venv

@@ -5,14 +5,9 @@
 @group(1) @binding(9) var<storage, read_write> means: array<f32>;
 
 #if THINNED
-// What roulette on evaluation left (passes/thin_paths.wgsl).
-@group(1) @binding(15) var<storage, read> chances: array<vec2<u32>>;
-
-// Whether anything of a path is evaluated: what it sees before it is scattered always is.
-fn evaluates(path: u32) -> bool {
-    let records = heads[path].y & 0xffffu;
-    let chance = chances[path];
-    return records > 0u && (chance.y != 0u || (chance.x & 0xffffu) > 0u);
+// Whether roulette (passes/thin_paths.wgsl) left anything of a path to evaluate: what it sees before it is scattered always is.
+fn evaluates(head: vec4<u32>) -> bool {
+    return (head.y & 0xffffu) > 0u && (head.w != 0u || (head.z & 0xffffu) > 0u);
 }
 #endif
 

@@ -6,8 +6,6 @@
 @group(0) @binding(1) var<storage, read> materials: array<Material>;
 #endif
 @group(0) @binding(2) var<storage, read> emitters: array<Emitter>;
-// Upper ends of the emitters' intervals in [0, 1], above the environment's.
-@group(0) @binding(3) var<storage, read> emitter_cdf: array<f32>;
 #repeat NODE_WINDOWS i
 @group(0) @binding($(4+i)) var<storage, read> nodes_$i: array<vec4<u32>>;
 #end

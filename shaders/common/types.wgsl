@@ -89,12 +89,14 @@ struct Surface {
     emitter: u32,
 }
 
-// One emitting primitive. `pick` is its share in next-event estimation, `area` in device units.
+// One emitting primitive. `pick` is its share in next-event estimation, `pick_end` the upper end of the interval in [0, 1] that
+// chooses it, `area` in device units.
 struct Emitter {
     primitive: u32,
     spectrum: u32,
     pick: f32,
     area: f32,
+    pick_end: f32,
 }
 
 #constants EMITTERS

@@ -3,7 +3,7 @@
 @group(1) @binding(0) var<uniform> wave: Wave;
 @group(1) @binding(1) var<storage, read> units: array<vec4<u32>>;
 @group(1) @binding(2) var<storage, read_write> states: array<vec4<u32>>;
-@group(1) @binding(3) var<storage, read_write> heads: array<vec2<u32>>;
+@group(1) @binding(3) var<storage, read_write> heads: array<vec$HEAD_WORDS<u32>>;
 @group(1) @binding(5) var<storage, read_write> counters: array<atomic<u32>>;
 @group(1) @binding(6) var<uniform> step: Step;
 #if SCALED

@@ -44,7 +44,7 @@ fn evaluate_path(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
     }
     var foreign = head.y ^ (wave.sequence << 16u);
 #if THINNED
-    foreign |= chance.x ^ (wave.sequence << 16u);
+    foreign |= head.z ^ (wave.sequence << 16u);
 #endif
     prove(1u, foreign, local_slot == 0u && id.z == 0u);
     report(bad, slot);

@@ -36,11 +36,11 @@ fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
 #if THINNED
         // Paths of which nothing is evaluated, in a loop of their own: software devices go through all of a loop's body that is skipped.
         for (; i < wave.samples; i += 1u) {
-            let skipped = local_slot * wave.samples + i;
+            let skipped = heads[local_slot * wave.samples + i];
             if (evaluates(skipped)) {
                 break;
             }
-            foreign |= (heads[skipped].y ^ mark) | (chances[skipped].x ^ mark);
+            foreign |= (skipped.y ^ mark) | (skipped.z ^ mark);
 #repeat VECTORS v
             mean_$v += (vec4<f32>(0.0) - mean_$v) / f32(wave.sample_begin + i + 1u);
 #end
@@ -59,7 +59,7 @@ fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
 #include common/path_chance.wgsl
         foreign |= head.y ^ mark;
 #if THINNED
-        foreign |= chance.x ^ mark;
+        foreign |= head.z ^ mark;
 #endif
 #include common/each_wavelength.wgsl
 #include common/held_spectra.wgsl

@@ -43,7 +43,7 @@ fn evaluate_spectral(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workg
     if (thread % LANES == 0u) {
         var foreign = head.y ^ (wave.sequence << 16u);
 #if THINNED
-        foreign |= chance.x ^ (wave.sequence << 16u);
+        foreign |= head.z ^ (wave.sequence << 16u);
 #endif
         prove(1u, foreign, local_slot == 0u && group.z == 0u);
     }

@@ -3,7 +3,7 @@
 @group(1) @binding(0) var<uniform> wave: Wave;
 @group(1) @binding(1) var<storage, read> units: array<vec4<u32>>;
 @group(1) @binding(2) var<storage, read_write> states: array<vec4<u32>>;
-@group(1) @binding(3) var<storage, read_write> heads: array<vec2<u32>>;
+@group(1) @binding(3) var<storage, read_write> heads: array<vec$HEAD_WORDS<u32>>;
 #if SCALED
 @group(1) @binding(7) var<storage, read_write> throughputs: array<f32>;
 #endif
@@ -43,7 +43,11 @@ fn generate_camera(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     let in_tile = slot % wave.tile_pixels;
     let pixel = unit.xy + vec2<u32>(in_tile % wave.tile_width, in_tile / wave.tile_width);
     if (any(pixel >= unit.zw)) {
+#if THINNED
+        heads[path] = vec4<u32>(0u, wave.sequence << 16u, 0u, 0u);
+#else
         heads[path] = vec2<u32>(0u, wave.sequence << 16u);
+#endif
 #if GENERAL
         states[STATE_WORDS * path + 1u].w = ENDED;
 #else
@@ -87,7 +91,11 @@ fn generate_camera(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 #else
     let mu = random_pair_bits(key, DIMENSION_WAVELENGTH, index, wave.epoch_mask).x;
 #endif
+#if THINNED
+    heads[path] = vec4<u32>(mu, 0u, 0u, 0u);
+#else
     heads[path] = vec2<u32>(mu, 0u);
+#endif
 #if GENERAL
     states[STATE_WORDS * path] = bitcast<vec4<u32>>(vec4<f32>(origin, -1.0));
     states[STATE_WORDS * path + 1u] = vec4<u32>(bitcast<vec3<u32>>(direction), 0u);

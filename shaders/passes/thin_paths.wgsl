@@ -3,9 +3,6 @@
 // the mean of that channel in the picture, and then counts for 1/p in every channel (docs/METHOD.md).
 
 @group(1) @binding(1) var<storage, read> units: array<vec4<u32>>;
-// Records of what is seen before scattering, in the low half, and in the high one the wave, once it is decided; what the rest counts
-// for, 0 where it does not.
-@group(1) @binding(15) var<storage, read_write> chances: array<vec2<u32>>;
 // Of each representative quad of channels: s over the channel's mean, 0 for channels that do not count.
 @group(1) @binding(16) var<storage, read> importances: array<vec4<f32>>;
 
@@ -19,7 +16,7 @@ fn thin_paths(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgro
     }
     let head = heads[path];
     let used = head.y & 0xffffu;
-    let seen_records = min(chances[path].x & 0xffffu, used);
+    let seen_records = min(head.z & 0xffffu, used);
     var kept = 1.0;
     if (used > seen_records) {
         // At the first of its wavelengths.
@@ -49,5 +46,6 @@ fn thin_paths(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgro
         let p = clamp(max(max(brought.x, brought.y), max(brought.z, brought.w)), 1.0 / f32(MOST_WEIGHT), 1.0);
         kept = select(0.0, 1.0 / p, u < p);
     }
-    chances[path] = vec2<u32>(seen_records | (wave.sequence << 16u), bitcast<u32>(kept));
+    heads[path].z = seen_records | (wave.sequence << 16u);
+    heads[path].w = bitcast<u32>(kept);
 }

@@ -93,7 +93,7 @@ impl OnDevice<'_> {
         };
         let mut try_paths = self.defines(Work::Evaluate);
         if let Some(thinning) = &self.thinning {
-            try_paths.constant("VECTORS", thinning.importances.len() as u32);
+            try_paths.constant("VECTORS", thinning.importances.len() as u32).set("THINS", true);
         }
         let text = |last: &[Text], defines: &Defines| {
             compose(&[EVALUATING, last].map(|texts| self.modules(texts)).concat(), defines)

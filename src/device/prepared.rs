@@ -360,9 +360,10 @@ fn emitters(
             (heat::Kind::ByPlace(place), Some(radiators)) => radiators.words[place] | EMITS_BY_PLACE,
             _ => source(emission.radiance),
         };
-        Emitter { primitive, spectrum: spectrum | sides, pick: pick as f32, area: area as f32 }
+        Emitter { primitive, spectrum: spectrum | sides, pick: pick as f32, area: area as f32, ..Emitter::default() }
     });
-    primitives.chain(lamps).chain(rows).collect()
+    let chosen = primitives.chain(lamps).zip(&picks.cdf).map(|(emitter, &pick_end)| Emitter { pick_end, ..emitter });
+    chosen.chain(rows).collect()
 }
 
 /// The scene's lights as the device has them, and their places among the emitters.
@@ -377,6 +378,7 @@ fn lamps(scene: &Scene, accel: &Accel, picks: &LightPicks, source: impl Fn(usize
             spectrum,
             pick: pick as f32,
             area: accel.space.scale.powi(2) as f32,
+            ..Emitter::default()
         };
         match *light {
             Light::Point { position, .. } => {

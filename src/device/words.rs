@@ -265,6 +265,8 @@ pub struct Emitter {
     pub spectrum: u32,
     pub pick: f32,
     pub area: f32,
+    /// Upper end of its interval in [0, 1], from which a random number chooses; the intervals lie above the environment's.
+    pub pick_end: f32,
 }
 
 /// `Material` in WGSL.
@@ -475,7 +477,7 @@ mod tests {
             sequence
         });
         same_layout!(Step { bounce, sample });
-        same_layout!(Emitter { primitive, spectrum, pick, area });
+        same_layout!(Emitter { primitive, spectrum, pick, area, pick_end });
         same_layout!(Material { factor, two_sided, albedo, unused });
         same_layout!(SurfaceMaterial { first_lobe, lobe_count, flags, survival });
         same_layout!(Lobe {

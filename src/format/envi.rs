@@ -321,6 +321,11 @@ pub fn header_path(data: &Path) -> Option<PathBuf> {
     names.into_iter().find(|path| path != data && path.is_file())
 }
 
+/// Whether a file that begins with these bytes is a header, with a byte order mark or without.
+pub fn is_header(start: &[u8]) -> bool {
+    start.strip_prefix("\u{feff}".as_bytes()).unwrap_or(start).starts_with(b"ENVI")
+}
+
 /// Reads a header; `path` stands in messages.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Header, Box<Problem>> {
     // Also as programs of Macintosh and Windows end lines.

@@ -1,6 +1,7 @@
 //! Spectra as instruments and other programs keep them: IES TM-27 (`.spdx`), rawtoaces (`.json`), field spectrometers (SVC `.sig`,
 //! Spectral Evolution `.sed`), RADIS (`.spec`); and formats that are known by their look and refused by their name.
 
+use std::ops::Range;
 use std::path::Path;
 
 use quick_xml::Reader;
@@ -111,6 +112,10 @@ impl Format {
                 "compute absorption coefficients from it, e.g. with HAPI or RADIS, and write them over wavelength";
             return Some(Format::Refused("a list of spectral lines of HITRAN", help));
         }
+        if is_cross_sections(untrimmed) {
+            let help = "write each of its temperatures as a column over wavenumber: `nu (cm-1),208 K (cm2/molecule)`";
+            return Some(Format::Refused("a file of HITRAN's cross sections", help));
+        }
         None
     }
 
@@ -156,6 +161,20 @@ fn is_line_list(start: &str) -> bool {
         line.len() >= 160 && molecule && wavenumber
     };
     lines.next().is_some_and(is_line) && lines.take(1).all(is_line)
+}
+
+/// A line of columns of fixed width (the molecule, 20; first and last wavenumber, 10 each; points, 7; temperature, 7; pressure, 6), and
+/// below it ten values of ten characters.
+fn is_cross_sections(start: &str) -> bool {
+    let mut lines = start.lines();
+    let number = |line: &str, columns: Range<usize>| line.get(columns)?.trim().parse::<f64>().ok();
+    let is_header = |line: &str| {
+        let [from, to, points, kelvin, torr] =
+            [20..30, 30..40, 40..47, 47..54, 54..60].map(|columns| number(line, columns).unwrap_or(f64::NAN));
+        line.len() >= 80 && from < to && points >= 2.0 && points.fract() == 0.0 && kelvin > 0.0 && torr >= 0.0
+    };
+    let is_values = |line: &str| (0..2).all(|i| number(line, 10 * i..10 * (i + 1)).is_some());
+    lines.next().is_some_and(is_header) && lines.next().is_some_and(is_values)
 }
 
 fn no_columns(path: &Path, wanted: Column) -> Read<()> {

@@ -15,7 +15,7 @@ type Read<T> = Result<T, Box<Problem>>;
 /// Whether `path` is an ENVI spectral library: its data, or its header.
 pub fn is_envi(path: &Path, bytes: &[u8]) -> bool {
     let extension = path.extension().unwrap_or_default();
-    extension.eq_ignore_ascii_case("sli") || (extension.eq_ignore_ascii_case("hdr") && bytes.starts_with(b"ENVI"))
+    extension.eq_ignore_ascii_case("sli") || (extension.eq_ignore_ascii_case("hdr") && envi::is_header(bytes))
 }
 
 /// The spectrum of that name or number (by default the only one) of an ENVI spectral library.

@@ -132,7 +132,11 @@ pub fn parse_index(bytes: &[u8], path: &Path) -> Result<[Option<SpectrumTable>; 
 
 /// Every column beside the wavelength, with the name that the header gives it.
 pub fn read_columns(path: &Path) -> Result<Vec<(String, SpectrumTable)>, Box<Problem>> {
-    parse_columns(&read(path)?, path)
+    let bytes = read(path)?;
+    match instrument::Format::of(path, &bytes) {
+        Some(format @ instrument::Format::Refused(..)) => format.read(&bytes, path, Column::Only).map(|_| Vec::new()),
+        _ => parse_columns(&bytes, path),
+    }
 }
 
 /// [`read_columns`] on the content of the file.

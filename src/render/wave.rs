@@ -9,13 +9,11 @@ use crate::files::format_bytes;
 use crate::gpu::buffer;
 use crate::{Error, Result};
 
-/// Bytes of a path between the passes, beside its state and its records: head (8), its places in the queues (8),
-/// what roulette and flights have made of its weight (4).
+/// Bytes of a path between the passes, beside its state and its records: head (8, and as many again where some paths are evaluated
+/// only), its places in the queues (8), what roulette and flights have made of its weight (4).
 const HEAD_BYTES: u64 = 8;
 const QUEUE_BYTES: u64 = 8;
 const THROUGHPUT_BYTES: u64 = 4;
-/// Of each path where some are evaluated only.
-const CHANCE_BYTES: u64 = 8;
 /// Bytes of a unit's rectangle.
 const UNIT_BYTES: u64 = 16;
 
@@ -207,8 +205,12 @@ impl WavePlan {
         u64::from(self.paths) * u64::from(self.state_size)
     }
 
+    fn head_size(&self) -> u64 {
+        if self.thinned { 2 * HEAD_BYTES } else { HEAD_BYTES }
+    }
+
     pub fn head_bytes(&self) -> u64 {
-        u64::from(self.paths) * HEAD_BYTES
+        u64::from(self.paths) * self.head_size()
     }
 
     /// Two lists of the paths still under way.
@@ -218,10 +220,6 @@ impl WavePlan {
 
     pub fn throughput_bytes(&self) -> u64 {
         if self.scaled { u64::from(self.paths) * THROUGHPUT_BYTES } else { 0 }
-    }
-
-    pub fn chance_bytes(&self) -> u64 {
-        if self.thinned { u64::from(self.paths) * CHANCE_BYTES } else { 0 }
     }
 
     pub fn spectral_state_bytes(&self) -> u64 {
@@ -278,11 +276,10 @@ impl WavePlan {
         let by_paths = [self.state_bytes(), self.head_bytes(), self.record_bytes(), self.queue_bytes()];
         let by_units = [self.unit_list_bytes(), self.mean_bytes(), self.staging_bytes(), self.staging_bytes()];
         let throughputs = self.scaled.then(|| self.throughput_bytes());
-        let chances = self.thinned.then(|| self.chance_bytes());
         let spectral = (self.spectral_state_size > 0).then(|| self.spectral_state_bytes());
         let saved = self.gathered.then(|| [self.saved_bytes(); SAVED_WAVES]);
         let sizes = [fixed, by_paths, by_units];
-        let others = throughputs.into_iter().chain(chances).chain(spectral).chain(saved.into_iter().flatten());
+        let others = throughputs.into_iter().chain(spectral).chain(saved.into_iter().flatten());
         sizes.iter().flatten().copied().chain(others).map(buffer::allocated).sum()
     }
 
@@ -295,11 +292,10 @@ impl WavePlan {
     /// Bytes of one saved path, all its records included.
     pub fn path_bytes(&self) -> u64 {
         u64::from(self.state_size)
-            + HEAD_BYTES
+            + self.head_size()
             + QUEUE_BYTES
             + u64::from(self.record_size) * u64::from(self.max_records)
             + self.throughput_bytes().min(THROUGHPUT_BYTES)
-            + self.chance_bytes().min(CHANCE_BYTES)
             + u64::from(self.spectral_state_size)
             + SAVED_WAVES as u64 * self.saved_bytes() / u64::from(self.paths)
     }

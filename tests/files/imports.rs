@@ -1,6 +1,7 @@
 //! Spectra in other people's formats, as the scene file and `spectile sensor` read them: against readers that were not
 //! written here (SPECTILE_PYTHON), through a scene, and spoilt in every way.
 
+use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
 
@@ -205,6 +206,44 @@ fn readers_of_python_read_the_same() {
         assert!(close(&ours.nm, &numbers("nm")), "{key}: {:?} {:?}", ours.nm, numbers("nm"));
         assert!(close(&ours.value, &numbers("value")), "{key}: {:?} {:?}", ours.value, numbers("value"));
     }
+}
+
+/// Files of real instruments, of versions 6 to 8: reflectances, and where there are counts their quotient by the white reference's, as
+/// pyASDReader reads them. Those that call counts radiance, since a calibration behind them would make it, are refused.
+#[test]
+#[ignore = "downloads pyASDReader's samples from a registry of Python packages"]
+fn real_files_of_asd_are_read_as_pyasdreader_reads_them() {
+    let Some(mut python) = python("asd_samples.py") else { return };
+    let folder = tempdir().expect("a folder");
+    let output = python.arg(folder.path()).current_dir(folder.path()).output().expect("runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let theirs: serde_json::Map<String, Value> = serde_json::from_slice(&output.stdout).expect("JSON");
+    let mut seen = HashMap::new();
+    for (path, theirs) in &theirs {
+        let numbers = |part: &str| -> Vec<f64> {
+            theirs[part].as_array().expect(path).iter().map(|v| v.as_f64().expect("a number")).collect()
+        };
+        let kind = theirs["type"].as_str().expect("a type");
+        *seen.entry(kind).or_insert(0) += 1;
+        let ours = match read_spectrum(Path::new(path), None.into(), None) {
+            Ok(ours) => ours,
+            Err(problem) => {
+                assert!(kind == "dt_RAD_TYPE" && problem.message.contains("are counts"), "{problem}");
+                continue;
+            }
+        };
+        let is_of_counts = ours.notes.iter().any(|note| note.contains("counts"));
+        assert_eq!(is_of_counts, kind == "dt_RAW_TYPE", "{path}: {:?}", ours.notes);
+        // Theirs are of f32 where ours are not, and the other way round.
+        let furthest = |a: &[f64], b: &[f64]| {
+            assert_eq!(a.len(), b.len(), "{path}");
+            a.iter().zip(b).map(|(a, b)| (a - b).abs() / b.abs().max(1e-9)).fold(0.0, f64::max)
+        };
+        assert!(furthest(&ours.nm, &numbers("nm")) < 1e-12, "{path}");
+        let furthest = furthest(&ours.value, &numbers("quotient"));
+        assert!(furthest < 1e-6, "{path}: {furthest}");
+    }
+    assert_eq!([seen["dt_REF_TYPE"], seen["dt_RAD_TYPE"], seen["dt_RAW_TYPE"]], [6, 3, 5]);
 }
 
 /// Everything that reads bytes, on bytes: accepted or refused with words, never a panic.

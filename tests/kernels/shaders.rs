@@ -31,8 +31,8 @@ const MAX_EVERYTHING_BYTES: usize = 104 << 10;
 
 /// Storage buffers that the fullest scene's largest kernel binds, four windows each of nodes and primitives included; and a plain
 /// scene's with one of each. What devices offer: Metal 29 through wgpu-hal 30, Vulkan on GPUs thousands, lavapipe of Mesa 22.3 32.
-const MOST_STORAGE_BUFFERS: u32 = 32;
-const PLAIN_STORAGE_BUFFERS: u32 = 12;
+const MOST_STORAGE_BUFFERS: u32 = 31;
+const PLAIN_STORAGE_BUFFERS: u32 = 11;
 
 const EVALUATORS: [Evaluator; 4] =
     [Evaluator::DpeptPixel, Evaluator::DpeptPath, Evaluator::DpeptSpectral, Evaluator::Pt];

@@ -6,6 +6,7 @@ mod cases;
 mod cli;
 mod converge;
 mod documents;
+mod drivers;
 mod peer;
 mod scenes;
 mod stress;

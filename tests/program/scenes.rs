@@ -19,6 +19,8 @@ use tempfile::TempDir;
 use crate::binary::{self, run};
 use crate::device::{self, Settings, render};
 use crate::outside::shared;
+#[cfg(target_os = "linux")]
+use crate::report::excuse;
 use crate::{size, statistics};
 
 fn committed() -> PathBuf {
@@ -277,6 +279,47 @@ fn every_scene_renders_a_small_picture_cleanly() {
         }
         // Hardly a pixel of these scenes is black in all of its four paths.
         assert!(lit > 900, "{name}: {lit} of 1000 pixels are lit");
+    }
+}
+
+/// With Debian 13's Mesa (25.0, LLVM 19), in a root of its own, the same bits as with the one that is here.
+#[cfg(target_os = "linux")]
+#[test]
+#[ignore = "installs Debian 13 from its registry, as root; minutes"]
+fn debian_13_renders_the_same_bits() {
+    use std::process::Command;
+
+    let can = "[ $(id -u) = 0 ] && PATH=$PATH:/usr/sbin command -v debootstrap chroot";
+    if !Command::new("sh").args(["-c", can]).output().is_ok_and(|found| found.status.success()) {
+        return excuse("debootstrap as root makes another Debian");
+    }
+    let root = TempDir::new().expect("a folder");
+    let mut debian = Command::new("debootstrap");
+    debian.args(["--variant=minbase", "--include=mesa-vulkan-drivers,libvulkan1", "trixie"]).arg(root.path());
+    let debian = debian.output().expect("it runs");
+    assert!(debian.status.success(), "{}", words(&debian));
+    fs::copy(env!("CARGO_BIN_EXE_spectile"), root.path().join("spectile")).expect("copied");
+    let copied = Command::new("cp").arg("-r").arg(made()).arg(root.path().join("scenes")).status();
+    assert!(copied.is_ok_and(|copied| copied.success()));
+    for (folder, name) in scenes() {
+        let small = ["--size", "24x16", "--spp", "4", "--set", "channels.equal.count=24"];
+        let small = [&small[..], &["--set", "channels.false_colour=[18,12,4]", "--quiet"]].concat();
+        let scene = format!("scenes/{folder}/{name}.toml");
+        let out = TempDir::new().expect("a folder");
+        let cube = out.path().join("cube.zarr");
+        let (file, path) = (made().join(&folder).join(format!("{name}.toml")), cube.to_string_lossy());
+        let here = run(out.path(), &[&["render", &file.to_string_lossy(), "-o", &path][..], &small].concat());
+        assert!(here.status.success(), "{name}: {}", words(&here));
+        let mut there = Command::new("chroot");
+        there.arg(root.path()).args(["/spectile", "render", &scene, "-o", "cube.zarr", "--overwrite"]).args(&small);
+        let there = there.env_remove("MESA_SHADER_CACHE_DIR").env("HOME", "/tmp").output().expect("it runs");
+        assert!(there.status.success(), "{name}: {}", words(&there));
+        let [here, there] = [&cube, &root.path().join("cube.zarr")].map(|cube| Cube::open(cube).expect("a cube"));
+        for (x, y) in (0..16).flat_map(|y| (0..24).map(move |x| (x, y))) {
+            let [here, there] = [&here, &there].map(|cube| cube.spectrum(x, y).expect("a pixel"));
+            assert_eq!(here, there, "{name} ({x}, {y})");
+        }
+        println!("{name}: the same");
     }
 }
 

@@ -322,7 +322,12 @@ fn envi_resolves() {
             bytes.extend(little);
         }
         let header = if data == "a.raw" { "a.raw.hdr" } else { "a.hdr" };
-        let folder = Folder::new(&[(data, bytes), (header, envi_header(interleave, data_type, byte_order, ""))]);
+        let mut text = envi_header(interleave, data_type, byte_order, "");
+        if data == "a.dat" {
+            // As some editors begin a text.
+            text.splice(..0, *b"\xef\xbb\xbf");
+        }
+        let folder = Folder::new(&[(data, bytes), (header, text)]);
         let (map, warnings) = folder.map(&format!("map = \"{named}\""));
         let Texels::Spectral { nm, radiance } = &map.texels else { panic!("{map:?}") };
         // Micrometres in text are not nanometres to the last bit.

@@ -19,7 +19,7 @@ fn choose_emitter(u: f32) -> u32 {
     var high = frame.emitter_count - 1u;
     while (low < high) {
         let middle = (low + high) / 2u;
-        if (u < emitter_cdf[middle]) {
+        if (u < emitters[middle].pick_end) {
             high = middle;
         } else {
             low = middle + 1u;

@@ -20,13 +20,14 @@ pub const SCENE: Part = Part {
             scene.windows.primitives,
             defines,
         );
+        // Roulette on evaluation adds what it leaves of a path.
+        defines.set("HEAD_WORDS", if scene.thinning.is_some() { 4u32 } else { 2 });
     },
     buffers: |scene| {
         let prepared = scene.prepared;
         let emitting = ["the emitting triangles of the scene", "a coarser mesh where it emits"];
         let mut buffers = vec![
             SceneBuffer::new("emitters", &prepared.emitters, emitting[0], emitting[1]),
-            SceneBuffer::new("emitter_cdf", &prepared.picks.cdf, emitting[0], emitting[1]),
             SceneBuffer::new("spectra", &prepared.tables.strata, SPECTRA, FEWER_SPECTRA),
         ];
         if !prepared.is_general() {

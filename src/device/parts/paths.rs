@@ -77,11 +77,11 @@ pub const ROULETTE_ON_EVALUATION: Part = Part {
     used: |scene| scene.thinning.is_some(),
     effect: |scene| match &scene.thinning {
         Some(thinning) => format!(
-            "a path that brings the mean is evaluated with {:.2}; 8 bytes a path, tried in {} quads of channels",
+            "a path that brings the mean is evaluated with {:.2}; 8 more bytes a path, tried in {} quads of channels",
             thinning.scale.min(1.0),
             thinning.importances.len()
         ),
-        None => "8 bytes a path, and a pass that tries paths in a few channels".into(),
+        None => "8 more bytes a path, and a pass that tries paths in a few channels".into(),
     },
     is_planned: true,
     modules: &[(Place::Generate, module!("parts/paths/seen.wgsl"))],

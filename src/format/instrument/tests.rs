@@ -63,6 +63,10 @@ fn air_is_converted_where_a_file_says_so() {
 #[test]
 fn what_is_not_read_is_named() {
     let par = format!("{:<160}\n", " 21  667.380000 1.0E-19 2.0E+00");
+    let xsc = format!(
+        "{:>20}{:10.4}{:10.4}{:7}{:7.2}{:6.2} 2.000E-17  .03{:>15}     air  8\n{}\n",
+        "CCl4", 700.0, 724.0, 4, 208.1, 7.51, "carbon tetra", " 1.000E-18 2.000E-18 3.000E-18 4.000E-18"
+    );
     for (name, bytes, words) in [
         ("a.nc", &b"\x89HDF\r\n"[..], "netCDF-4"),
         ("a.xlsx", b"PK\x03\x04", "spreadsheet"),
@@ -70,6 +74,7 @@ fn what_is_not_read_is_named() {
         ("02_hit.par", par.as_bytes(), "lines of HITRAN"),
         ("H2O.data", par.replace('\n', ",0.5\n").as_bytes(), "lines of HITRAN"),
         ("H2O.header", b"{\"table_name\": \"H2O\", \"order\": [\"nu\"]}", "lines of HAPI"),
+        ("CCl4_208.0K.xsc", xsc.as_bytes(), "HITRAN's cross sections"),
         ("leaf.jdx", b"##TITLE= leaf\n##JCAMP-DX= 4.24\n##YFACTOR= 0.1\n##XYPOINTS= (XY..XY)\n400, 1\n", "JCAMP-DX"),
         ("abi_g16.SpcCoeff.nc", b"\x89HDF", "coefficients of CRTM"),
         ("abi_g16.SpcCoeff.bin", b"\0\0", "coefficients of CRTM"),

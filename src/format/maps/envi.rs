@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use super::{Bands, Map, checked_size, spectral, whole, with_help};
 use crate::error::Problem;
-use crate::format::envi::{header_path, parse};
+use crate::format::envi::{header_path, is_header, parse};
 use crate::format::unit;
 
 /// The header of the data file at `path`, if it is one of ENVI's.
 pub fn header_of(path: &Path) -> Option<PathBuf> {
-    header_path(path).filter(|header| std::fs::read(header).is_ok_and(|bytes| bytes.starts_with(b"ENVI")))
+    header_path(path).filter(|header| std::fs::read(header).is_ok_and(|bytes| is_header(&bytes)))
 }
 
 /// The data file of the header at `path`.

@@ -63,14 +63,14 @@ pub fn read(path: &Path) -> Result<Map, Box<Problem>> {
     if path.is_dir() {
         return zarr::read(path);
     }
-    let mut start = [0; 4];
+    let mut start = [0; 8];
     let length = std::fs::File::open(path)
-        .and_then(|file| file.take(4).read(&mut start))
+        .and_then(|file| file.take(8).read(&mut start))
         .map_err(|e| whole(path, format!("cannot be read: {e}")))?;
     match &start[..length] {
-        [0x76, 0x2f, 0x31, 0x01] => exr::read_map(path),
+        [0x76, 0x2f, 0x31, 0x01, ..] => exr::read_map(path),
         [b'#', b'?', ..] => hdr::read(path),
-        b"ENVI" => envi::read(path, None),
+        start if crate::format::envi::is_header(start) => envi::read(path, None),
         _ => match envi::header_of(path) {
             Some(header) => envi::read(&header, Some(path)),
             None => {
