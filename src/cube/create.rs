@@ -5,8 +5,9 @@ use std::io::ErrorKind;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use super::arrays::arrays;
 use super::lock::TileLock;
-use super::metadata::{self, Header};
+use super::metadata::Header;
 use super::restore::{coordinates, pretty};
 use super::store::{Cube, Origin, PRIVATE, RECORD};
 use super::writer::BATCH_BYTES;
@@ -287,7 +288,7 @@ fn is_cube_alone(path: &Path) -> std::result::Result<(), String> {
         Error::Storage { what, .. } => what,
         error => error.to_string(),
     })?;
-    let arrays = metadata::arrays(cube.header(), cube.layout());
+    let arrays = arrays(cube.header(), cube.layout());
     let known = |name: &str| [PRIVATE, "zarr.json"].contains(&name) || arrays.iter().any(|(array, _)| *array == name);
     only_holds(path, known)?;
     let folders = arrays.iter().map(|(array, _)| path.join(array)).filter(|folder| folder.is_dir());

@@ -10,6 +10,7 @@
 //!
 //! Invariant: nothing outside this module maps memory.
 
+mod arrays;
 mod checksums;
 mod choices;
 mod compare;

@@ -10,6 +10,7 @@ pub mod pilot;
 pub mod plan;
 pub mod pool;
 pub mod queue;
+mod ready;
 pub mod schedule;
 pub mod self_test;
 pub mod time_limit;

@@ -8,19 +8,16 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 use signal_hook::consts::SIGINT;
 
-use crate::cube::{Choices, Run, RunFile, Writer, check_target, epoch_samples, epochs_in, reduction, samples_before};
-use crate::device::prepared::Prepared;
-use crate::gpu::adapter::Gpu;
+use crate::cube::{Run, RunFile, Writer, epoch_samples, epochs_in, reduction, samples_before};
 use crate::preview::{Control, DeviceStatus, Status};
 use crate::render::interrupt::Interrupt;
 use crate::render::job::{Job, SURE_EPOCHS};
-use crate::render::last_bounce::LastBounce;
+use crate::render::plan;
 use crate::render::pool::{Merged, Pool, Report, Tally};
 use crate::render::queue::Queue;
+use crate::render::ready::{Ready, get_ready};
 use crate::render::watch::{Heard, Reports, Requests};
-use crate::render::wave::{Budget, WavePlan};
-use crate::render::worker::{Profile, device_limits};
-use crate::render::{pilot, plan};
+use crate::render::worker::Profile;
 use crate::{Error, Result, preview};
 
 /// The preview file is rewritten at most this often, and takes at most this share of the time.
@@ -63,57 +60,13 @@ pub struct Summary {
 /// Renders `job` into a cube, new or gone on with. Errors leave the cube with every unit merged so far.
 pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event) -> Result<()>) -> Result<Summary> {
     let started = Instant::now();
-    plan::check(&job.scene)?;
-    let samples_limit = job.stop.samples_limit(job.scene.integrator.epoch, job.uncertainty)?;
-    let tile = plan::tile_size(&job.scene, job.tile);
-    let mut header = job.header(tile);
-    let tiles = job.tiles(&header)?;
-    let there = check_target(&job.output, &header, job.existing, &tiles)?;
-    if let Some(preview) = &job.preview {
-        preview::PICTURE.check_target(&preview.file)?;
-    }
-    let mut gpus = Gpu::open_all(&job.devices)?;
-    for gpu in &gpus {
-        observe(Event::Device(&gpu.name))?;
-    }
-    if gpus.iter().any(|gpu| gpu.name != gpus[0].name) {
-        let what =
-            "the devices are of different kinds: the cube is right, but its last bits depend on which rendered what";
-        observe(Event::Warning(what.into()))?;
-    }
-    let software = gpus[0].is_software;
-    let evaluator = plan::evaluator(&job.scene, there.as_ref(), software)?;
-    plan::record_evaluator(&mut header, evaluator);
-    let prepared = Prepared::for_evaluator(&job.scene, job.seed, evaluator)?;
-    refuse_too_little(job, &prepared, tile, &gpus)?;
-    let there = there.map(|_| Choices::read(&job.output)).transpose()?.flatten();
-    let (prepared, choices) =
-        pilot::decide(&job.scene, prepared, there, &mut gpus, job.memory, interrupt, &mut |what| {
-            observe(Event::Warning(what))
-        })?;
-    let first = Arc::new(gpus.remove(0));
-    let last_bounce = LastBounce::measure(&job.scene, &prepared, &first, job.memory, interrupt);
-    gpus.insert(0, Arc::into_inner(first).ok_or_else(|| Error::Internal("a device was kept that was lent".into()))?);
-    match last_bounce {
-        Ok(None) => {}
-        Ok(Some(last)) if last.is_much() => observe(Event::Warning(last.to_string()))?,
-        Ok(Some(last)) => observe(Event::Note(last.to_string()))?,
-        Err(error) if error.may_be_of_one_device() => {
-            observe(Event::Warning(format!("what the last bounce brings was not measured: {error}")))?;
-        }
-        Err(error) => return Err(error),
-    }
-    if prepared.accel.degenerate > 0 {
-        let what =
-            format!("{} triangles without area in f32 were left out: no ray can meet them", prepared.accel.degenerate);
-        observe(Event::Warning(what))?;
-    }
-
+    let Ready { header, tiles, samples_limit, gpus, software, evaluator, prepared, choices } =
+        get_ready(job, interrupt, observe)?;
     let pool = Arc::new(Pool {
         prepared,
         queue: Queue::default(),
         cube: OnceLock::new(),
-        tile,
+        tile: header.tile,
         full_epoch: job.scene.integrator.epoch,
         memory: job.memory,
         profile: job.profile,
@@ -187,21 +140,6 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
         tally: render.tally,
         status: render.status,
     })
-}
-
-/// Refuses memory that holds the waves of no device, before a pilot's smaller ones fill it.
-fn refuse_too_little(job: &Job, prepared: &Prepared, tile: [u32; 2], gpus: &[Gpu]) -> Result<()> {
-    let budget = Budget { memory: job.memory, paths: None };
-    let thinned = pilot::is_needed(&job.scene, prepared);
-    let plans = gpus.iter().map(|gpu| WavePlan::with_thinning(prepared, tile, device_limits(gpu), budget, thinned));
-    let mut refusals = Vec::new();
-    for plan in plans {
-        match plan {
-            Ok(_) => return Ok(()),
-            Err(refusal) => refusals.push(refusal),
-        }
-    }
-    refusals.into_iter().next().map_or(Ok(()), Err)
 }
 
 fn no_cube() -> Error {

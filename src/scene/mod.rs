@@ -13,6 +13,7 @@ mod digest;
 mod draft;
 mod environment;
 mod file;
+mod integrator;
 pub mod keys;
 mod light;
 mod material;
@@ -40,6 +41,7 @@ use serde::{Deserialize, Serialize};
 pub use decode::join as dotted_key;
 pub use draft::Draft;
 pub use file::{load, parse, read};
+pub use integrator::{Evaluation, Evaluator, Integrator, Sampler, Wavelengths};
 pub use light::{Cone, Light, Profile};
 
 pub use crate::format::phase::PhaseTable;
@@ -84,6 +86,19 @@ pub struct Scene {
     pub warnings: Vec<String>,
     /// Hex SHA-256 over everything above that decides the values of a cube (not paths or warnings).
     pub digest: String,
+}
+
+impl Scene {
+    /// Whether weights of products of its spectra are kept instead of radiance.
+    pub fn is_factored(&self) -> bool {
+        self.integrator.evaluator == Evaluator::Factored
+    }
+
+    /// The same, with weights of products of its spectra kept instead of radiance.
+    pub fn factored(mut self) -> Scene {
+        self.integrator.evaluator = Evaluator::Factored;
+        self
+    }
 }
 
 /// A curve with the name it goes by in messages.
@@ -158,126 +173,6 @@ pub enum Filter {
     Box,
     /// σ = 0.5 px per axis, cut at ±2 px per axis, by filter importance sampling.
     Gaussian,
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Integrator {
-    /// Scattering events; next-event estimation at the last one included.
-    pub max_bounces: u32,
-    /// 0 = off; otherwise the first scattering event (1-based) at which roulette may end a path.
-    pub russian_roulette_start: u32,
-    pub sampler: Sampler,
-    pub wavelengths: Wavelengths,
-    /// At how many wavelengths of each channel a path is evaluated, a power of two up to 16.
-    pub wavelengths_per_channel: u32,
-    /// How many techniques decide where light goes that matter scatters (docs/METHOD.md, Techniques), 1 to 16; `None`: as many as
-    /// its channels differ.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub techniques: Option<u32>,
-    /// Which of a scene's paths are evaluated.
-    pub evaluation: Evaluation,
-    pub evaluator: Evaluator,
-    /// Samples per pixel of a full epoch, a power of two up to 1,024.
-    pub epoch: u32,
-}
-
-/// Which paths are evaluated: all have the same means.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Evaluation {
-    /// What pays, as a few samples of the scene tell before it is rendered.
-    Auto,
-    All,
-    /// Those of little energy by chance.
-    Roulette,
-}
-
-impl Evaluation {
-    pub const ALL: [Evaluation; 3] = [Evaluation::Auto, Evaluation::All, Evaluation::Roulette];
-
-    /// As scene files have it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Evaluation::Auto => "auto",
-            Evaluation::All => "all",
-            Evaluation::Roulette => "roulette",
-        }
-    }
-}
-
-/// How channels are evaluated along paths. All trace the same paths and differ in rounding only.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Evaluator {
-    /// What is fastest on the device, by a fixed rule of its kind and the number of channels (`device::evaluator`).
-    Auto,
-    /// Deferred: a thread takes some channels of a pixel along all its saved paths.
-    DpeptPixel,
-    /// Deferred: a thread takes all channels of a saved path, batch by batch (Hoarau et al. 2018, section 5.1).
-    DpeptPath,
-    /// Deferred: the threads of a workgroup take different channels of the same saved path (Hoarau et al. 2018, section 5.2).
-    DpeptSpectral,
-    /// The conventional path tracer: all channels of all paths in memory, updated at every bounce (Hoarau et al. 2018, section 4).
-    Pt,
-    /// None: weights of products of spectra are kept, from which any channels follow (`render --factored`).
-    Factored,
-}
-
-impl Scene {
-    /// Whether weights of products of its spectra are kept instead of radiance.
-    pub fn is_factored(&self) -> bool {
-        self.integrator.evaluator == Evaluator::Factored
-    }
-
-    /// The same, with weights of products of its spectra kept instead of radiance.
-    pub fn factored(mut self) -> Scene {
-        self.integrator.evaluator = Evaluator::Factored;
-        self
-    }
-}
-
-impl Evaluator {
-    /// Those that a scene may ask for.
-    pub const ALL: [Evaluator; 5] =
-        [Evaluator::Auto, Evaluator::DpeptPixel, Evaluator::DpeptPath, Evaluator::DpeptSpectral, Evaluator::Pt];
-
-    /// Whether a dispatch takes one sample of every pixel, instead of all that are there.
-    pub fn takes_one_sample(self) -> bool {
-        matches!(self, Evaluator::DpeptPath | Evaluator::DpeptSpectral)
-    }
-
-    /// The one of this name, but for `auto`, which is none.
-    pub fn named(name: &str) -> Option<Evaluator> {
-        Evaluator::ALL[1..].iter().copied().find(|evaluator| evaluator.name() == name)
-    }
-
-    /// As scenes write it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Evaluator::Auto => "auto",
-            Evaluator::DpeptPixel => "dpept-pixel",
-            Evaluator::DpeptPath => "dpept-path",
-            Evaluator::DpeptSpectral => "dpept-spectral",
-            Evaluator::Pt => "pt",
-            Evaluator::Factored => "factored",
-        }
-    }
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Sampler {
-    Sobol,
-    Independent,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Wavelengths {
-    /// Evenly over each channel: Eq. 4 of Hoarau et al. 2018.
-    Uniform,
-    /// From the emitters' own spectral density in each channel, see [`crate::spectral::warp`].
-    Emission,
 }
 
 #[derive(Debug, Clone, PartialEq)]

@@ -7,7 +7,7 @@ use crate::device::words::{
     HOT_FACET_COUNT, NONE, RADIATOR_ABSORBS, RADIATOR_COAT, RADIATOR_FACETS, RADIATOR_LAMP, RADIATOR_MIRROR,
     RADIATOR_OPEN, RADIATOR_PASSES_SPECTRUM, RADIATOR_PASSES_TEXTURE, RADIATOR_TWO_SIDED, RADIATOR_VARNISH, Radiator,
 };
-use crate::scene::{Bsdf, Reflectance, SMOOTH, Scene, Temperature, TextureKind};
+use crate::scene::{Bsdf, Reflectance, SMOOTH, Scene, SpectrumId, Temperature, TextureKind};
 use crate::spectral::Curve;
 use crate::spectral::hemisphere::fresnel::{mean_conductor, mean_dielectric};
 use crate::spectral::hemisphere::{DielectricAlbedo, ReflectionAlbedo, index_range};
@@ -193,40 +193,7 @@ impl Radiators {
                 (Kind::Facets, 2 * HOT_FACET_COUNT + 2)
             }
             Bsdf::Plastic { reflectance, eta, roughness } => {
-                radiator.spectra = surfaces.spectrum(eta);
-                let rough = (roughness >= SMOOTH)
-                    .then(|| DielectricAlbedo::shared(roughness, index_range(curve(eta), &scene.channels)));
-                radiator.alpha = [roughness as f32; 2];
-                let mean_reflected = |eta: f64| match &rough {
-                    None => mean_dielectric(eta),
-                    Some(table) => table.mean_reflected(eta, false),
-                };
-                // Of what leaves the base, the share that the coat sends back to it.
-                let back = |eta: f64| 1.0 - (1.0 - mean_reflected(eta)) / (eta * eta);
-                radiator.inner = match reflectance {
-                    Reflectance::Spectrum(spectrum) => {
-                        let kept = |v: &[f64]| (1.0 - v[0]) / (1.0 - v[0] * back(v[1]));
-                        let kept = Curve::derived(&[curve(spectrum), curve(eta)], &scene.channels, kept);
-                        radiator.kind |= RADIATOR_ABSORBS;
-                        surfaces.derived(format!("{name}, kept by the base"), kept)
-                    }
-                    Reflectance::Texture(texture) => {
-                        radiator.reflectance = texture as u32;
-                        let back = Curve::derived(&[curve(eta)], &scene.channels, |v| back(v[0]));
-                        surfaces.derived(format!("{name}, back to the base"), back)
-                    }
-                };
-                match &rough {
-                    None => {
-                        self.features.varnish = true;
-                        (Kind::Varnish, 3)
-                    }
-                    Some(table) => {
-                        self.features.coats = true;
-                        radiator.inner |= surfaces.eta_table(table) << 16;
-                        (Kind::Coat, 3)
-                    }
-                }
+                (self.plastic(scene, &mut radiator, name, reflectance, (eta, roughness), surfaces), 3)
             }
             Bsdf::Dielectric { .. } | Bsdf::Blend { .. } => unreachable!("hot parts absorb, and are no blends"),
         };
@@ -237,6 +204,53 @@ impl Radiators {
         radiator.kind |= kind as u32;
         self.all.push(radiator);
         records
+    }
+
+    /// A base under a varnish: what it keeps of what comes back from below the boundary too.
+    fn plastic(
+        &mut self,
+        scene: &Scene,
+        radiator: &mut Radiator,
+        name: &str,
+        reflectance: Reflectance,
+        (eta, roughness): (SpectrumId, f64),
+        surfaces: &mut Surfaces,
+    ) -> Kind {
+        let curve = |spectrum: usize| &scene.spectra[spectrum].curve;
+        radiator.spectra = surfaces.spectrum(eta);
+        let rough = (roughness >= SMOOTH)
+            .then(|| DielectricAlbedo::shared(roughness, index_range(curve(eta), &scene.channels)));
+        radiator.alpha = [roughness as f32; 2];
+        let mean_reflected = |eta: f64| match &rough {
+            None => mean_dielectric(eta),
+            Some(table) => table.mean_reflected(eta, false),
+        };
+        // Of what leaves the base, the share that the coat sends back to it.
+        let back = |eta: f64| 1.0 - (1.0 - mean_reflected(eta)) / (eta * eta);
+        radiator.inner = match reflectance {
+            Reflectance::Spectrum(spectrum) => {
+                let kept = |v: &[f64]| (1.0 - v[0]) / (1.0 - v[0] * back(v[1]));
+                let kept = Curve::derived(&[curve(spectrum), curve(eta)], &scene.channels, kept);
+                radiator.kind |= RADIATOR_ABSORBS;
+                surfaces.derived(format!("{name}, kept by the base"), kept)
+            }
+            Reflectance::Texture(texture) => {
+                radiator.reflectance = texture as u32;
+                let back = Curve::derived(&[curve(eta)], &scene.channels, |v| back(v[0]));
+                surfaces.derived(format!("{name}, back to the base"), back)
+            }
+        };
+        match &rough {
+            None => {
+                self.features.varnish = true;
+                Kind::Varnish
+            }
+            Some(table) => {
+                self.features.coats = true;
+                radiator.inner |= surfaces.eta_table(table) << 16;
+                Kind::Coat
+            }
+        }
     }
 }
 
