@@ -87,7 +87,7 @@ fn generate_camera(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     // Where all of the path's wavelengths stand in their parts of the channel, and by the last bits, which are in no order, in which
     // part its own is: so those of all samples together are as evenly spread as so many samples' would be.
     let drawn = random_pair_bits(key, DIMENSION_WAVELENGTH, index, wave.epoch_mask).x;
-    let mu = (drawn >> WAVELENGTH_BITS) | (drawn << (32u - WAVELENGTH_BITS));
+    let mu = (drawn >> $WAVELENGTH_BITSu) | (drawn << (32u - $WAVELENGTH_BITSu));
 #else
     let mu = random_pair_bits(key, DIMENSION_WAVELENGTH, index, wave.epoch_mask).x;
 #endif

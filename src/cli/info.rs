@@ -190,11 +190,13 @@ impl Found {
     /// Whether nobody has decided yet which paths are evaluated.
     fn is_pending(&self) -> bool {
         let attributes = &self.cube.header().attributes;
-        let setting = attributes.get("settings").and_then(|settings| settings["integrator"]["evaluation"].as_str());
+        let setting = |name: &str| attributes.get("settings")?["integrator"][name].as_str();
+        let is_open = setting("wavelengths_per_channel").is_some()
+            || setting("evaluation").is_some_and(|setting| setting != Evaluation::All.name());
         let by_itself = [Evaluator::Pt, Evaluator::Factored].map(Evaluator::name);
         let by_itself =
             attributes.get("evaluator").is_some_and(|evaluator| by_itself.iter().any(|name| evaluator == name));
-        !by_itself && self.progress.samples[1] == 0 && setting.is_some_and(|setting| setting != Evaluation::All.name())
+        !by_itself && self.progress.samples[1] == 0 && is_open
     }
 
     fn describe(&self) -> String {
@@ -240,11 +242,12 @@ impl Found {
             row("standard error", what);
         }
         if let Some(choices) = &self.choices {
+            row("wavelengths", choices.describe_wavelengths());
             row("evaluation", choices.describe());
         } else if self.is_pending() {
             row(
                 "evaluation",
-                "pending: samples decide which paths are evaluated, when the first device renders".into(),
+                "pending: samples decide which paths are evaluated, and at how many wavelengths, when the first device renders".into(),
             );
         }
         row("preview", shows(cube));

@@ -18,6 +18,7 @@ use crate::files::{format_bytes, shown};
 use crate::gpu::adapter::{Gpu, Selection};
 use crate::gpu::pass::storage_buffers;
 use crate::render::job::StopRule;
+use crate::render::pilot::Pilot;
 use crate::render::pool::MERGE_THREADS;
 use crate::render::wave::{Budget, WavePlan};
 use crate::render::worker::Worker;
@@ -93,9 +94,16 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     let (prepared, choices) = match args.pilot {
         false => (Arc::new(prepared), None),
         true if gpus.is_empty() => return Err(Error::NoDevice("--pilot follows paths, and there is no device".into())),
-        true => pilot::decide(&scene, prepared, None, &mut gpus, args.memory, &Arc::default(), &mut |what| {
-            warn(output, &what)
-        })?,
+        true => {
+            let pilot = Pilot {
+                scene: &scene,
+                gpus: &mut gpus,
+                memory: args.memory,
+                interrupt: &Arc::default(),
+                warn: &mut |what| warn(output, &what),
+            };
+            pilot.decide(prepared, None)?
+        }
     };
     let stop = StopRule { samples: Some(args.spp), ..StopRule::default() };
     let samples = stop.samples_limit(scene.integrator.epoch, false)?.unwrap_or(args.spp);
@@ -291,7 +299,9 @@ impl Plan<'_> {
         text += &format!("disk      {}\n", format_bytes(header.store_bytes()));
         text += &format!("evaluator {}\n", p.evaluator.name());
         text += &match &self.choices {
-            Some(choices) => wrapped("paths", &choices.describe()),
+            Some(choices) => {
+                wrapped("per path", &choices.describe_wavelengths()) + &wrapped("paths", &choices.describe())
+            }
             None if pilot::is_needed(self.scene, p) => wrapped("paths", UNDECIDED),
             None => String::new(),
         };
@@ -390,8 +400,8 @@ impl Plan<'_> {
     }
 }
 
-const UNDECIDED: &str = "which are worth evaluating is decided by samples when the cube is made (--pilot does it now); this is the plan of \
-                         evaluating all";
+const UNDECIDED: &str = "which are worth evaluating, and at how many wavelengths, is decided by samples when the cube is made (--pilot does it \
+                         now); this is the plan of evaluating all at one";
 
 /// Words under a title, in lines of a width that terminals have.
 fn wrapped(title: &str, words: &str) -> String {

@@ -1,5 +1,5 @@
-//! What a few samples decided before a render began: which paths of it are evaluated. It stays with the cube, so that whoever joins
-//! or goes on renders the same.
+//! What a few samples decided before a render began: which paths of it are evaluated, and at how many wavelengths. It stays with the
+//! cube, so that whoever joins or goes on renders the same.
 
 use std::fs;
 use std::io::ErrorKind;
@@ -16,7 +16,16 @@ const FILE: &str = "choices.json";
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Choices {
-    /// Why, in words.
+    /// At how many wavelengths of each channel a path is evaluated. Cubes made before there was a choice say nothing, and have 1.
+    #[serde(default = "one")]
+    pub wavelengths_per_channel: u32,
+    /// Efficiency (1 / (time x variance), mean over channels) over that of one wavelength, as expected.
+    #[serde(default = "no_gain")]
+    pub wavelengths_gain: f64,
+    /// Why so many, in words.
+    #[serde(default)]
+    pub wavelengths_reason: String,
+    /// Why so many paths, in words.
     pub reason: String,
     /// What a path's energy is multiplied with to be its chance of being evaluated; `None` where all are.
     #[serde(deserialize_with = "Option::deserialize")] // Not `None` where it is missing.
@@ -33,8 +42,26 @@ pub struct Choices {
     pub mean_radiance: Vec<f64>,
 }
 
+fn one() -> u32 {
+    1
+}
+
+fn no_gain() -> f64 {
+    1.0
+}
+
 impl Choices {
-    /// In a line, for people.
+    /// How many wavelengths, in a line, for people.
+    pub fn describe_wavelengths(&self) -> String {
+        let gain = match self.wavelengths_gain {
+            1.0 => String::new(),
+            gain => format!(", {gain:.2} times the efficiency of one expected"),
+        };
+        let reason = if self.wavelengths_reason.is_empty() { "as always" } else { &self.wavelengths_reason };
+        format!("{} a channel and path{gain} ({reason})", self.wavelengths_per_channel)
+    }
+
+    /// Which paths, in a line, for people.
     pub fn describe(&self) -> String {
         match self.scale {
             None => format!("all paths: {}", self.reason),

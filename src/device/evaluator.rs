@@ -12,7 +12,7 @@ pub const MOST_PT_CHANNELS: usize = 16;
 
 /// What to use for `scene` on a software device or a GPU: its evaluator, or what `auto` stands for.
 pub fn resolve(scene: &Scene, software: bool) -> Evaluator {
-    let values = scene.channels.len() * scene.integrator.wavelengths_per_channel as usize;
+    let values = scene.channels.len() * scene.integrator.wavelengths_per_channel.unwrap_or(1) as usize;
     match scene.integrator.evaluator {
         // Its state is that of every wavelength.
         Evaluator::Auto if !software && values <= MOST_PT_CHANNELS => Evaluator::Pt,

@@ -199,7 +199,7 @@ impl Prepared {
             factors: ids.factors.len(),
             sources: ids.sources.len(),
             channels: scene.channels.len(),
-            wavelengths_per_channel: scene.integrator.wavelengths_per_channel,
+            wavelengths_per_channel: scene.integrator.wavelengths_per_channel.unwrap_or(1),
             path_weight: ids.path_weight.map(|position| tables.ids[position]),
             integration,
             separable,

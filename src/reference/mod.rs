@@ -151,7 +151,7 @@ mod tests {
                 russian_roulette_start: 1,
                 sampler: Sampler::Independent,
                 wavelengths: Wavelengths::Uniform,
-                wavelengths_per_channel: 1,
+                wavelengths_per_channel: Some(1),
                 techniques: None,
                 evaluation: Evaluation::All,
                 evaluator: Evaluator::Auto,

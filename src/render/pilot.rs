@@ -1,6 +1,7 @@
-//! What a few samples of a scene decide before it is rendered: which of its paths are worth being evaluated in every channel.
+//! What a few samples of a scene decide before it is rendered: at how many wavelengths of a channel paths are evaluated, and which of
+//! them are worth it.
 //!
-//! The theory is in docs/METHOD.md, Roulette on evaluation. Nothing here looks at a clock: what paths cost is known by the kind of
+//! The theory is in docs/METHOD.md, Several wavelengths a channel and Roulette on evaluation. Nothing here looks at a clock: what paths cost is known by the kind of
 //! device, how they vary is measured on paths that are never counted in the picture, so that the choice is the same every time.
 
 use std::sync::Arc;
@@ -9,12 +10,12 @@ use crate::cube::Choices;
 use crate::device::evaluator::evaluation_cost;
 use crate::device::parts::paths::{Thinning, representatives, tried_channels};
 use crate::device::prepared::Prepared;
-use crate::device::words::MOST_WEIGHT;
+use crate::device::words::{LOOP_LIMIT, MOST_WEIGHT};
 use crate::gpu::adapter::Gpu;
 use crate::render::interrupt::Interrupt;
 use crate::render::wave::Budget;
 use crate::render::worker::{UnitRect, Worker};
-use crate::scene::{Evaluation, Evaluator, Film, Scene};
+use crate::scene::{Evaluation, Evaluator, Film, MOST_WAVELENGTHS, Scene};
 use crate::{Error, Result};
 
 /// Pixels of the pilot, all over the film.
@@ -41,62 +42,241 @@ const LEAST_GAIN: f64 = 1.1;
 /// the very most, and usually nothing.
 const LEAST_COST: f64 = 0.25;
 
+/// Wavelengths of a channel that the pilot compares with one.
+const TRIED_WAVELENGTHS: u32 = 4;
+/// Where evaluating a path at one wavelength costs this share of generating it, `auto` takes one: there are so many channels that
+/// each is narrow, and two would cost half as much again.
+const MOST_COST_OF_ONE: f64 = 1.0;
+/// Variance within a channel, over the square of the mean, that some spectrum must have for `auto` to ask samples.
+const LEAST_VARIATION: f64 = 0.05;
+
 /// Whether there is something to decide: `pt` evaluates while it traces, and factored renders evaluate nothing.
 pub fn is_needed(scene: &Scene, prepared: &Prepared) -> bool {
-    let is_deferred = !matches!(prepared.evaluator, Evaluator::Pt | Evaluator::Factored);
-    scene.integrator.evaluation != Evaluation::All && is_deferred
+    may_thin(scene, prepared) || (is_deferred(prepared) && scene.integrator.wavelengths_per_channel.is_none())
 }
 
-/// `prepared` with what was chosen for `scene`: by the cube that is gone on with (`there`), else by rule, else by samples on the first of
-/// `gpus` that can take them. Those that cannot leave the list, which is warned of, as long as there are others.
-pub fn decide(
-    scene: &Scene,
-    prepared: Prepared,
-    there: Option<Choices>,
-    gpus: &mut Vec<Gpu>,
-    memory: Option<u64>,
-    interrupt: &Arc<Interrupt>,
-    warn: &mut dyn FnMut(String) -> Result<()>,
-) -> Result<(Arc<Prepared>, Option<Choices>)> {
-    let mut prepared = Arc::new(prepared);
-    if !is_needed(scene, &prepared) {
-        return Ok((prepared, None));
+/// Whether roulette may leave out paths.
+pub fn may_thin(scene: &Scene, prepared: &Prepared) -> bool {
+    is_deferred(prepared) && scene.integrator.evaluation != Evaluation::All
+}
+
+fn is_deferred(prepared: &Prepared) -> bool {
+    !matches!(prepared.evaluator, Evaluator::Pt | Evaluator::Factored)
+}
+
+/// What a pilot works with.
+pub struct Pilot<'a> {
+    pub scene: &'a Scene,
+    /// The first that can follows its paths. Those that cannot leave the list, which is warned of, as long as there are others.
+    pub gpus: &'a mut Vec<Gpu>,
+    /// Most that a device may use, bytes.
+    pub memory: Option<u64>,
+    pub interrupt: &'a Arc<Interrupt>,
+    pub warn: &'a mut dyn FnMut(String) -> Result<()>,
+}
+
+impl Pilot<'_> {
+    /// `prepared` with what was chosen for the scene: by the cube that is gone on with (`there`), else by rule, else by samples.
+    pub fn decide(mut self, prepared: Prepared, there: Option<Choices>) -> Result<(Arc<Prepared>, Option<Choices>)> {
+        let mut prepared = Arc::new(prepared);
+        if !is_needed(self.scene, &prepared) {
+            return Ok((prepared, None));
+        }
+        let choices = match there {
+            Some(choices) => {
+                set_wavelengths(&mut prepared, choices.wavelengths_per_channel)?;
+                choices
+            }
+            None => {
+                let several = self.wavelengths(&mut prepared)?;
+                set_wavelengths(&mut prepared, several.count)?;
+                several.and(self.paths(&prepared)?)
+            }
+        };
+        let asked = self.scene.integrator.evaluation;
+        if asked == Evaluation::Roulette && choices.scale.is_none() {
+            let what = "integrator.evaluation = \"roulette\", but all paths are evaluated";
+            (self.warn)(format!("{what}: {}", choices.reason))?;
+        }
+        if let Some(scale) = choices.scale {
+            if choices.mean_radiance.len() != prepared.channels {
+                return Err(Error::Internal("what was chosen for the cube is for other channels than it has".into()));
+            }
+            let thinning = Thinning::new(&prepared, scale, &choices.mean_radiance);
+            Arc::get_mut(&mut prepared).ok_or_else(kept)?.thinning = Some(thinning);
+        }
+        Ok((prepared, Some(choices)))
     }
-    let choices = match there.or_else(|| by_rule(scene, &prepared, gpus[0].is_software)) {
-        Some(choices) => choices,
-        None => loop {
-            let gpu = Arc::new(gpus.remove(0));
-            match choose(&gpu, &prepared, scene, memory, interrupt) {
-                Ok(choices) => {
-                    gpus.insert(0, Arc::into_inner(gpu).ok_or_else(kept)?);
-                    break choices;
+
+    /// At how many wavelengths of each channel paths are evaluated.
+    fn wavelengths(&mut self, prepared: &mut Arc<Prepared>) -> Result<Several> {
+        if let Some(count) = self.scene.integrator.wavelengths_per_channel {
+            return Ok(Several { count, gain: 1.0, reason: AS_ASKED.into() });
+        }
+        let cost = evaluation_cost(prepared, self.gpus[0].is_software);
+        if let Some(reason) = one_by_rule(self.scene, prepared, cost) {
+            return Ok(Several { count: 1, gain: 1.0, reason });
+        }
+        self.on_a_device(|pilot, gpu| {
+            let mut variances = |count| {
+                set_wavelengths(prepared, count)?;
+                let mut worker = worker(gpu, prepared, pilot.memory, pilot.interrupt)?;
+                net_variances(&mut worker, prepared.channels, pilot.scene)
+            };
+            let (one, tried) = (variances(1)?, variances(TRIED_WAVELENGTHS)?);
+            let each = prepared.path_iterations() / TRIED_WAVELENGTHS;
+            let counts =
+                (0..=MOST_WAVELENGTHS.ilog2()).map(|bits| 1 << bits).filter(|count| each * count <= LOOP_LIMIT);
+            Ok(Several::of(counts, &one, &tried, cost))
+        })
+    }
+
+    /// Which paths are evaluated.
+    fn paths(&mut self, prepared: &Arc<Prepared>) -> Result<Choices> {
+        if self.scene.integrator.evaluation == Evaluation::All {
+            return Ok(all(AS_ASKED.into(), 0, Vec::new()));
+        }
+        if let Some(choices) = all_by_rule(self.scene, prepared, self.gpus[0].is_software) {
+            return Ok(choices);
+        }
+        self.on_a_device(|pilot, gpu| choose(gpu, prepared, pilot.scene, pilot.memory, pilot.interrupt))
+    }
+
+    /// Lends the first device that can do `work`.
+    fn on_a_device<T>(&mut self, mut work: impl FnMut(&Self, &Arc<Gpu>) -> Result<T>) -> Result<T> {
+        loop {
+            let gpu = Arc::new(self.gpus.remove(0));
+            match work(self, &gpu) {
+                Ok(done) => {
+                    self.gpus.insert(0, Arc::into_inner(gpu).ok_or_else(kept)?);
+                    return Ok(done);
                 }
-                Err(error) if error.may_be_of_one_device() && !gpus.is_empty() => {
-                    warn(format!("a device is left out: {error}"))?;
+                Err(error) if error.may_be_of_one_device() && !self.gpus.is_empty() => {
+                    (self.warn)(format!("a device is left out: {error}"))?;
                 }
                 Err(error) => return Err(error),
             }
-        },
-    };
-    if scene.integrator.evaluation == Evaluation::Roulette && choices.scale.is_none() {
-        warn(format!("integrator.evaluation = \"roulette\", but all paths are evaluated: {}", choices.reason))?;
-    }
-    if let Some(scale) = choices.scale {
-        if choices.mean_radiance.len() != prepared.channels {
-            return Err(Error::Internal("what was chosen for the cube is for other channels than it has".into()));
         }
-        let thinning = Thinning::new(&prepared, scale, &choices.mean_radiance);
-        Arc::get_mut(&mut prepared).ok_or_else(kept)?.thinning = Some(thinning);
     }
-    Ok((prepared, Some(choices)))
+}
+
+fn worker(gpu: &Arc<Gpu>, prepared: &Arc<Prepared>, memory: Option<u64>, interrupt: &Arc<Interrupt>) -> Result<Worker> {
+    let budget = Budget { memory, paths: None };
+    let mut worker = Worker::new(Arc::clone(gpu), Arc::clone(prepared), [1, 1], budget)?;
+    worker.watch(interrupt);
+    Ok(worker)
+}
+
+/// Follows the paths of the pilot on `gpu` and chooses which of a render's are evaluated.
+pub fn choose(
+    gpu: &Arc<Gpu>,
+    prepared: &Arc<Prepared>,
+    scene: &Scene,
+    memory: Option<u64>,
+    interrupt: &Arc<Interrupt>,
+) -> Result<Choices> {
+    let trial = Trial::run(&mut worker(gpu, prepared, memory, interrupt)?, prepared, scene)?;
+    let cost = evaluation_cost(prepared, gpu.is_software);
+    Ok(trial.choose(cost, scene.integrator.evaluation == Evaluation::Roulette))
+}
+
+/// The reason for what a scene has chosen itself.
+const AS_ASKED: &str = "as the scene says";
+
+fn set_wavelengths(prepared: &mut Arc<Prepared>, count: u32) -> Result<()> {
+    Arc::get_mut(prepared).ok_or_else(kept)?.wavelengths_per_channel = count;
+    Ok(())
+}
+
+/// At how many wavelengths of each channel paths are evaluated, and why.
+struct Several {
+    count: u32,
+    gain: f64,
+    reason: String,
+}
+
+impl Several {
+    /// The one among `counts` that is expected to bring most, by variances of each channel with one wavelength and with
+    /// [`TRIED_WAVELENGTHS`]; evaluating at one costs `cost` of generating a path. Of m the noise within a channel falls as 1/m at
+    /// least: V(m) = V_p + V_l / m (docs/METHOD.md, Several wavelengths a channel).
+    fn of(counts: impl Iterator<Item = u32>, one: &[f64], tried: &[f64], cost: f64) -> Several {
+        let lit: Vec<(f64, f64)> =
+            one.iter().copied().zip(tried.iter().copied()).filter(|(one, _)| *one > 0.0).collect();
+        let tried = f64::from(TRIED_WAVELENGTHS);
+        let gain = |count: u32| {
+            let m = f64::from(count);
+            let grown = lit.iter().map(|&(one, several)| {
+                let within = ((one - several) * tried / (tried - 1.0)).clamp(0.0, one);
+                (one - within + within / m) / one
+            });
+            let mean = grown.sum::<f64>() / lit.len() as f64;
+            // To whole percents: so that what differs in the last bits chooses the same.
+            ((1.0 + cost) / (1.0 + m * cost) / mean.max(1e-3) * 100.0).round() / 100.0
+        };
+        // Of equal gains the fewest.
+        let best = counts.filter(|_| !lit.is_empty()).map(|count| (count, gain(count)));
+        let best = best.fold((1, 1.0), |best, found| if found.1 > best.1 { found } else { best });
+        match best {
+            (count, gain) if count > 1 && gain >= LEAST_GAIN => {
+                Several { count, gain, reason: format!("evaluating a path once costs {cost:.2} of generating it") }
+            }
+            (_, gain) => Several { count: 1, gain: 1.0, reason: format!("several would bring {gain:.2}, too little") },
+        }
+    }
+
+    /// What both choices are together.
+    fn and(self, paths: Choices) -> Choices {
+        let Several { count, gain, reason } = self;
+        Choices { wavelengths_per_channel: count, wavelengths_gain: gain, wavelengths_reason: reason, ..paths }
+    }
+}
+
+/// Why one wavelength a channel is enough, where no sample needs to be asked.
+fn one_by_rule(scene: &Scene, prepared: &Prepared, cost: f64) -> Option<String> {
+    if prepared.surfaces.as_ref().is_some_and(|surfaces| surfaces.dispersion) {
+        return Some("behind dispersion a path counts at its own wavelength only".into());
+    }
+    if prepared.path_iterations().saturating_mul(TRIED_WAVELENGTHS) > LOOP_LIMIT {
+        return Some("one evaluation of a path is as long as a loop may be".into());
+    }
+    if cost >= MOST_COST_OF_ONE {
+        return Some(format!("evaluating a path once costs {cost:.2} of generating it"));
+    }
+    // Wavelengths that are drawn by emission make that even.
+    let drawn = if prepared.warp.bits() > 0 { sources(scene) } else { Vec::new() };
+    let curves = (0..scene.spectra.len()).filter(|spectrum| !drawn.contains(spectrum));
+    let varies = |spectrum: usize| {
+        let bounds = &scene.channels.bounds;
+        bounds.iter().any(|b| scene.spectra[spectrum].curve.variation(b[0], b[1]) > LEAST_VARIATION)
+    };
+    let none = !curves.into_iter().any(varies);
+    none.then(|| "no spectrum varies by much within a channel".into())
+}
+
+/// Spectra of what emits.
+fn sources(scene: &Scene) -> Vec<usize> {
+    let surfaces = scene.objects.iter().filter_map(|object| Some(object.emission.as_ref()?.radiance));
+    let lights = scene.lights.iter().map(|light| light.spectrum());
+    surfaces.chain(lights).chain(scene.environment.iter().filter_map(|sky| sky.uniform())).collect()
+}
+
+/// Of each channel: variance of a sample as the nets of the render's sampler make it, from the difference of two.
+fn net_variances(worker: &mut Worker, channels: usize, scene: &Scene) -> Result<Vec<f64>> {
+    let (units, net) = (pixels(&scene.film), scene.integrator.epoch.min(LARGEST_NET));
+    let some = &units[..units.len().min((NET_SAMPLES / net) as usize)];
+    let mut nets = Vec::new();
+    for i in 0..2 {
+        nets.push(values(worker, some, FIRST_EPOCH + SINGLES + i, net)?);
+    }
+    Ok(differences(&nets[0], &nets[1], channels, net))
 }
 
 fn kept() -> Error {
     Error::Internal("the pilot kept what it was lent".into())
 }
 
-/// Where no sample needs to be asked.
-fn by_rule(scene: &Scene, prepared: &Prepared, software: bool) -> Option<Choices> {
+/// All paths, where no sample needs to be asked.
+fn all_by_rule(scene: &Scene, prepared: &Prepared, software: bool) -> Option<Choices> {
     let reason = if prepared.surfaces.as_ref().is_some_and(|surfaces| surfaces.dispersion) {
         "dispersion leaves paths to one channel each, of which the few that they are tried in do not tell".to_owned()
     } else {
@@ -110,23 +290,18 @@ fn by_rule(scene: &Scene, prepared: &Prepared, software: bool) -> Option<Choices
 }
 
 fn all(reason: String, samples: u32, mean_radiance: Vec<f64>) -> Choices {
-    Choices { reason, scale: None, evaluated: 1.0, gain: 1.0, variance: 1.0, samples, mean_radiance }
-}
-
-/// Follows the paths of the pilot on `gpu` and chooses.
-pub fn choose(
-    gpu: &Arc<Gpu>,
-    prepared: &Arc<Prepared>,
-    scene: &Scene,
-    memory: Option<u64>,
-    interrupt: &Arc<Interrupt>,
-) -> Result<Choices> {
-    let budget = Budget { memory, paths: None };
-    let mut worker = Worker::new(Arc::clone(gpu), Arc::clone(prepared), [1, 1], budget)?;
-    worker.watch(interrupt);
-    let trial = Trial::run(&mut worker, prepared, &scene.film, scene.integrator.epoch.min(LARGEST_NET))?;
-    let cost = evaluation_cost(prepared, gpu.is_software);
-    Ok(trial.choose(cost, scene.integrator.evaluation == Evaluation::Roulette))
+    Choices {
+        wavelengths_per_channel: 1,
+        wavelengths_gain: 1.0,
+        wavelengths_reason: String::new(),
+        reason,
+        scale: None,
+        evaluated: 1.0,
+        gain: 1.0,
+        variance: 1.0,
+        samples,
+        mean_radiance,
+    }
 }
 
 /// The pilot's pixels, in the coordinates of the full film: all where they are few, else points of Roberts' R2 sequence
@@ -160,9 +335,9 @@ struct Trial {
 }
 
 impl Trial {
-    /// `net`: samples of a full epoch of the render.
-    fn run(worker: &mut Worker, prepared: &Prepared, film: &Film, net: u32) -> Result<Trial> {
-        let (units, count) = (pixels(film), prepared.channels);
+    fn run(worker: &mut Worker, prepared: &Prepared, scene: &Scene) -> Result<Trial> {
+        let (units, count) = (pixels(&scene.film), prepared.channels);
+        let net = scene.integrator.epoch.min(LARGEST_NET);
         let representatives = representatives(prepared);
         let even = (0..count.min(MOST_CHANNELS)).map(|i| i * count / count.min(MOST_CHANNELS));
         let mut channels: Vec<usize> = even.chain(representatives.iter().copied()).collect();
@@ -234,13 +409,11 @@ impl Trial {
                 all(format!("roulette would bring {:.2}, too little", expected.gain), self.samples, self.means)
             }
             Some((scale, expected)) => Choices {
-                reason: format!("evaluating a path costs {cost:.2} of generating it"),
                 scale: Some(scale),
                 evaluated: expected.evaluated,
                 gain: expected.gain,
                 variance: expected.variance,
-                samples: self.samples,
-                mean_radiance: self.means,
+                ..all(format!("evaluating a path costs {cost:.2} of generating it"), self.samples, self.means)
             },
         }
     }
@@ -304,15 +477,22 @@ impl Samples<'_> {
 fn share_of_nets(singles: &Samples, first: &[f32], second: &[f32], net: u32) -> f64 {
     let kept = singles.channels;
     let pixels = first.len() / kept;
-    let mut squares = vec![0.0; kept];
-    for (a, b) in first.chunks(kept).zip(second.chunks(kept)) {
-        for (square, (a, b)) in squares.iter_mut().zip(a.iter().zip(b)) {
-            *square += 0.5 * f64::from(a - b).powi(2) * f64::from(net) / pixels as f64;
-        }
-    }
+    let squares = differences(first, second, kept, net);
     let of_paths = singles.variances(pixels);
     let shares: Vec<f64> = squares.iter().zip(&of_paths).filter(|(_, v)| **v > 0.0).map(|(s, v)| s / v).collect();
     if shares.is_empty() { 1.0 } else { (shares.iter().sum::<f64>() / shares.len() as f64).clamp(1e-4, 1.0) }
+}
+
+/// Variance of a sample of each channel, mean over the pixels, by two means of a `net`.
+fn differences(first: &[f32], second: &[f32], channels: usize, net: u32) -> Vec<f64> {
+    let pixels = (first.len() / channels) as f64;
+    let mut squares = vec![0.0; channels];
+    for (a, b) in first.chunks(channels).zip(second.chunks(channels)) {
+        for (square, (a, b)) in squares.iter_mut().zip(a.iter().zip(b)) {
+            *square += 0.5 * f64::from(a - b).powi(2) * f64::from(net) / pixels;
+        }
+    }
+    squares
 }
 
 struct Expected {

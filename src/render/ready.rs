@@ -9,6 +9,7 @@ use crate::gpu::adapter::Gpu;
 use crate::render::interrupt::Interrupt;
 use crate::render::job::Job;
 use crate::render::last_bounce::LastBounce;
+use crate::render::pilot::Pilot;
 use crate::render::schedule::Event;
 use crate::render::wave::{Budget, WavePlan};
 use crate::render::worker::device_limits;
@@ -60,10 +61,14 @@ pub(super) fn get_ready(
     let prepared = Prepared::for_evaluator(&job.scene, job.seed, evaluator)?;
     refuse_too_little(job, &prepared, tile, &gpus)?;
     let there = there.map(|_| Choices::read(&job.output)).transpose()?.flatten();
-    let (prepared, choices) =
-        pilot::decide(&job.scene, prepared, there, &mut gpus, job.memory, interrupt, &mut |what| {
-            observe(Event::Warning(what))
-        })?;
+    let pilot = Pilot {
+        scene: &job.scene,
+        gpus: &mut gpus,
+        memory: job.memory,
+        interrupt,
+        warn: &mut |what| observe(Event::Warning(what)),
+    };
+    let (prepared, choices) = pilot.decide(prepared, there)?;
     let first = Arc::new(gpus.remove(0));
     let last_bounce = LastBounce::measure(&job.scene, &prepared, &first, job.memory, interrupt);
     gpus.insert(0, Arc::into_inner(first).ok_or_else(|| Error::Internal("a device was kept that was lent".into()))?);
@@ -87,7 +92,7 @@ pub(super) fn get_ready(
 /// Refuses memory that holds the waves of no device, before a pilot's smaller ones fill it.
 fn refuse_too_little(job: &Job, prepared: &Prepared, tile: [u32; 2], gpus: &[Gpu]) -> Result<()> {
     let budget = Budget { memory: job.memory, paths: None };
-    let thinned = pilot::is_needed(&job.scene, prepared);
+    let thinned = pilot::may_thin(&job.scene, prepared);
     let plans = gpus.iter().map(|gpu| WavePlan::with_thinning(prepared, tile, device_limits(gpu), budget, thinned));
     let mut refusals = Vec::new();
     for plan in plans {

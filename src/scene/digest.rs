@@ -177,10 +177,14 @@ impl Hash {
         });
         self.text(evaluator.name());
         self.counts([epoch]);
-        // Nothing of what is usual, so that other scenes keep their digests.
-        if *wavelengths_per_channel > 1 {
-            self.text("wavelengths per channel");
-            self.counts([wavelengths_per_channel]);
+        // Nothing of what was usual when they came, so that scenes that ask for that keep their digests.
+        match wavelengths_per_channel {
+            Some(1) => {}
+            Some(count) => {
+                self.text("wavelengths per channel");
+                self.counts([count]);
+            }
+            None => self.text("wavelengths per channel as it pays"),
         }
         if let Some(techniques) = techniques {
             self.text("techniques");

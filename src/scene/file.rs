@@ -26,7 +26,7 @@ const MAX_BOUNCES: u32 = 16_383;
 const MAX_EPOCH: u32 = 1024;
 /// Of spectral MIS: the state of a path has a number for each.
 const MOST_TECHNIQUES: u32 = 16;
-const MOST_WAVELENGTHS: u32 = 16;
+pub const MOST_WAVELENGTHS: u32 = 16;
 
 /// Reads the scene in `file`. `overrides` are the `--set` arguments: a dotted key and the text of a TOML value; a bare
 /// word is a string.
@@ -161,7 +161,7 @@ impl Default for Integrator {
             russian_roulette_start: 0,
             sampler: Sampler::Sobol,
             wavelengths: Wavelengths::Emission,
-            wavelengths_per_channel: 1,
+            wavelengths_per_channel: None,
             techniques: None,
             evaluation: Evaluation::Auto,
             evaluator: Evaluator::Auto,
@@ -199,10 +199,13 @@ fn decode_integrator(item: &Item) -> Option<Integrator> {
         }),
         None => Some(default),
     };
-    let wavelengths_per_channel =
-        power_of_two("wavelengths_per_channel", MOST_WAVELENGTHS, default.wavelengths_per_channel);
+    let is_auto = |item: &Item| matches!(&item.node.value, Value::String(word) if word == "auto");
+    let wavelengths_per_channel = match fields.get("wavelengths_per_channel").filter(|item| !is_auto(item)) {
+        Some(_) => power_of_two("wavelengths_per_channel", MOST_WAVELENGTHS, 1).map(Some),
+        None => Some(default.wavelengths_per_channel),
+    };
     let techniques = match fields.get("techniques") {
-        Some(item) if matches!(&item.node.value, Value::String(word) if word == "auto") => Some(None),
+        Some(item) if is_auto(&item) => Some(None),
         Some(item) => item.whole(1..=MOST_TECHNIQUES).map(Some),
         None => Some(default.techniques),
     };

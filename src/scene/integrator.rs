@@ -10,8 +10,10 @@ pub struct Integrator {
     pub russian_roulette_start: u32,
     pub sampler: Sampler,
     pub wavelengths: Wavelengths,
-    /// At how many wavelengths of each channel a path is evaluated, a power of two up to 16.
-    pub wavelengths_per_channel: u32,
+    /// At how many wavelengths of each channel a path is evaluated, a power of two up to 16; `None`: as a few samples of the scene tell
+    /// before it is rendered. Cubes made before there was a choice say nothing of it, and have 1.
+    #[serde(default = "one", with = "auto")]
+    pub wavelengths_per_channel: Option<u32>,
     /// How many techniques decide where light goes that matter scatters (docs/METHOD.md, Techniques), 1 to 16; `None`: as many as
     /// its channels differ.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -107,4 +109,33 @@ pub enum Wavelengths {
     Uniform,
     /// From the emitters' own spectral density in each channel, see [`crate::spectral::warp`].
     Emission,
+}
+
+fn one() -> Option<u32> {
+    Some(1)
+}
+
+/// A number, or `"auto"`.
+mod auto {
+    use serde::de::Error;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    #[derive(Serialize, Deserialize)]
+    #[serde(untagged)]
+    enum Written {
+        Number(u32),
+        Word(String),
+    }
+
+    pub fn serialize<S: Serializer>(number: &Option<u32>, to: S) -> Result<S::Ok, S::Error> {
+        number.map_or_else(|| Written::Word("auto".into()), Written::Number).serialize(to)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Option<u32>, D::Error> {
+        match Written::deserialize(from)? {
+            Written::Number(number) => Ok(Some(number)),
+            Written::Word(word) if word == "auto" => Ok(None),
+            Written::Word(word) => Err(D::Error::custom(format!("{word:?} is neither a number nor \"auto\""))),
+        }
+    }
 }

@@ -149,6 +149,22 @@ impl Curve {
         }
     }
 
+    /// The variance of the values over [from, to] nm, over the square of their mean; 0 where that is 0.
+    pub fn variation(&self, from: f64, to: f64) -> f64 {
+        let mean = self.mean(from, to);
+        if !mean.is_normal() {
+            return 0.0;
+        }
+        let square = match self.linear_pieces(from, to) {
+            Some(nodes) => {
+                let of = |a: f64, b: f64| (a * a + a * b + b * b) / 3.0;
+                nodes.windows(2).map(|w| (w[1].0 - w[0].0) * of(w[0].1, w[1].1)).sum::<f64>() / (to - from)
+            }
+            None => mean_smooth(|nm| self.eval(nm).powi(2), from, to),
+        };
+        (square / (mean * mean) - 1.0).max(0.0)
+    }
+
     /// The curve times `factor`.
     pub fn scaled(&self, factor: f64) -> Curve {
         match self {

@@ -82,7 +82,7 @@ fn the_same_paths_give_the_same_means() {
         scene
     };
     let several = |mut scene: Scene| {
-        scene.integrator.wavelengths_per_channel = 4;
+        scene.integrator.wavelengths_per_channel = Some(4);
         scene
     };
     let mut far = 0.0f64;

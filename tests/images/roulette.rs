@@ -81,7 +81,7 @@ fn the_means_are_those_of_all_paths() {
     assert!(grown.iter().all(|grown| *grown > 2.0), "most paths were dropped: {grown:?}");
     compare("everything", &hot(5), 0.1, 32, 0.1);
     let mut several = plain(3);
-    several.integrator.wavelengths_per_channel = 4;
+    several.integrator.wavelengths_per_channel = Some(4);
     compare("several wavelengths", &several, 0.1, 32, 0.1);
     if size::is_full() {
         compare("many channels", &plain(150), 0.2, 16, 0.1);

@@ -104,7 +104,7 @@ fn a_lamp_of_lines_in_few_channels() {
 
 fn several(scene: &Scene, count: u32) -> Scene {
     let mut scene = scene.clone();
-    scene.integrator.wavelengths_per_channel = count;
+    scene.integrator.wavelengths_per_channel = Some(count);
     scene
 }
 

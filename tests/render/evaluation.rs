@@ -1,4 +1,4 @@
-//! Which paths are evaluated: decided once, kept with the cube, adopted by whoever goes on.
+//! Which paths are evaluated, and at how many wavelengths: decided once, kept with the cube, adopted by whoever goes on.
 
 use std::fs;
 
@@ -8,6 +8,33 @@ use super::{Place, arrays, text};
 
 /// So many channels that it is worth a thought.
 const MANY: &[&str] = &["--tile", "8", "--set", "channels.equal.count=120"];
+const COMB: &str = r#"
+[camera.perspective]
+position = [0, -3, 2]
+look_at = [0, 0, 0]
+up = [0, 0, 1]
+fov = 40
+
+[film]
+width = 16
+height = 16
+
+[channels]
+equal = { from = 400.0, to = 700.0, count = 4 }
+
+[integrator]
+max_bounces = 1
+
+[environment]
+radiance = 1.0
+
+[materials.comb.diffuse]
+reflectance = { samples = [TEETH] }
+
+[[objects]]
+disk = { center = [0, 0, 0], normal = [0, 0, 1], radius = 100 }
+material = "comb"
+"#;
 const ROULETTE: &[&str] = &["--set", "integrator.evaluation=roulette"];
 
 fn choices(place: &Place, name: &str) -> Option<Value> {
@@ -62,7 +89,13 @@ fn few_channels_need_no_pilot() {
     let chosen = choices(&place, "auto.zarr").expect("a choice");
     assert_eq!((&chosen["scale"], &chosen["samples"]), (&Value::Null, &Value::from(0)), "{chosen}");
     assert!(chosen["reason"].as_str().is_some_and(|reason| reason.contains("too little to save")), "{chosen}");
-    assert_eq!(choices(&place, "all.zarr"), None);
+    let smooth = "no spectrum varies by much within a channel";
+    assert_eq!((&chosen["wavelengths_per_channel"], &chosen["wavelengths_reason"]), (&Value::from(1), &smooth.into()));
+    // Of two choices one is made by the scene, or both.
+    assert_eq!(choices(&place, "all.zarr").expect("a choice")["reason"], "as the scene says");
+    let one = ["--spp", "4", "--set", "integrator.evaluation=all", "--set", "integrator.wavelengths_per_channel=1"];
+    assert!(radiance(arrays(&place.render("one.zarr", &one))) == radiance(arrays(&place.cube("all.zarr"))));
+    assert_eq!(choices(&place, "one.zarr"), None);
     // `pt` evaluates while it traces.
     place.render("pt.zarr", &[ROULETTE, &["--spp", "1", "--set", "integrator.evaluator=pt"]].concat());
     assert_eq!(choices(&place, "pt.zarr"), None);
@@ -72,15 +105,57 @@ fn few_channels_need_no_pilot() {
     assert!(text(&output.stderr).contains("all paths are evaluated: channel 0 was dark"), "{}", text(&output.stderr));
 }
 
+/// A comb painted on a floor under an even sky, whose paths differ by their wavelengths and little else: several are chosen, by every way
+/// of rendering the cube, and what is expected comes.
+#[test]
+fn several_wavelengths_are_chosen_where_they_pay() {
+    let teeth: Vec<String> = (0..=150).map(|i| format!("[{}, {}]", 400 + 2 * i, [0.05, 0.9][i % 2])).collect();
+    let place = Place::of(&COMB.replace("TEETH", &teeth.join(", ")));
+    let render = |name: &str, more: &[&str]| arrays(&place.render(name, &[&["--uncertainty"], more].concat()));
+    let straight = render("comb.zarr", &["--spp", "256"]);
+    let chosen = choices(&place, "comb.zarr").expect("a choice");
+    let (count, gain) = (&chosen["wavelengths_per_channel"], chosen["wavelengths_gain"].as_f64().expect("a number"));
+    assert!(count.as_u64() > Some(1) && gain > 1.1, "{chosen}");
+    render("resumed.zarr", &["--spp", "4"]);
+    assert!(render("resumed.zarr", &["--spp", "256", "--resume", "--devices", "2"]) == straight);
+    // As if it had been asked for.
+    let same = format!("integrator.wavelengths_per_channel={count}");
+    let radiance = |mut files: crate::cube_files::Files| {
+        files.retain(|name, _| name.starts_with("radiance/c"));
+        files
+    };
+    assert!(radiance(render("asked.zarr", &["--spp", "256", "--set", &same])) == radiance(straight));
+    let errors = |name: &str| {
+        let (info, _) = place.success(&["info", name, "--json"]);
+        let info: Value = serde_json::from_str(info.lines().last().expect("an event")).expect("JSON");
+        let of = |channel: &Value| channel["error_estimate"].as_f64().expect("a number").powi(2);
+        info["channels"].as_array().expect("channels").iter().map(of).sum::<f64>()
+    };
+    render("one.zarr", &["--spp", "256", "--set", "integrator.wavelengths_per_channel=1"]);
+    let (one, several) = (errors("one.zarr"), errors("comb.zarr"));
+    println!("{count} wavelengths: variance {:.3} of that with one, {gain} expected", several / one);
+    // Evaluation costs next to nothing here, so that the gain is nearly the variance that goes, by 1/m at least.
+    assert!(several * gain < 1.2 * one, "{several} {one}");
+}
+
 #[test]
 fn a_plan_decides_where_it_is_asked_to() {
     let place = Place::new();
     let plan = [&["plan", "scene.toml"], MANY, ROULETTE].concat();
     let (undecided, _) = place.success(&plan);
-    assert!(undecided.contains("\npaths     which are worth evaluating is decided by samples"), "{undecided}");
+    assert!(
+        undecided
+            .contains("\npaths     which are worth evaluating, and at how many wavelengths, is decided by samples"),
+        "{undecided}"
+    );
     let (decided, _) = place.success(&[&plan[..], &["--pilot"]].concat());
     assert!(decided.contains("\npaths     roulette: a path that brings the mean"), "{decided}");
     assert!(decided.contains("\nused") && decided.contains("roulette on evaluation ("), "{decided}");
-    let (plain, _) = place.success(&["plan", "scene.toml", "--set", "integrator.evaluation=all"]);
-    assert!(!plain.contains("\npaths "), "{plain}");
+    assert!(decided.contains("\nper path  1 a channel and path ("), "{decided}");
+    let asked = ["--set", "integrator.evaluation=all", "--set", "integrator.wavelengths_per_channel=2"];
+    let (plain, _) = place.success(&[&["plan", "scene.toml"][..], &asked].concat());
+    assert!(
+        !plain.contains("\npaths ") && plain.contains("several wavelengths a channel (every path is evaluated at 2)"),
+        "{plain}"
+    );
 }

@@ -21,7 +21,8 @@ pub const SEVERAL: Part = Part {
     defines: |scene, work, defines| {
         let count = scene.wavelengths_per_channel;
         match work {
-            Work::Generate => _ = defines.constant("WAVELENGTH_BITS", count.ilog2()),
+            // No constant: kernels that know nothing of it stay what they are.
+            Work::Generate => _ = defines.set("WAVELENGTH_BITS", count.ilog2()),
             Work::Evaluate => {
                 defines.constant("WAVELENGTHS", count);
                 // As far apart as the whole of μ, 2^32, allows.

@@ -439,11 +439,13 @@ pub static INTEGRATOR: Section = Section {
         Key::default(
             "wavelengths_per_channel",
             Whole,
-            "1",
+            "\"auto\"",
             "At how many wavelengths of every channel a path is evaluated, evenly spread: less noise where spectra vary within a \
              channel (lines of gases, narrow reflectances), for as much more time in evaluation \
-             ([METHOD.md](METHOD.md#several-wavelengths-a-channel)).",
+             ([METHOD.md](METHOD.md#several-wavelengths-a-channel)). `auto` asks a few samples before the render begins, where spectra \
+             vary enough, and takes more than one where that is expected to pay; the cube remembers. `pt` takes one.",
         )
+        .or("`\"auto\"`")
         .range("[1, 16], a power of two"),
         Key::default(
             "techniques",

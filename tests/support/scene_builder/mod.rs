@@ -28,7 +28,7 @@ impl Builder {
                 russian_roulette_start: 0,
                 sampler: Sampler::Independent,
                 wavelengths: Wavelengths::Emission,
-                wavelengths_per_channel: 1,
+                wavelengths_per_channel: Some(1),
                 techniques: None,
                 evaluation: Evaluation::All,
                 evaluator: Evaluator::Auto,
