@@ -222,6 +222,8 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         Some(_) => export::BLOCKS.check_target(&args.output)?,
         None => format.check_target(&args.output)?,
     }
+    // Before anything is written: it fails where a file of the cube is gone.
+    let missing = missing(&cube)?;
     let files = write(args, &view, format, output)?;
     if let (export::Format::Envi { .. }, None) = (format, args.blocks)
         && let Some(other) = export::other_header(&args.output)
@@ -241,7 +243,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
             image.display()
         ))?;
     }
-    report(args, &view, format, &files, output)
+    report(args, &view, format, &files, missing, output)
 }
 
 /// What is said about an export: beside it, where that itself has the standard output.
@@ -363,11 +365,18 @@ fn write(args: &Args, view: &View, format: export::Format, output: &Said) -> Res
     })
 }
 
-fn report(args: &Args, view: &View, format: export::Format, written: &[PathBuf], output: &Said) -> Result<()> {
-    let progress = view.cube().progress()?;
-    let missing = progress.tiles - progress.tiles_started;
+fn report(
+    args: &Args,
+    view: &View,
+    format: export::Format,
+    written: &[PathBuf],
+    [missing, tiles]: [u32; 2],
+    output: &Said,
+) -> Result<()> {
     let ([width, height], channels) = (view.size(), view.channels().len());
-    let bytes: u64 = written.iter().map(|path| files::bytes_of(path)).sum();
+    // Through a link the file behind it was written.
+    let bytes: u64 =
+        written.iter().map(|path| files::bytes_of(&path.canonicalize().unwrap_or_else(|_| path.clone()))).sum();
     output.event(
         "done",
         json!({
@@ -385,7 +394,7 @@ fn report(args: &Args, view: &View, format: export::Format, written: &[PathBuf],
     let bytes = files::format_bytes(bytes);
     output.text(&format!("{}: {width} x {height} pixels x {channels} bands, {bytes}\n", names.join(", ")))?;
     if missing > 0 {
-        output.text(&format!("{missing} of {} tiles have no samples yet\n", progress.tiles))?;
+        output.text(&format!("{missing} of {tiles} tiles have no samples yet\n"))?;
     }
     Ok(())
 }
@@ -444,9 +453,9 @@ fn write_png(args: &Args, cube: &Cube, output: &Said) -> Result<()> {
             }
         }
     };
+    let missing = missing(cube)?;
     let tone = picture(args, &view, &shown, args.exposure.map(Tone::Exposure), output)?;
     let Tone::Exposure(ev) = tone else { return Err(Error::Internal("colours have an exposure".into())) };
-    let missing = missing(cube)?;
     output.event(
         "done",
         json!({
@@ -476,13 +485,13 @@ fn write_map(args: &Args, view: &View, output: &Said) -> Result<()> {
         (_, true) => (export::Map::Integrated, "radiance", "W m-2 sr-1"),
         _ => (export::Map::Radiance, "mean radiance", "W m-2 sr-1 nm-1"),
     };
+    let missing = missing(view.cube())?;
     let tone = picture(args, view, &Shown::Map(map), args.range.map(Tone::Range), output)?;
     let Tone::Range(range) = tone else { return Err(Error::Internal("a colour map has ends".into())) };
     let channels = view.channels();
     let from = channels.bounds.iter().map(|b| b[0]).fold(f64::INFINITY, f64::min);
     let to = channels.bounds.iter().map(|b| b[1]).fold(f64::NEG_INFINITY, f64::max);
     let shows = format!("{of} of {} bands, {from} to {to} nm", channels.len());
-    let missing = missing(view.cube())?;
     output.event(
         "done",
         json!({

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 
 use super::Output;
-use crate::cube::{Cube, Existing, integrate};
+use crate::cube::{Cube, Existing, Progress, integrate};
 use crate::files::shown;
 use crate::format::response;
 use crate::scene::load_sensor;
@@ -195,6 +195,8 @@ fn integrate_with(args: &Args, file: &Path, output: &Output) -> Result<()> {
         ))?;
     }
     let made = Cube::open(&args.output)?;
+    let Progress { tiles, tiles_started, .. } = made.progress()?;
+    let missing = tiles - tiles_started;
     let wide = |(name, error): &(String, Option<f64>)| json!({ "band": name, "relative_error": error });
     let left_out = |(name, share): &(String, f64)| json!({ "band": name, "covered": share });
     output.event(
@@ -204,6 +206,7 @@ fn integrate_with(args: &Args, file: &Path, output: &Output) -> Result<()> {
             "bands": made.channels().names,
             "left_out": findings.left_out.iter().map(left_out).collect::<Vec<_>>(),
             "too_wide": findings.wide.iter().map(wide).collect::<Vec<_>>(),
+            "tiles_missing": missing,
         }),
     )?;
     output.text(&format!(
@@ -212,5 +215,9 @@ fn integrate_with(args: &Args, file: &Path, output: &Output) -> Result<()> {
         made.channels().len(),
         about,
         made.channels().names.join(", ")
-    ))
+    ))?;
+    match missing {
+        0 => Ok(()),
+        _ => output.text(&format!("{missing} of {tiles} tiles have no samples yet\n")),
+    }
 }

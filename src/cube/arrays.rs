@@ -166,7 +166,7 @@ fn compressed() -> Value {
     ])
 }
 
-fn plain() -> Value {
+pub(super) fn plain() -> Value {
     json!([{ "name": "bytes", "configuration": { "endian": "little" } }])
 }
 

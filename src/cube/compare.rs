@@ -168,6 +168,12 @@ fn check_comparable(a: &Cube, b: &Cube) -> Result<()> {
     if [wa, ha] != [wb, hb] {
         return refuse(format!("the first has {wa}x{ha} pixels, the second {wb}x{hb}"));
     }
+    let ([xa, ya], [xb, yb]) = (a.header().origin, b.header().origin);
+    if [xa, ya] != [xb, yb] {
+        return refuse(format!(
+            "the first begins at pixel {xa}, {ya} of its film, the second at {xb}, {yb}: render both with the same `film.crop`"
+        ));
+    }
     let (ca, cb) = (a.channels(), b.channels());
     if ca.len() != cb.len() {
         return refuse(format!("the first has {} channels, the second {}", ca.len(), cb.len()));

@@ -291,6 +291,15 @@ fn is_cube_alone(path: &Path) -> std::result::Result<(), String> {
     let arrays = arrays(cube.header(), cube.layout());
     let known = |name: &str| [PRIVATE, "zarr.json"].contains(&name) || arrays.iter().any(|(array, _)| *array == name);
     only_holds(path, known)?;
+    let private = path.join(PRIVATE);
+    if private.is_dir() {
+        // What a process that was killed left aside begins with these names too.
+        let of_cube = ["cube.json", "lock", "journal", "choices.json", "aside", "slurm", "run-"];
+        only_holds(&private, |name| of_cube.iter().any(|known| name.trim_start_matches('.').starts_with(known)))?;
+    }
+    if let Some(name) = cube.foreign_attribute().map_err(|error| error.to_string())? {
+        return Err(format!("has the attribute `{name}`, which somebody has put there"));
+    }
     let folders = arrays.iter().map(|(array, _)| path.join(array)).filter(|folder| folder.is_dir());
     folders.into_iter().try_for_each(|folder| only_holds(&folder, |name| ["zarr.json", "c"].contains(&name)))
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde_json::{Map, Value, json};
 
-use super::arrays::arrays;
+use super::arrays::{arrays, plain};
 use super::grid::Grid;
 use super::weights::{GROUPS, GROUPS_WITH_UNCERTAINTY, Shape};
 use crate::spectral::product::Basis;
@@ -427,6 +427,13 @@ impl Header {
         let Some(&[count]) = shape_of("wavelength").as_deref() else {
             return Err(damaged("gives no shape [wavelength] of `wavelength`"));
         };
+        let bounds = "wavelength_bounds";
+        if !stored[bounds].is_object() {
+            return Err(damaged("describes no `wavelength_bounds`"));
+        }
+        if stored[bounds]["codecs"] != plain() {
+            return Err(rewritten(path, bounds));
+        }
 
         let mut attributes = group["attributes"].as_object().cloned().unwrap_or_default();
         structure_attributes(&mut attributes);
@@ -453,13 +460,43 @@ impl Header {
         header.validate().map_err(|what| damaged(&format!("is not valid: {what}")))?;
 
         // What is read as raw files must be laid out as this version does it, to the last codec.
-        for (name, array) in arrays(&header, layout).iter().filter(|(name, _)| is_raw(name)) {
+        let arrays = arrays(&header, layout);
+        for (name, array) in arrays.iter().filter(|(name, _)| is_raw(name)) {
             if !same_layout(array, &stored[*name]) {
-                return Err(damaged(&format!("describes a `{name}` of another layout")));
+                return Err(rewritten(path, name));
+            }
+        }
+        // And mean what it means by them.
+        for (name, array) in &arrays {
+            if let Some(what) = other_meaning(&array["attributes"], &stored[*name]["attributes"]) {
+                let what = format!("is a copy of a cube in which somebody gave `{name}` {what}");
+                let help = "values are read as Spectile writes them: put that right, or open the copy with xarray";
+                return Err(Error::storage(path, format!("{what}; {help}")));
             }
         }
         Ok((header, layout))
     }
+}
+
+/// The error of an array that another program has stored anew.
+fn rewritten(path: &Path, name: &str) -> Error {
+    let what = format!(
+        "is a copy of a cube in which another program has stored `{name}` in another way (codecs, chunks or shape)"
+    );
+    Error::storage(path, format!("{what}: copy the folder itself, or open this one with xarray"))
+}
+
+/// What of an array's attributes makes other numbers of the stored ones than `ours`, in words.
+fn other_meaning(ours: &Value, stored: &Value) -> Option<String> {
+    let text = |attributes: &Value, name: &str| attributes[name].as_str().map(str::to_owned);
+    match (text(ours, "units"), text(stored, "units")) {
+        (Some(ours), Some(stored)) if ours != stored => {
+            return Some(format!("the units `{stored}` instead of `{ours}`"));
+        }
+        _ => {}
+    }
+    let packed = ["scale_factor", "add_offset"].into_iter().find(|name| !stored[*name].is_null());
+    packed.map(|name| format!("a `{name}` of {}", stored[name]))
 }
 
 /// What [`Header::from_record`] finds.

@@ -181,6 +181,15 @@ pub fn integrate(
                 let pixel = ((y - rect.y0) * grid.tile[0] + (x - rect.x0)) as usize;
                 for (b, band) in bands.iter().enumerate() {
                     let (value, error) = (sum(&band.weights), sum(&band.slopes));
+                    if !value.is_finite() {
+                        let what = format!(
+                            "holds a value that is not finite in a channel of pixel {x}, {y}: somebody has changed it"
+                        );
+                        return Err(Error::storage(
+                            cube.path(),
+                            format!("{what}; `spectile info --verify` says which tile"),
+                        ));
+                    }
                     unit[pixel * bands.len() + b] = value as f32;
                     squares[b][0] += error * error;
                     squares[b][1] += value * value;

@@ -203,6 +203,17 @@ impl Cube {
         &self.path
     }
 
+    /// An attribute of the group that is not the cube's, if its record tells which are.
+    pub(super) fn foreign_attribute(&self) -> Result<Option<String>> {
+        if !matches!(self.origin, Origin::Record { .. }) {
+            return Ok(None);
+        }
+        let (own, _) = self.header.metadata()?;
+        let is_own = |name: &&String| own["attributes"].get(name.as_str()).is_some();
+        let group = read_group(&self.path)?;
+        Ok(group["attributes"].as_object().and_then(|all| all.keys().find(|name| !is_own(name)).cloned()))
+    }
+
     pub fn header(&self) -> &Header {
         &self.header
     }

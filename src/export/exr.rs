@@ -20,6 +20,7 @@ use smallvec::SmallVec;
 use super::{Progress, check_space};
 use crate::cube::{Quantity, Rect, Strides, View};
 use crate::files::output::{Product, Replacement, cannot_write};
+use crate::format::maps::exr::QUANTITY;
 use crate::{Error, Result};
 
 /// What [`write`] writes. Where its chunks lie stands at the beginning, and is known at the end: no pipe takes it.
@@ -183,12 +184,14 @@ fn header(view: &View, named: &[(String, Source)], strict_units: bool) -> Result
     };
     let about = format!("Spectile {}; R, G, B: {preview}", env!("CARGO_PKG_VERSION"));
     let other = &mut header.own_attributes.other;
-    for (key, value) in [("spectralLayoutVersion", "1.0"), ("emissiveUnits", units), ("comments", about.as_str())] {
-        if key == "comments" {
-            header.own_attributes.comments = Some(text(value)?);
-        } else {
-            other.insert(text(key)?, AttributeValue::Text(text(value)?));
-        }
+    header.own_attributes.comments = Some(text(&about)?);
+    let mut of_all = vec![("spectralLayoutVersion", "1.0"), ("emissiveUnits", units)];
+    if view.quantity() == Quantity::Integrated {
+        // The layout has the same label for spectral radiance.
+        of_all.push((QUANTITY, "radiance integrated over each band, W m^-2 sr^-1"));
+    }
+    for (key, value) in of_all {
+        other.insert(text(key)?, AttributeValue::Text(text(value)?));
     }
     // How wide each band is: its response, one over its interval, under its own name.
     for (name, source) in named {

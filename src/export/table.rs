@@ -19,7 +19,8 @@ pub const TABLE: Product = Product {
     check: is_table,
 };
 
-/// Whether the first lines are the header `x,y,…` and a pixel.
+/// Whether the first lines are the header `x,y,…` and pixels in the order of [`write`]: what other tables of places and values,
+/// points of a survey say, have by accident at most in their first two.
 fn is_table(path: &Path) -> std::result::Result<(), String> {
     let unreadable = |error: std::io::Error| format!("cannot be read as text ({error})");
     let mut lines = BufReader::new(File::open(path).map_err(unreadable)?).lines();
@@ -29,16 +30,29 @@ fn is_table(path: &Path) -> std::result::Result<(), String> {
         return Err("does not begin with the columns x and y".into());
     }
     // Names may hold commas in quotation marks; a pixel has numbers alone.
-    let is_pixel = |line: &str| {
+    let pixel = |line: &str| {
         let mut cells = line.split(',');
-        let is_position = (0..2).all(|_| cells.next().is_some_and(|cell| cell.parse::<u32>().is_ok()));
-        is_position && cells.all(|cell| cell.is_empty() || cell.parse::<f32>().is_ok())
+        let mut place = || cells.next()?.parse::<u32>().ok();
+        let place = [place()?, place()?];
+        cells.all(|cell| cell.is_empty() || cell.parse::<f32>().is_ok()).then_some(place)
     };
-    match next()? {
-        Some(line) if is_pixel(&line) => Ok(()),
-        _ => Err("does not have a pixel on its second line".into()),
+    let Some([left, mut y]) = next()?.as_deref().and_then(pixel) else {
+        return Err("does not have a pixel on its second line".into());
+    };
+    let mut x = left;
+    for number in 3..SEEN_LINES {
+        let Some(line) = next()? else { break };
+        match pixel(&line) {
+            Some([left_again, below]) if left_again == left && below == y + 1 => (x, y) = (left, below),
+            Some(place) if place == [x + 1, y] => x += 1,
+            _ => return Err(format!("does not go on with the next pixel on line {number}")),
+        }
     }
+    Ok(())
 }
+
+/// Lines by which a table is known.
+const SEEN_LINES: u32 = 1000;
 
 /// Columns `x`, `y` (on the full film), then one a band, named after it. Numbers have as many digits as bring back the
 /// stored ones exactly; what is not rendered is empty.

@@ -40,7 +40,8 @@ fn hull(scene: &Scene, of: impl Fn(usize) -> bool) -> String {
 fn sources(scene: &Scene) -> Vec<Source> {
     let channels = &scene.channels.bounds;
     let by = |shines: &dyn Fn([f64; 2]) -> bool| channels.iter().map(|bounds| shines(*bounds)).collect::<Vec<bool>>();
-    let of_curve = |curve: &Curve| by(&|[a, b]| curve.mean(a, b) > 0.0);
+    // What is less than a device can count is nothing.
+    let of_curve = |curve: &Curve| by(&|[a, b]| curve.mean(a, b) >= f64::from(f32::MIN_POSITIVE));
     let of_spectrum = |id: usize| of_curve(&scene.spectra[id].curve);
     let mut sources = Vec::new();
     // Objects of one lamp say the same.
@@ -81,11 +82,7 @@ fn sources(scene: &Scene) -> Vec<Source> {
             sources.push(Source { name: format!("the environment map {}", map.name), shines });
         }
     }
-    // Heat: as much as Planck's law leaves above the smallest number of a device.
-    let glow = |kelvin: f64| {
-        let curve = Curve::Blackbody { kelvin, scale: 1.0 };
-        by(&|[a, b]| curve.mean(a, b) >= f64::from(f32::MIN_POSITIVE))
-    };
+    let glow = |kelvin: f64| of_curve(&Curve::Blackbody { kelvin, scale: 1.0 });
     for material in &scene.materials {
         if let Some(kelvin) = hottest(scene, material) {
             sources.push(Source { name: format!("the heat of material \"{}\"", material.name), shines: glow(kelvin) });

@@ -115,7 +115,7 @@ fn heat_pays_for_nothing_but_lamps() {
     hot.materials.iter_mut().for_each(|material| material.temperature = Some(Temperature::Constant(300.0)));
     let [cold, hot] = [cold, hot].map(|scene| Prepared::new(&scene, 0).unwrap_or_else(|e| panic!("{e}")));
     assert_eq!((hot.features, hot.emitters.len()), (cold.features, cold.emitters.len()));
-    assert_eq!((size_of::<Emitter>(), size_of::<Material>()), (16, 16));
+    assert_eq!((size_of::<Emitter>(), size_of::<Material>()), (20, 16));
 }
 
 /// Surfaces whose emission depends on the angle, in an isothermal room: nothing of them can be seen. Emittances are within

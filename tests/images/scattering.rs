@@ -122,7 +122,7 @@ fn layers_reflect_and_transmit_what_is_published() {
     assert_layers(
         "isotropic",
         &isotropic_layers[..size::either(4, 8)],
-        size::either(2, 20),
+        size::either(2, 28),
         size::either(0.03, 0.01),
         isotropic,
     );

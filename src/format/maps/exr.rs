@@ -5,6 +5,7 @@ use std::path::Path;
 
 use exr::meta::MetaData;
 use exr::meta::attribute::{AttributeValue, EnvironmentMap, Text};
+use exr::meta::header::Header;
 
 use super::{Bands, Content, Map, checked_size, spectral, to_srgb, with_help};
 use crate::error::Problem;
@@ -19,18 +20,27 @@ pub fn read_map(path: &Path) -> Result<Map, Box<Problem>> {
     let size = checked_size(path, picture.size[0].into(), picture.size[1].into())?;
     let planes = &picture.planes;
     let mut warnings = Vec::new();
-    said(path, &mut warnings)?;
-    let bands: Vec<(f64, &[f32])> =
-        planes.iter().filter_map(|plane| Some((emissive_band(&plane.name)?, plane.samples.as_slice()))).collect();
-    if !bands.is_empty() {
+    // That the file can be read was seen to.
+    let meta = MetaData::read_from_file(path, false).ok();
+    let header = meta.as_ref().and_then(|meta| meta.headers.first());
+    let attribute = |name: &str| text_attribute(header?, name);
+    said(path, header, &mut warnings)?;
+    let emissive: Vec<(f64, &Plane)> =
+        planes.iter().filter_map(|plane| Some((emissive_band(&plane.name)?, plane))).collect();
+    if !emissive.is_empty() {
         // The layout's own label; its authors store W m-2 sr-1 nm-1 under it, as everybody does.
         const KNOWN: [&str; 3] = ["W.m^-2.sr^-1", "W.m^-2.sr^-1.nm^-1", "W m^-2 sr^-1 nm^-1"];
         if planes.iter().any(|plane| ["S1.", "S2.", "S3."].iter().any(|start| plane.name.starts_with(start))) {
             warnings.push("holds polarised light: S1, S2 and S3 are left out".to_owned());
         }
-        let mut bands = bands;
+        if let Some(quantity) = attribute(QUANTITY) {
+            let message = format!("holds {quantity}, no spectral radiance");
+            return Err(with_help(path, message, "export it without --integrated"));
+        }
+        let mut bands: Vec<(f64, &[f32])> =
+            emissive.iter().map(|(nm, plane)| (*nm, plane.samples.as_slice())).collect();
         let mut converted: Vec<Vec<f32>> = Vec::new();
-        if let Some(units) = units(path).filter(|units| !KNOWN.contains(&units.as_str())) {
+        if let Some(units) = attribute("emissiveUnits").filter(|units| !KNOWN.contains(&units.as_str())) {
             match super::radiance_of(path, &units, unit::parse(&units), Unit::NANOMETRE, &mut warnings)? {
                 Density::Plain(1.0) => {}
                 density => {
@@ -43,7 +53,8 @@ pub fn read_map(path: &Path) -> Result<Map, Box<Problem>> {
             }
         }
         let (nm, planes): (Vec<f64>, Vec<&[f32]>) = bands.into_iter().unzip();
-        let content = spectral(path, &Bands { nm, spans: None }, &planes, &mut warnings)?;
+        let spans = emissive.iter().map(|(_, plane)| attribute(&plane.name).and_then(|text| interval(&text)));
+        let content = spectral(path, &Bands { nm, spans: spans.collect() }, &planes, &mut warnings)?;
         return Ok(Map { size, content, warnings });
     }
     // Whether a picture is transparent matters to nobody who looks at the sky.
@@ -78,10 +89,8 @@ pub fn read_map(path: &Path) -> Result<Map, Box<Problem>> {
 }
 
 /// What attributes say of the numbers, or of the directions of the pixels, and nothing here applies.
-fn said(path: &Path, warnings: &mut Vec<String>) -> Result<(), Box<Problem>> {
-    // That the file can be read was seen to before.
-    let Ok(meta) = MetaData::read_from_file(path, false) else { return Ok(()) };
-    let Some(header) = meta.headers.first() else { return Ok(()) };
+fn said(path: &Path, header: Option<&Header>, warnings: &mut Vec<String>) -> Result<(), Box<Problem>> {
+    let Some(header) = header else { return Ok(()) };
     if header.own_attributes.environment_map == Some(EnvironmentMap::Cube) {
         let message = "says (`envmap`) that it is the six faces of a cube".to_owned();
         return Err(with_help(path, message, "convert it to longitude and latitude, e.g. with exrenvmap"));
@@ -100,15 +109,29 @@ fn said(path: &Path, warnings: &mut Vec<String>) -> Result<(), Box<Problem>> {
     Ok(())
 }
 
-/// `emissiveUnits` of the spectral layout.
-fn units(path: &Path) -> Option<String> {
-    let meta = MetaData::read_from_file(path, false).ok()?;
-    let (header, key) = (meta.headers.first()?, Text::from("emissiveUnits"));
+/// The attribute of a file whose channels hold another quantity than spectral radiance, which the layout has no word for.
+pub const QUANTITY: &str = "spectileQuantity";
+
+/// An attribute that is a text.
+fn text_attribute(header: &Header, name: &str) -> Option<String> {
+    let key = Text::new_or_none(name)?;
     let found = header.own_attributes.other.get(&key).or(header.shared_attributes.other.get(&key));
     match found {
         Some(AttributeValue::Text(text)) => Some(text.to_string()),
         _ => None,
     }
+}
+
+/// The interval, in nm, over which the response of a band is 1: of `400nm:1;410nm:1;`, as the layout writes responses. None of those
+/// that are no box.
+fn interval(response: &str) -> Option<[f64; 2]> {
+    let points = response.split(';').map(str::trim).filter(|point| !point.is_empty()).map(|point| {
+        let (place, value) = point.split_once(':')?;
+        (value.trim().parse() == Ok(1.0)).then_some(())?;
+        place.trim().strip_suffix("nm")?.replace(',', ".").parse().ok()
+    });
+    let points: Vec<f64> = points.collect::<Option<_>>()?;
+    <[f64; 2]>::try_from(points).ok().filter(|[from, to]| from < to)
 }
 
 /// The wavelength, in nm, of an unpolarised emissive channel: `S0.` and a number with a decimal comma, an SI prefix, and

@@ -3,7 +3,7 @@
 //! What the values mean by direction is the scene's business; here they are a picture of RGB or spectra.
 
 mod envi;
-mod exr;
+pub mod exr;
 mod hdr;
 mod zarr;
 
