@@ -138,6 +138,11 @@ impl File {
 fn transform(node: &Node, index: usize) -> Result<DAffine3, String> {
     let at = format!("nodes[{index}]");
     let affine = match node.matrix {
+        Some(_) if node.scale.is_some() || node.rotation.is_some() || node.translation.is_some() => {
+            return Err(format!(
+                "`{at}` has a matrix and a translation, rotation or scale: only one of both says where it is"
+            ));
+        }
         Some(m) => {
             if [m[3], m[7], m[11], m[15]] != [0.0, 0.0, 0.0, 1.0] {
                 return Err(format!("`{at}.matrix` has a last row that is not 0, 0, 0, 1"));

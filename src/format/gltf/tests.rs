@@ -60,6 +60,8 @@ fn transforms_of_nodes_are_chained() {
     let mesh = read(&square(matrix, STRIP)).unwrap();
     assert_eq!(mesh.parts[0].positions[1], [4., 6., 7.]);
     assert!((0..2).all(|i| normal_of(&mesh.parts[0], i) == DVec3::Z));
+    let both = matrix.replace("\"mesh\": 0", "\"mesh\": 0, \"scale\": [2, 2, 2]");
+    assert!(read(&square(&both, STRIP)).unwrap_err().to_string().contains("`nodes[0]` has a matrix and a"));
 }
 
 #[test]
