@@ -432,11 +432,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Header, Box<Problem>> {
     header.find_wavelengths()?;
     header.find_scaling()?;
     header.find_unit()?;
-    let known = |key: &&String| !KNOWN.contains(&key.as_str());
-    let unknown: Vec<&str> = header.entries.keys().filter(known).map(String::as_str).collect();
-    if !unknown.is_empty() {
-        header.notes.push(format!("has a header with keys that are not known, and left out: {}", unknown.join(", ")));
-    }
+    header.tell_what_is_left_out();
     Ok(header)
 }
 
@@ -479,6 +475,14 @@ impl Header {
             }
         }
         Ok(())
+    }
+
+    fn tell_what_is_left_out(&mut self) {
+        let known = |key: &&String| !KNOWN.contains(&key.as_str());
+        let unknown: Vec<&str> = self.entries.keys().filter(known).map(String::as_str).collect();
+        if !unknown.is_empty() {
+            self.notes.push(format!("has a header with keys that are not known, and left out: {}", unknown.join(", ")));
+        }
     }
 
     /// The numbers of a list, where the key is there: one for each of `counts`' numbers of things.

@@ -467,6 +467,8 @@ fn zarr_chunks_without_a_file_are_told_or_refused() {
     };
     v2("null")
         .refused("map = \"s.zarr\"", &["no file of 1 of its 2 chunks, the first of them `0.0.0`", "no fill value"]);
+    v2("\"NaN\"")
+        .refused("map = \"s.zarr\"", &["no value at column 0, row 0 of band 1, and has no file of 1 of the 2 chunks"]);
     let warnings = told(&v2("0"));
     assert!(warnings.len() == 1 && warnings[0].contains("no file of 1 of the 2 chunks"), "{warnings:?}");
 }

@@ -68,7 +68,7 @@ pub fn read(path: &Path) -> Result<Map, Box<Problem>> {
     };
 
     let values = radiance.values()?;
-    warnings.extend(radiance.lost_chunks()?);
+    let lost = radiance.lost_chunks()?;
     let stride = |dimension: usize| shape[dimension + 1..].iter().product::<u64>() as usize;
     let (by_band, by_row, by_column) = (stride(spectrum), stride(y), stride(x));
     let mut planes: Vec<Vec<f32>> = Vec::with_capacity(bands.nm.len());
@@ -78,7 +78,8 @@ pub fn read(path: &Path) -> Result<Map, Box<Problem>> {
             for (column, from_column) in columns.iter().enumerate() {
                 let value = values[band * by_band + from_row * by_row + from_column * by_column];
                 if value.is_nan() {
-                    let message = format!("has no value at column {column}, row {row} of band {}", band + 1);
+                    let why = lost.map(|words| format!(", and {words}")).unwrap_or_default();
+                    let message = format!("has no value at column {column}, row {row} of band {}{why}", band + 1);
                     return Err(with_help(path, message, "fill the gaps: light comes from every direction"));
                 }
                 plane.push(density.apply(value, nm) as f32);
@@ -86,6 +87,7 @@ pub fn read(path: &Path) -> Result<Map, Box<Problem>> {
         }
         planes.push(plane);
     }
+    warnings.extend(lost);
     let planes: Vec<&[f32]> = planes.iter().map(Vec::as_slice).collect();
     let content = spectral(path, &bands, &planes, &mut warnings)?;
     Ok(Map { size, content, warnings })

@@ -464,73 +464,16 @@ fn product(tokens: &[Token], at: &mut usize, depth: usize) -> Option<Measure> {
 
 /// A unit by symbol, with an SI prefix, or by name.
 fn symbol(name: &str) -> Option<Measure> {
-    const NANO: f64 = 1e-9;
     let lower = name.to_lowercase();
-    let base = |name: &str| -> Option<Measure> {
-        Some(match name {
-            "m" => Measure::of(METRE, 1.0),
-            "W" => Measure::of(WATT, 1.0),
-            "s" => Measure::of(SECOND, 1.0),
-            "sr" => Measure::of(STERADIAN, 1.0),
-            "Hz" => Measure { powers: Measure::ONE.times(Measure::of(SECOND, 1.0), -1)?.powers, factor: 1.0 },
-            "eV" => Measure::of(ELECTRONVOLT, 1.0),
-            "J" => Measure::of(WATT, 1.0).times(Measure::of(SECOND, 1.0), 1)?,
-            "K" => Measure::of(KELVIN, 1.0),
-            "lm" => Measure::of(LUMEN, 1.0),
-            "cd" => Measure::of(LUMEN, 1.0).times(Measure::of(STERADIAN, 1.0), -1)?,
-            "lx" => Measure::of(LUMEN, 1.0).times(Measure::of(METRE, 1.0), -2)?,
-            "mol" => Measure::of(COUNT, 6.022_140_76e23),
-            "flick" => long_name(name)?,
-            "erg" => Measure::of(WATT, 1e-7).times(Measure::of(SECOND, 1.0), 1)?,
-            // 1e-26 W m-2 Hz-1
-            "Jy" => Measure::of(WATT, 1e-26).times(Measure::of(SECOND, 1.0), 1)?.times(Measure::of(METRE, 1.0), -2)?,
-            _ => return None,
-        })
-    };
     // Spellings by their whole name first.
-    let whole = match lower.as_str() {
-        "%" | "percent" | "pct" | "perc" => Measure { factor: 0.01, ..Measure::ONE },
-        "\u{2030}" | "permille" | "promille" => Measure { factor: 1e-3, ..Measure::ONE },
-        "ppm" | "ppmv" => Measure { factor: 1e-6, ..Measure::ONE },
-        "ppb" | "ppbv" => Measure { factor: 1e-9, ..Measure::ONE },
-        "unitless" | "dimensionless" | "fraction" | "none" | "ratio" | "reflectance" | "transmittance" => Measure::ONE,
-        "atm" | "atmosphere" | "atmospheres" => Measure::of(ATMOSPHERE, 1.0),
-        "bar" => Measure::of(ATMOSPHERE, 1.0 / 1.013_25),
-        "kpa" => Measure::of(ATMOSPHERE, 1.0 / 101.325),
-        "torr" | "mmhg" => Measure::of(ATMOSPHERE, 1.0 / 760.0),
-        // Loschmidt's number of molecules in a cubic metre (CODATA 2018).
-        "amagat" | "amagats" => Measure::of(COUNT, 2.686_780_111e25).times(Measure::of(METRE, 1.0), -3)?,
-        "inch" | "inches" => Measure::of(METRE, 0.0254),
-        "ft" | "foot" | "feet" => Measure::of(METRE, 0.3048),
-        "hpa" | "mbar" => Measure::of(ATMOSPHERE, 1.0 / 1013.25),
-        "pa" => Measure::of(ATMOSPHERE, 1.0 / 101_325.0),
-        "photon" | "photons" | "ph" | "quanta" | "molecule" | "molecules" | "molec" | "mole" | "moles" | "counts"
-        | "dn" | "count" => Measure::of(COUNT, 1.0),
-        "steradian" | "steradians" | "ster" | "str" => Measure::of(STERADIAN, 1.0),
-        "sr" => Measure::of(STERADIAN, 1.0),
-        "angstrom" | "angstroms" | "\u{e5}ngstr\u{f6}m" | "\u{e5}ngstrom" | "angstr\u{f6}m" | "ang" | "\u{e5}" => {
-            Measure::of(METRE, 0.1 * NANO)
-        }
-        "nm" => Measure::of(METRE, NANO),
-        "um" | "micron" | "microns" | "mic" | "mu" | "mum" => Measure::of(METRE, 1e-6),
-        "hz" => base("Hz")?,
-        "kelvin" | "kelvins" | "degk" => Measure::of(KELVIN, 1.0),
-        "electronvolt" | "electronvolts" => Measure::of(ELECTRONVOLT, 1.0),
-        "lumen" | "lumens" => Measure::of(LUMEN, 1.0),
-        "lux" => base("lx")?,
-        "kayser" | "kaysers" => Measure::ONE.times(Measure::of(METRE, 0.01), -1)?,
-        "ev" => Measure::of(ELECTRONVOLT, 1.0),
-        "sec" | "second" | "seconds" => Measure::of(SECOND, 1.0),
-        _ => Measure { factor: 0.0, ..Measure::ONE },
-    };
-    if whole.factor > 0.0 {
+    if let Some(whole) = spelt_out(&lower) {
         return Some(whole);
     }
     if name == "Mb" {
         return long_name("barn").and_then(|barn| Measure { factor: 1e6, ..Measure::ONE }.times(barn, 1));
     }
     if matches!(name, "A" | "AA" | "\u{c5}") {
-        return Some(Measure::of(METRE, 0.1 * NANO));
+        return Some(Measure::of(METRE, 1e-10));
     }
     if let Some(measure) = base(name) {
         return Some(measure);
@@ -580,6 +523,68 @@ fn symbol(name: &str) -> Option<Measure> {
         }
     }
     None
+}
+
+/// A unit that is spelt in no other way, in small letters.
+fn spelt_out(lower: &str) -> Option<Measure> {
+    Some(match lower {
+        "%" | "percent" | "pct" | "perc" => Measure { factor: 0.01, ..Measure::ONE },
+        "\u{2030}" | "permille" | "promille" => Measure { factor: 1e-3, ..Measure::ONE },
+        "ppm" | "ppmv" => Measure { factor: 1e-6, ..Measure::ONE },
+        "ppb" | "ppbv" => Measure { factor: 1e-9, ..Measure::ONE },
+        "unitless" | "dimensionless" | "fraction" | "none" | "ratio" | "reflectance" | "transmittance" => Measure::ONE,
+        "atm" | "atmosphere" | "atmospheres" => Measure::of(ATMOSPHERE, 1.0),
+        "bar" => Measure::of(ATMOSPHERE, 1.0 / 1.013_25),
+        "kpa" => Measure::of(ATMOSPHERE, 1.0 / 101.325),
+        "torr" | "mmhg" => Measure::of(ATMOSPHERE, 1.0 / 760.0),
+        // Loschmidt's number of molecules in a cubic metre (CODATA 2018).
+        "amagat" | "amagats" => Measure::of(COUNT, 2.686_780_111e25).times(Measure::of(METRE, 1.0), -3)?,
+        "inch" | "inches" => Measure::of(METRE, 0.0254),
+        "ft" | "foot" | "feet" => Measure::of(METRE, 0.3048),
+        "hpa" | "mbar" => Measure::of(ATMOSPHERE, 1.0 / 1013.25),
+        "pa" => Measure::of(ATMOSPHERE, 1.0 / 101_325.0),
+        "photon" | "photons" | "ph" | "quanta" | "molecule" | "molecules" | "molec" | "mole" | "moles" | "counts"
+        | "dn" | "count" => Measure::of(COUNT, 1.0),
+        "steradian" | "steradians" | "ster" | "str" => Measure::of(STERADIAN, 1.0),
+        "sr" => Measure::of(STERADIAN, 1.0),
+        "angstrom" | "angstroms" | "\u{e5}ngstr\u{f6}m" | "\u{e5}ngstrom" | "angstr\u{f6}m" | "ang" | "\u{e5}" => {
+            Measure::of(METRE, 1e-10)
+        }
+        "nm" => Measure::of(METRE, 1e-9),
+        "um" | "micron" | "microns" | "mic" | "mu" | "mum" => Measure::of(METRE, 1e-6),
+        "hz" => base("Hz")?,
+        "kelvin" | "kelvins" | "degk" => Measure::of(KELVIN, 1.0),
+        "electronvolt" | "electronvolts" => Measure::of(ELECTRONVOLT, 1.0),
+        "lumen" | "lumens" => Measure::of(LUMEN, 1.0),
+        "lux" => base("lx")?,
+        "kayser" | "kaysers" => Measure::ONE.times(Measure::of(METRE, 0.01), -1)?,
+        "ev" => Measure::of(ELECTRONVOLT, 1.0),
+        "sec" | "second" | "seconds" => Measure::of(SECOND, 1.0),
+        _ => return None,
+    })
+}
+
+/// An SI unit, or another one that takes prefixes, by its symbol.
+fn base(name: &str) -> Option<Measure> {
+    Some(match name {
+        "m" => Measure::of(METRE, 1.0),
+        "W" => Measure::of(WATT, 1.0),
+        "s" => Measure::of(SECOND, 1.0),
+        "sr" => Measure::of(STERADIAN, 1.0),
+        "Hz" => Measure { powers: Measure::ONE.times(Measure::of(SECOND, 1.0), -1)?.powers, factor: 1.0 },
+        "eV" => Measure::of(ELECTRONVOLT, 1.0),
+        "J" => Measure::of(WATT, 1.0).times(Measure::of(SECOND, 1.0), 1)?,
+        "K" => Measure::of(KELVIN, 1.0),
+        "lm" => Measure::of(LUMEN, 1.0),
+        "cd" => Measure::of(LUMEN, 1.0).times(Measure::of(STERADIAN, 1.0), -1)?,
+        "lx" => Measure::of(LUMEN, 1.0).times(Measure::of(METRE, 1.0), -2)?,
+        "mol" => Measure::of(COUNT, 6.022_140_76e23),
+        "flick" => long_name(name)?,
+        "erg" => Measure::of(WATT, 1e-7).times(Measure::of(SECOND, 1.0), 1)?,
+        // 1e-26 W m-2 Hz-1
+        "Jy" => Measure::of(WATT, 1e-26).times(Measure::of(SECOND, 1.0), 1)?.times(Measure::of(METRE, 1.0), -2)?,
+        _ => return None,
+    })
 }
 
 fn long_name(name: &str) -> Option<Measure> {
