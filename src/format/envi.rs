@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use super::unit::{self, Stated, Unit};
+use super::table::shown;
+use super::unit::{self, FACTORS, Meaning, Stated, Unit};
 use crate::error::Problem;
 
 /// How the values of an image follow each other.
@@ -110,6 +111,8 @@ pub struct Header {
     /// Which bands (samples of a library) `bbl` calls good; empty where it says nothing.
     good: Vec<bool>,
     scaling: Scaling,
+    /// What `data units` says of the values, or the second of `z plot titles`.
+    unit: Option<Stated>,
     /// Line and text by key.
     entries: BTreeMap<String, (usize, String)>,
 }
@@ -220,9 +223,9 @@ impl Header {
         })
     }
 
-    /// `data units`, where it is understood.
-    pub fn unit(&self) -> Option<Stated> {
-        Stated::of(self.get("data units")?)
+    /// What `data units` says of the values; where that is nothing, the second of `z plot titles`, in brackets.
+    pub fn unit(&self) -> Option<&Stated> {
+        self.unit.as_ref()
     }
 
     /// A number, where the key is there.
@@ -418,6 +421,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Header, Box<Problem>> {
         notes: Vec::new(),
         good: Vec::new(),
         scaling: Scaling { gain: Vec::new(), offset: Vec::new(), factor: 1.0 },
+        unit: None,
         entries: BTreeMap::new(),
     };
     if header.data_bytes().is_none() {
@@ -427,11 +431,8 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Header, Box<Problem>> {
     header.refuse_what_is_not_applied()?;
     header.find_wavelengths()?;
     header.find_scaling()?;
-    let known = |key: &&String| !KNOWN.contains(&key.as_str());
-    let unknown: Vec<&str> = header.entries.keys().filter(known).map(String::as_str).collect();
-    if !unknown.is_empty() {
-        header.notes.push(format!("has a header with keys that are not known, and left out: {}", unknown.join(", ")));
-    }
+    header.find_unit()?;
+    header.tell_what_is_left_out();
     Ok(header)
 }
 
@@ -453,7 +454,7 @@ impl Header {
             }
         }
         // Keys that programs add of their own, such as `scale factor`, nobody else applies.
-        let scales = |key: &str| ["scale", "gain", "factor", "multipl"].iter().any(|word| key.contains(word));
+        let scales = |key: &str| FACTORS.iter().any(|word| key.contains(word));
         let is_one = |text: &str| split_list(text).iter().all(|number| number.parse() == Ok(1.0));
         let own = |(key, (_, text)): &(&String, &(usize, String))| {
             !KNOWN.contains(&key.as_str()) && scales(key) && !is_one(text)
@@ -474,6 +475,14 @@ impl Header {
             }
         }
         Ok(())
+    }
+
+    fn tell_what_is_left_out(&mut self) {
+        let known = |key: &&String| !KNOWN.contains(&key.as_str());
+        let unknown: Vec<&str> = self.entries.keys().filter(known).map(String::as_str).collect();
+        if !unknown.is_empty() {
+            self.notes.push(format!("has a header with keys that are not known, and left out: {}", unknown.join(", ")));
+        }
     }
 
     /// The numbers of a list, where the key is there: one for each of `counts`' numbers of things.
@@ -525,6 +534,27 @@ impl Header {
             let span = |(x, width): (&f64, &f64)| [unit.to_nm(x - 0.5 * width), unit.to_nm(x + 0.5 * width)];
             values.iter().zip(&widths).map(span).collect()
         });
+        Ok(())
+    }
+
+    fn find_unit(&mut self) -> Result<(), Box<Problem>> {
+        let of_data = self.get("data units").map(str::trim).filter(|text| !text.is_empty());
+        let unknown = |text: &str| Stated { meaning: Meaning::Unknown, text: text.to_owned(), certain: true };
+        let of_data = of_data.map(|text| Stated::of(text).unwrap_or_else(|| unknown(text)));
+        let of_plot = self.list("z plot titles").and_then(|titles| Stated::in_name(titles.get(1)?));
+        if let (Some(data), Some(plot)) = (&of_data, &of_plot)
+            && let (Meaning::Unit(a), Meaning::Unit(b)) = (data.meaning, plot.meaning)
+            && !(a.powers == b.powers && (a.factor / b.factor - 1.0).abs() < 1e-9)
+        {
+            let (plot, data) = (shown(&plot.text), shown(&data.text));
+            let message = format!("says `{plot}` of the values, but `data units` says `{data}`: correct one of them");
+            return Err(self.problem("z plot titles", &message));
+        }
+        let is_known = |stated: &Stated| stated.meaning != Meaning::Unknown;
+        self.unit = match (of_data, of_plot) {
+            (Some(data), Some(plot)) if !is_known(&data) && is_known(&plot) => Some(plot),
+            (data, plot) => data.or(plot),
+        };
         Ok(())
     }
 

@@ -80,7 +80,8 @@ pub fn parse_envi(
     };
     let surplus = header.surplus(data.len(), data_path);
     let data = header.data(data, data_path)?;
-    let mut table = SpectrumTable { unit: header.unit(), notes: header.notes.clone(), ..SpectrumTable::default() };
+    let mut table =
+        SpectrumTable { unit: header.unit().cloned(), notes: header.notes.clone(), ..SpectrumTable::default() };
     table.notes.extend(surplus);
     let mut missing = 0usize;
     for (i, nm) in nm.into_iter().enumerate() {

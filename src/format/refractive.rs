@@ -7,6 +7,7 @@ use serde_saphyr::Spanned;
 
 use super::table;
 use super::text::{self, SpectrumTable};
+use super::unit;
 use crate::error::Problem;
 
 /// n and k over wavelength in nm, as far as a file gives them; each may be wrong by itself. k > 0 absorbs.
@@ -53,6 +54,16 @@ pub fn parse(bytes: &[u8], path: &Path, needed: Option<[f64; 2]>) -> Result<Inde
 struct Document {
     #[serde(rename = "DATA")]
     data: Vec<Block>,
+    /// Of the database's pages of glasses.
+    #[serde(rename = "SPECS")]
+    specs: Option<Specs>,
+}
+
+/// What n and wavelengths are relative to; without a word that is the vacuum.
+#[derive(Deserialize, Default)]
+struct Specs {
+    n_is_absolute: Option<Spanned<String>>,
+    wavelength_is_vacuum: Option<Spanned<String>>,
 }
 
 /// One entry of `DATA`. Numbers are kept as text: rows and lists are separated by blanks.
@@ -129,7 +140,38 @@ impl Yaml<'_> {
                 |(_, kind): &(Option<usize>, &str)| format!("has a block of type `{}`, left out", table::shown(kind));
             table.notes.extend(others.iter().map(left_out));
         }
+        self.bring_to_vacuum(&mut index, &document.specs.unwrap_or_default())?;
         Ok(index)
+    }
+
+    /// Makes wavelengths in air those in vacuum, and n relative to air absolute, where the page says that they are such.
+    fn bring_to_vacuum(&self, index: &mut Index, specs: &Specs) -> Result<(), Box<Problem>> {
+        let denied = |flag: &Option<Spanned<String>>, name: &str| match flag {
+            None => Ok(false),
+            Some(flag) => match flag.value.trim().to_lowercase().as_str() {
+                "true" => Ok(false),
+                "false" => Ok(true),
+                other => {
+                    let message = format!("`{name}` must be true or false, but is `{}`", table::shown(other));
+                    Err(self.at(line_of(flag), message, ""))
+                }
+            },
+        };
+        let in_air = denied(&specs.wavelength_is_vacuum, "wavelength_is_vacuum")?;
+        let is_relative = denied(&specs.n_is_absolute, "n_is_absolute")?;
+        if in_air {
+            for table in [&mut index.n, &mut index.k].into_iter().flatten().flatten() {
+                table.nm.iter_mut().for_each(|nm| *nm = unit::vacuum_nm(*nm));
+                table.notes.push(unit::FROM_AIR.to_owned());
+            }
+        }
+        if let (true, Some(Ok(n))) = (is_relative, &mut index.n) {
+            n.value.iter_mut().zip(&n.nm).for_each(|(value, nm)| *value *= unit::air_index(*nm));
+            n.notes.push(
+                "gives n relative to air: it is multiplied by that of air (Ciddor 1996, dry air of 15 °C)".to_owned(),
+            );
+        }
+        Ok(())
     }
 
     /// The columns of a tabulated block beside the wavelength, which is in um.
@@ -514,6 +556,34 @@ mod tests {
         let n = parse(text.as_bytes(), Path::new("t.yml"), Some([400.0, 700.0])).unwrap().n.unwrap().unwrap();
         let expected = (1.0 + 6.44 / (1.0 - 0.05 / 4.0) + 3.16 / (1.0 - 2200.0 / 4.0f64)).sqrt();
         assert!(n.nm == [2000.0; 2] && n.value.iter().all(|n| (n - expected).abs() < 1e-15), "{n:?}");
+    }
+
+    /// As the database's pages of glasses have it. Of the sodium line in air NIST gives the wavelength in vacuum.
+    #[test]
+    fn what_is_relative_to_air_is_brought_to_vacuum() {
+        let page = |specs: &str| {
+            format!(
+                "DATA:\n  - type: tabulated nk\n    data: |\n        0.588995095 1.5 0.25\n        0.9 1.5 0.25\nSPECS:\n{specs}    temperature: 20.0 °C\n"
+            )
+        };
+        let read = |specs: &str| {
+            let [Some(n), Some(k)] = yaml(&page(specs)).unwrap() else { panic!("both are given") };
+            (n, k)
+        };
+        let (n, k) = read("    n_is_absolute: false\n    wavelength_is_vacuum: false\n");
+        assert!((n.nm[0] - 589.158_326).abs() < 2e-4 && k.nm == n.nm, "{n:?}");
+        // λ in vacuum over λ in air is the index of air.
+        assert!((n.value[0] / 1.5 - 589.158_326 / 588.995_095).abs() < 1e-7, "{n:?}");
+        assert_eq!((k.value[0], n.notes.len(), k.notes.len()), (0.25, 2, 1));
+        let (n, _) = read("    n_is_absolute: false\n    wavelength_is_vacuum: true\n");
+        assert!(n.nm[0] == 588.995095 && n.value[0] > 1.5 && n.notes[0].contains("multiplied by that of air"), "{n:?}");
+        let (n, _) = read("    n_is_absolute: true\n");
+        assert_eq!((n.value[0], n.notes.len()), (1.5, 0));
+        let problem = yaml(&page("    n_is_absolute: perhaps\n")).unwrap_err();
+        assert!(problem.line == Some(7) && problem.message.contains("true or false, but is `perhaps`"), "{problem}");
+        let formula = "DATA:\n  - type: formula 5\n    wavelength_range: 0.4 0.8\n    coefficients: 1.5\nSPECS:\n  n_is_absolute: false\n";
+        let [Some(n), _] = yaml(formula).unwrap() else { panic!("n is given") };
+        assert!(n.value.iter().all(|n| *n > 1.5004 && *n < 1.50043), "{n:?}");
     }
 
     #[test]

@@ -51,6 +51,7 @@ pub fn parse_responses(bytes: &[u8], path: &Path) -> Result<Responses, Box<Probl
         wrong(Some(table.line), message, "name wavelength and unit: nm, um, angstrom, cm-1, THz, eV")
     })?;
     let in_air = unit::is_in_air(name(axis));
+    notes.extend(in_air.then(|| unit::FROM_AIR.to_owned()));
 
     let mut tables: Vec<(String, SpectrumTable)> = Vec::new();
     if table.names.is_empty() {
@@ -113,7 +114,7 @@ pub fn parse_responses(bytes: &[u8], path: &Path) -> Result<Responses, Box<Probl
     notes.dedup();
     let is_logarithm = |name: &str| Stated::in_name(name).is_some_and(|stated| stated.meaning == Meaning::Logarithm);
     if let Some((name, _)) = tables.iter().find(|(name, _)| is_logarithm(&value_name(name))) {
-        let message = format!("gives logarithms as the responses \"{}\"", name.escape_debug());
+        let message = format!("gives logarithms, or K/S, as the responses \"{}\"", name.escape_debug());
         return Err(wrong(Some(table.line), message, "write the responses themselves"));
     }
     let mut seen = std::collections::BTreeSet::new();
@@ -245,6 +246,12 @@ mod tests {
     }
 
     #[test]
+    fn wavelengths_in_air_are_converted_which_is_said() {
+        let found = parse("wavelength in air (nm),a\n400,0\n500,1\n600,0\n").unwrap();
+        assert!(found.warnings.len() == 1 && found.warnings[0].contains("converted to vacuum"), "{:?}", found.warnings);
+    }
+
+    #[test]
     fn noise_becomes_zero_and_is_told() {
         let noisy = parse("nm,a,b\n400,-0.009,0\n500,1,2\n600,-0.001,0\n").unwrap();
         let [warning] = &noisy.warnings[..] else { panic!("{:?}", noisy.warnings) };
@@ -269,6 +276,7 @@ mod tests {
             ("Frequency,a\n400,1\n500,1\n", Some(1), "`Frequency`"),
             ("band,nm,response\n", None, "no responses"),
             ("nm,log10 a\n400,0\n500,1\n", Some(1), "logarithms"),
+            ("nm,filter OD\n400,4\n500,0.1\n600,4\n", Some(1), "logarithms"),
             ("band,nm,response\na,400,1\na,500,1\na,450,1\na,600,1\n", Some(4), "follows"),
         ] {
             let problem = parse(text).unwrap_err();

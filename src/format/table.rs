@@ -5,7 +5,7 @@ use std::path::Path;
 
 use csv::{ReaderBuilder, StringRecord, Trim};
 
-use super::unit::{self, Stated, Unit};
+use super::unit::{self, FACTORS, Stated, Unit};
 use crate::error::Problem;
 
 type Read<T> = Result<T, Box<Problem>>;
@@ -320,7 +320,7 @@ impl Table<'_> {
         if self.names.is_empty() { self.rows.first().map_or(0, |row| row.cells.len()) } else { self.names.len() }
     }
 
-    /// The number in a cell; `None` where there is none, in a table of more than two columns.
+    /// The number in a cell; `None` where there is none.
     pub fn number(&self, row: &Row, column: usize) -> Read<Option<f64>> {
         let cell = row.cells.get(column).unwrap_or("");
         match parse_number(cell, self.decimal).filter(|value| value.is_finite()) {
@@ -332,8 +332,7 @@ impl Table<'_> {
 
     fn is_missing(&self, cell: &str) -> bool {
         let lower = cell.to_lowercase();
-        // Of two columns an empty one is more likely a mistake than a value that was not taken.
-        NOT_GIVEN.contains(&lower.as_str()) && (!cell.is_empty() || self.columns() > 2)
+        NOT_GIVEN.contains(&lower.as_str())
     }
 
     /// Refuses rows that have more or fewer cells than the table.
@@ -379,6 +378,7 @@ impl Table<'_> {
         }
         self.look_at_preamble(preamble)?;
         self.warn_of_units_in_comments(&names, start, comments);
+        self.warn_of_factors_in_comments(&names, comments);
         self.unit_in_comment = self.unit_of_comments(start, comments);
         if names.is_empty() {
             self.line = self.rows.get(start).map_or(self.line, |row| row.line);
@@ -490,7 +490,7 @@ impl Table<'_> {
             let key = whole.split([':', '=']).next().unwrap_or("").to_lowercase();
             let has_value =
                 row.cells.iter().flat_map(|cell| cell.split([':', '=', ' '])).any(|word| self.is_number(word));
-            let scales = ["scale", "factor", "gain", "offset", "multipl"].iter().any(|word| key.contains(word));
+            let scales = FACTORS.iter().chain(["offset"].iter()).any(|word| key.contains(word));
             let of_units = key.contains("unit") && Unit::stated(&whole) != Ok(None);
             if (scales && has_value) || of_units {
                 let message = format!("says `{}`, which is not applied", shown(&whole));
@@ -543,6 +543,23 @@ impl Table<'_> {
                 return;
             }
         }
+    }
+
+    /// The first comment that states a factor of the values, and the first that says that the wavelengths are those in air, where
+    /// the header does not.
+    fn warn_of_factors_in_comments(&mut self, names: &[String], comments: &[(usize, &str)]) {
+        let is_header = |line: usize| !names.is_empty() && line == self.line;
+        let others = || comments.iter().filter(|(line, _)| !is_header(*line));
+        let told = |(line, text): &(usize, &str)| format!("has the comment `{}` on line {line}", shown(text));
+        let factor = others().find(|(_, text)| unit::states_a_factor(text)).map(|comment| {
+            format!("{}, which is not applied (write the values so, or say `scale = …` in the scene)", told(comment))
+        });
+        let header_says = names.iter().any(|name| unit::is_in_air(name));
+        let air = others().find(|(_, text)| !header_says && unit::speaks_of_air(text)).map(|comment| {
+            let instead = "are taken as those in vacuum (name the column e.g. `wavelength in air (nm)`)";
+            format!("{}, which is not applied: its wavelengths {instead}", told(comment))
+        });
+        self.notes.extend(factor.into_iter().chain(air));
     }
 }
 

@@ -304,9 +304,7 @@ impl Axis {
             }
             found.notes.extend(self.looks_like_micrometres(&found.nm));
             if self.in_air {
-                found.notes.push(
-                    "gives wavelengths in air: they are converted to vacuum (Ciddor 1996, dry air of 15 °C)".to_owned(),
-                );
+                found.notes.push(unit::FROM_AIR.to_owned());
             }
             Ok((*column, ascending(found, table.path, &of(*column))?))
         };

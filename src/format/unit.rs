@@ -6,7 +6,7 @@ mod spelling;
 mod tests;
 
 use spelling::{
-    bracketed, has_factor, is_about_the_medium, is_logarithm, is_wavenumber, looks_like_unit, plain,
+    bracketed, has_factor, is_about_the_medium, is_logarithm, is_percent, is_wavenumber, looks_like_unit, plain,
     spectral_power_at_end, spells_power,
 };
 
@@ -19,6 +19,9 @@ const PLANCK_EV: f64 = PLANCK / CHARGE;
 
 /// Wavelengths all below this are those of nobody's optics in nm, and of everybody's in um.
 pub const MICROMETRES_BELOW: f64 = 100.0;
+
+/// How words begin, in small letters, with which files say that their numbers are multiplied.
+pub const FACTORS: [&str; 4] = ["scale", "factor", "gain", "multipl"];
 
 /// Dimensions that units are made of. Counts of things (photons, molecules) are dimensions, so that they never cancel against
 /// anything else.
@@ -336,7 +339,7 @@ pub struct Stated {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Meaning {
     Unit(Measure),
-    /// That of something else than the values themselves.
+    /// That of something else than the values themselves: their logarithms, or K/S.
     Logarithm,
     /// A unit or a factor that is not known here.
     Unknown,
@@ -371,7 +374,9 @@ impl Stated {
             }
             return match parse(inner) {
                 Some(measure) => stated(Meaning::Unit(measure), true),
-                None if looks_like_unit(inner) || has_factor(&text) => stated(Meaning::Unknown, true),
+                None if looks_like_unit(&text[..text.rfind(inner).unwrap_or(0)], inner) || has_factor(&text) => {
+                    stated(Meaning::Unknown, true)
+                }
                 None => None,
             };
         }
@@ -385,10 +390,10 @@ impl Stated {
             return stated(Meaning::Unit(measure), true);
         }
         // Spectrophotometers write %R and %T.
-        if text.ends_with('%')
-            || text.strip_prefix('%').is_some_and(|rest| rest.trim_start().starts_with(char::is_alphabetic))
-        {
-            return stated(Meaning::Unit(Measure { factor: 0.01, ..Measure::ONE }), true);
+        match is_percent(&text) {
+            Some(true) => return stated(Meaning::Unit(Measure { factor: 0.01, ..Measure::ONE }), true),
+            Some(false) => {}
+            None => return stated(Meaning::Unknown, true),
         }
         if let Some(measure) = text.rsplit_once(", ").and_then(|(_, after)| parse(after)) {
             return stated(Meaning::Unit(measure), false);
@@ -402,18 +407,45 @@ pub fn is_in_air(name: &str) -> bool {
     plain(name).to_lowercase().split(|c: char| !c.is_alphanumeric()).any(|word| word == "air")
 }
 
+/// Whether a sentence says that its wavelengths are those in air.
+pub fn speaks_of_air(text: &str) -> bool {
+    let lower = text.to_lowercase();
+    let of_axis = ["wave", "lambda", "\u{3bb}"].iter().any(|word| lower.contains(word));
+    let in_air =
+        lower.split("in air").skip(1).any(|after| !after.starts_with(|c: char| c.is_alphanumeric() || c == '-'));
+    let said = in_air || ["air wave", "(air)", "[air]", ": air", "= air"].iter().any(|words| lower.contains(words));
+    of_axis && said && !lower.contains("vac")
+}
+
+/// Whether a sentence says that values are to be, or have been, multiplied: `scale factor: 0.001`, `multiply by 1e-3`,
+/// `values x 1000`.
+pub fn states_a_factor(text: &str) -> bool {
+    spelling::states_a_factor(&plain(text))
+}
+
+/// What is said of wavelengths in air, after the name of their file.
+pub const FROM_AIR: &str = "gives wavelengths in air: they are converted to vacuum (Ciddor 1996, dry air of 15 °C)";
+
 /// A wavelength in air, nm, as that in vacuum: P. E. Ciddor, Applied Optics 35, 1566 (1996), eq. 1, for standard air (dry, 15 °C,
 /// 101,325 Pa, 450 ppm CO₂). Below 185 nm, where the formula ends, nothing changes.
 pub fn vacuum_nm(air_nm: f64) -> f64 {
-    if air_nm < 185.0 {
+    if air_nm < CIDDOR_FROM_NM {
         return air_nm;
     }
-    let index = |vacuum_nm: f64| {
-        // Squared wavenumber, µm⁻².
-        let s2 = 1e6 / (vacuum_nm * vacuum_nm);
-        1.0 + 1e-8 * (5_792_105.0 / (238.0185 - s2) + 167_917.0 / (57.362 - s2))
-    };
     // The index changes so slowly that two steps reach the last digit.
-    let first = air_nm * index(air_nm);
-    air_nm * index(air_nm * index(first))
+    let first = air_nm * ciddor(air_nm);
+    air_nm * ciddor(air_nm * ciddor(first))
+}
+
+/// The index of refraction of the same air at a wavelength in vacuum, nm; 1 where the formula has ended.
+pub fn air_index(vacuum_nm: f64) -> f64 {
+    if vacuum_nm < CIDDOR_FROM_NM { 1.0 } else { ciddor(vacuum_nm) }
+}
+
+const CIDDOR_FROM_NM: f64 = 185.0;
+
+fn ciddor(vacuum_nm: f64) -> f64 {
+    // Squared wavenumber, µm⁻².
+    let s2 = 1e6 / (vacuum_nm * vacuum_nm);
+    1.0 + 1e-8 * (5_792_105.0 / (238.0185 - s2) + 167_917.0 / (57.362 - s2))
 }

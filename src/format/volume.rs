@@ -14,6 +14,8 @@ pub struct Volume {
     pub values: Vec<f32>,
     /// What the file says of its unit, and what that is where it is understood.
     pub unit: Option<(String, Option<Measure>)>,
+    /// What to say of the file, in words that go on after its name.
+    pub notes: Vec<String>,
 }
 
 /// Voxels that one volume may have: 1 GiB of f32, and far below what indices of u32 reach.
@@ -58,7 +60,8 @@ pub fn read(path: &Path) -> Result<Volume, Box<Problem>> {
         }
     }
     let unit = array.units().map(|(text, measure)| (text.to_owned(), measure));
-    Ok(Volume { size: [nx, ny, nz].map(|side| side as u32), values, unit })
+    let notes = array.lost_chunks()?.into_iter().collect();
+    Ok(Volume { size: [nx, ny, nz].map(|side| side as u32), values, unit, notes })
 }
 
 /// Which dimensions are z, y and x: by their names, in any order, or [z, y, x] where they have none of these.

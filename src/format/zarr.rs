@@ -11,7 +11,8 @@ use serde_json::{Map, Value};
 use zarrs::array::{Array, ArrayBytes, ElementOwned};
 use zarrs::filesystem::FilesystemStore;
 
-use super::unit::{self, Measure};
+use super::table::shown;
+use super::unit::{self, FACTORS, Measure};
 use crate::error::Problem;
 
 type Read<T> = Result<T, Box<Problem>>;
@@ -26,9 +27,18 @@ pub struct Variable {
     /// The name of every dimension, empty where it has none.
     pub dimensions: Vec<String>,
     pub attributes: Map<String, Value>,
-    /// `fill_value` of a store of version 2, where CF's `_FillValue` stands.
     fill_value: Option<Value>,
+    /// Whether the store is of version 2, where CF's `_FillValue` stands as `fill_value`.
+    is_v2: bool,
     packing: Packing,
+}
+
+/// Chunks of an array that have no file.
+struct Lost {
+    /// The name of the first.
+    first: String,
+    count: u64,
+    of: u64,
 }
 
 /// How stored numbers become values.
@@ -75,6 +85,21 @@ pub fn arrays(path: &Path) -> Read<Vec<Variable>> {
     Ok(found)
 }
 
+/// The groups right within the group at `path`, by name.
+pub fn groups(path: &Path) -> Vec<String> {
+    let is_group = |path: &Path| {
+        let is_v3 = matches!(json(&path.join("zarr.json")), Ok(Some(data)) if data["node_type"] == "group");
+        is_v3 || path.join(".zgroup").is_file()
+    };
+    let entries = std::fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.path());
+    let mut names: Vec<String> = entries
+        .filter(|path| is_group(path))
+        .filter_map(|path| Some(path.file_name()?.to_string_lossy().into_owned()))
+        .collect();
+    names.sort();
+    names
+}
+
 fn json(path: &Path) -> Read<Option<Value>> {
     match std::fs::read(path) {
         Ok(bytes) => serde_json::from_slice(&bytes)
@@ -117,9 +142,9 @@ impl Variable {
             .unwrap_or_default();
         dimensions.resize(shape.len(), String::new());
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let fill_value = metadata.get("fill_value").filter(|_| is_v2).cloned();
-        let packing = Packing::default();
-        let mut variable = Variable { path: path.to_owned(), name, shape, dimensions, attributes, fill_value, packing };
+        let fill_value = metadata.get("fill_value").cloned();
+        let (path, packing) = (path.to_owned(), Packing::default());
+        let mut variable = Variable { path, name, shape, dimensions, attributes, fill_value, is_v2, packing };
         variable.packing = variable.packing()?;
         Ok(Some(variable))
     }
@@ -158,7 +183,8 @@ impl Variable {
             }
         }
         // 0 is what stores get that nobody asked: a number like any other.
-        missing.extend(self.fill_value.as_ref().and_then(fill).filter(|value| *value != 0.0));
+        let of_store = self.fill_value.as_ref().filter(|_| self.is_v2);
+        missing.extend(of_store.and_then(fill).filter(|value| *value != 0.0));
         let mut valid = match self.attributes.get("valid_range") {
             None | Some(Value::Null) => None,
             Some(Value::Array(range)) if range.len() == 2 => match (number(&range[0]), number(&range[1])) {
@@ -187,16 +213,91 @@ impl Variable {
         (!text.is_empty()).then(|| (text, unit::parse(text)))
     }
 
-    /// All values, C order; NaN where there is none.
-    pub fn values(&self) -> Read<Vec<f64>> {
-        let broken = |e: &dyn std::fmt::Display| {
-            let help = "what is uncompressed, or compressed with zstd, gzip, zlib, bz2 or Blosc, is read: in Python \
-                        `xarray.open_zarr(…).to_zarr(…, zarr_format=3)` writes that";
-            self.problem(format!("cannot be read as a Zarr array: {e}"), help)
+    fn broken(&self, e: &dyn std::fmt::Display) -> Box<Problem> {
+        let help = "what is uncompressed, or compressed with zstd, gzip, zlib, bz2 or Blosc, is read: in Python \
+                    `xarray.open_zarr(…).to_zarr(…, zarr_format=3)` writes that";
+        self.problem(format!("cannot be read as a Zarr array: {e}"), help)
+    }
+
+    fn array(&self) -> Read<Array<FilesystemStore>> {
+        let store = FilesystemStore::new(&self.path).map_err(|e| self.broken(&e))?;
+        Array::open(Arc::new(store), "/").map_err(|e| self.broken(&e))
+    }
+
+    /// Refuses attributes that scale numbers, or say which are none, by other names than CF's: nothing here applies them.
+    fn refuse_what_is_not_applied(&self) -> Read<()> {
+        const APPLIED: [&str; 4] = ["scale_factor", "add_offset", "_FillValue", "missing_value"];
+        const NO_VALUE: [&str; 6] = ["ignore value", "nodata", "no data", "fillvalue", "fill value", "missing value"];
+        let changes = |(key, value): &(&String, &Value)| {
+            let lower = key.to_lowercase().replace(['_', '-'], " ");
+            let has = |words: &[&str]| words.iter().any(|word| lower.contains(word));
+            let neutral = match (has(&FACTORS), has(&["offset"])) {
+                (true, _) => 1.0,
+                (false, true) => 0.0,
+                (false, false) => return has(&NO_VALUE) && !value.is_null(),
+            };
+            let is_neutral = |value: &Value| number(value) == Some(neutral);
+            match value {
+                Value::Null => false,
+                Value::Array(all) => !all.iter().all(is_neutral),
+                Value::String(text) if ["", "none", "linear"].contains(&text.trim().to_lowercase().as_str()) => false,
+                one => !is_neutral(one),
+            }
         };
-        let store = FilesystemStore::new(&self.path).map_err(|e| broken(&e))?;
-        let array = Array::open(Arc::new(store), "/").map_err(|e| broken(&e))?;
-        let bytes: ArrayBytes<'static> = array.retrieve_array_subset(&array.subset_all()).map_err(|e| broken(&e))?;
+        let is_applied = |key: &String| APPLIED.contains(&key.as_str());
+        match self.attributes.iter().filter(|(key, _)| !is_applied(key)).find(changes) {
+            None => Ok(()),
+            Some((key, value)) => {
+                let value = shown(&value.to_string());
+                let help =
+                    "apply it and remove it; CF's `scale_factor`, `add_offset` and `_FillValue` are applied here";
+                Err(self.problem(format!("has the attribute `{key}` = {value}, which is not applied"), help))
+            }
+        }
+    }
+
+    /// What to say of chunks without a file, if there are any, in words that go on after the store's name: they read as the
+    /// fill value.
+    pub fn lost_chunks(&self) -> Read<Option<String>> {
+        let Some(Lost { first, count, of }) = self.lost(&self.array()?) else { return Ok(None) };
+        let fill = self.fill_value.as_ref().map_or("0".to_owned(), Value::to_string);
+        Ok(Some(format!(
+            "has no file of {count} of the {of} chunks of its array `{}`, the first of them `{first}`: they are read as the \
+             fill value, {fill}",
+            self.name
+        )))
+    }
+
+    fn lost(&self, array: &Array<FilesystemStore>) -> Option<Lost> {
+        let grid = array.chunk_grid_shape();
+        let of = grid.iter().product();
+        let mut lost: Option<Lost> = None;
+        for chunk in 0..of {
+            let mut rest: u64 = chunk;
+            let mut place = vec![0; grid.len()];
+            for (at, side) in place.iter_mut().zip(grid).rev() {
+                (*at, rest) = (rest % side, rest / side);
+            }
+            let key = array.chunk_key(&place);
+            if !self.path.join(key.as_str()).is_file() {
+                lost.get_or_insert_with(|| Lost { first: key.as_str().to_owned(), count: 0, of }).count += 1;
+            }
+        }
+        lost
+    }
+
+    /// All values, C order; NaN where there is none. An error where an attribute that is not applied changes them, or where a
+    /// chunk without a file has no fill value.
+    pub fn values(&self) -> Read<Vec<f64>> {
+        self.refuse_what_is_not_applied()?;
+        let array = self.array()?;
+        if let (Some(Value::Null), Some(Lost { first, count, of })) = (&self.fill_value, self.lost(&array)) {
+            let message =
+                format!("has no file of {count} of its {of} chunks, the first of them `{first}`, and no fill value");
+            return Err(self.problem(message, "copy the store again, whole"));
+        }
+        let bytes: ArrayBytes<'static> =
+            array.retrieve_array_subset(&array.subset_all()).map_err(|e| self.broken(&e))?;
         let stored = numbers(&array, &bytes, self.packing.unsigned)
             .ok_or_else(|| self.problem(format!("holds {}, but must hold real numbers", array.data_type()), ""))?;
         Ok(self.packing.apply(stored))

@@ -105,7 +105,7 @@ impl Data {
             return Err(self.problem(message, HELP));
         }
         // Each is at most the number of voxels.
-        Ok(Volume { size: [x, y, z].map(|n| n as u32), values: values.clone(), unit: None })
+        Ok(Volume { size: [x, y, z].map(|n| n as u32), values: values.clone(), unit: None, notes: Vec::new() })
     }
 
     /// As a mesh file of one run of faces.

@@ -98,7 +98,10 @@ fn responses(item: &Item) -> Option<Vec<(String, Response)>> {
 
 /// What a `unit` is in nm.
 fn unit(fields: &Fields) -> Option<f64> {
-    fields.get("unit").map_or(Some(1.0), |item| item.choice(&UNITS))
+    let Some(item) = fields.get("unit") else { return Some(1.0) };
+    // The sign for micro is a character of its own beside the Greek letter.
+    let is_micro = matches!(item.text()?, "\u{b5}m" | "\u{3bc}m");
+    if is_micro { Some(1e3) } else { item.choice(&UNITS) }
 }
 
 /// A wavelength in nm, written in a unit.

@@ -381,8 +381,9 @@ impl Grids {
 
 /// A volume in Spectile's units, without noise; what is missing or impossible is an error.
 fn checked(item: &Item, volume: Volume, describes: Describes) -> Option<Grid> {
-    let Volume { size, mut values, unit } = volume;
+    let Volume { size, mut values, unit, notes } = volume;
     let (name, _) = item.source()?;
+    notes.iter().for_each(|note| item.cx.warn(format!("{name} {note}")));
     let place = |i: usize| {
         let [nx, ny, _] = size.map(|n| n as usize);
         format!("[{}, {}, {}]", i / (nx * ny), i / nx % ny, i % nx)

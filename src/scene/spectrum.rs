@@ -499,7 +499,7 @@ impl<'a> Spectra<'a> {
             Meaning::Unit(measure) => measure,
             Meaning::Logarithm => {
                 user.error_help(
-                    format!("{path} gives logarithms as its values (`{text}`)"),
+                    format!("{path} gives logarithms, or K/S, as its values (`{text}`)"),
                     "write the values themselves",
                 );
                 return None;

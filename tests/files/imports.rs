@@ -181,6 +181,60 @@ fn scenes_use_them_wherever_a_spectrum_is_expected() {
     wrong("file = \"bare.csv\"\n", "constant = 1\n", "goes with `file` only");
 }
 
+/// What files say of their values, through a scene: applied, refused or told of, never skipped.
+#[test]
+fn what_columns_say_of_their_values_is_applied_refused_or_told() {
+    let folder = files();
+    let percent = format!("{LIBRARY}z plot titles = {{Wavelength (nm), Reflectance (percent)}}\n");
+    fs::write(folder.path().join("percent.hdr"), percent).expect("written");
+    fs::copy(folder.path().join("soils.sli"), folder.path().join("percent.sli")).expect("copied");
+    let load = |header: &str, material: &str| {
+        fs::write(folder.path().join("a.csv"), format!("nm,{header}\n300,0.5\n900,0.5\n")).expect("written");
+        let text = format!(
+            "[camera.perspective]\nposition = [0, 0, 3]\nlook_at = [0, 0, 0]\nup = [0, 1, 0]\nfov = 40\n[film]\nwidth = 4\n\
+             height = 4\n[channels]\nequal = {{ from = 420, to = 700, count = 4 }}\n[environment]\nradiance = 1\n{material}"
+        );
+        scene::parse(&text, &folder.path().join("scene.toml"), &[]).map_err(|error| error.to_string())
+    };
+    let ball = "[[objects]]\nsphere = { center = [0, 0, 0], radius = 1 }";
+    let diffuse = |source: &str| format!("[materials.x.diffuse]\nreflectance = {source}\n{ball}\nmaterial = \"x\"\n");
+    let csv = diffuse("{ file = \"a.csv\" }");
+    let gas = format!(
+        "[media.m]\ntemperature = 600\nspecies = [{{ table = \"a.csv\", fraction = 0.5 }}]\n{ball}\ninterior = \"m\"\n"
+    );
+    let holds = |scene: &scene::Scene, expected: f64| {
+        scene.spectra.iter().any(|s| match &s.curve {
+            Curve::Linear { value, .. } => (value[0] / expected - 1.0).abs() < 1e-6,
+            _ => false,
+        })
+    };
+    for (header, material, expected) in [
+        ("percent", &csv, 0.005),
+        ("reflectance (per mille)", &csv, 0.5e-3),
+        ("reflectance (ppm)", &csv, 0.5e-6),
+        ("300 (kPa-1 m-1)", &gas, 0.5 * 101.325),
+        // At 600 K there are fewer molecules in a cubic metre of 1 atm.
+        ("600 (m-1 amagat-1)", &gas, 0.5 * 273.15 / 600.0),
+        ("", &diffuse("{ file = \"percent.sli\", column = \"second\" }"), 0.003),
+    ] {
+        let scene = load(header, material).unwrap_or_else(|error| panic!("{header}: {error}"));
+        assert!(holds(&scene, expected), "{header}: {:?}", scene.spectra);
+        assert!(scene.warnings.iter().all(|warning| !warning.contains("not understood")), "{:?}", scene.warnings);
+    }
+    for (header, material) in
+        [("reflectance (bananas)", &csv), ("reflectance (0-100)", &csv), ("300 (cm-1 bananas)", &gas)]
+    {
+        let scene = load(header, material).unwrap_or_else(|error| panic!("{header}: {error}"));
+        let told =
+            scene.warnings.iter().filter(|warning| warning.contains(&format!("`{header}` of its values"))).count();
+        assert_eq!(told, 1, "{header}: {:?}", scene.warnings);
+    }
+    for header in ["OD", "optical density", "Abs", "-log R", "\"reflectance, log\"", "K/S"] {
+        let error = load(header, &csv).expect_err(header);
+        assert!(error.contains("gives logarithms, or K/S, as its values"), "{header}: {error}");
+    }
+}
+
 /// What spectral's own readers and pyASDReader make of the files, and a library that spectral wrote.
 #[test]
 fn readers_of_python_read_the_same() {

@@ -337,22 +337,24 @@ fn envi_resolves() {
     }
 }
 
+/// The metadata of a Zarr v3 array in one plain chunk.
+fn zarr_array(shape: &[usize], kind: &str, names: &[&str], attributes: &str) -> Vec<u8> {
+    format!(
+        r#"{{"zarr_format": 3, "node_type": "array", "shape": {shape:?}, "data_type": "{kind}",
+        "chunk_grid": {{"name": "regular", "configuration": {{"chunk_shape": {shape:?}}}}},
+        "chunk_key_encoding": {{"name": "default", "configuration": {{"separator": "/"}}}},
+        "fill_value": 0, "codecs": [{{"name": "bytes", "configuration": {{"endian": "little"}}}}],
+        "dimension_names": {names:?}, "attributes": {attributes}}}"#
+    )
+    .into_bytes()
+}
+
 /// A Zarr v3 group of two arrays in plain chunks; `order` are the dimensions of the radiance.
 fn zarr(order: [&str; 3], units: &str) -> Vec<(String, Vec<u8>)> {
     let length = |name: &str| match name {
         "wavelength" => 4,
         "y" => 2,
         _ => 3,
-    };
-    let array = |shape: &[usize], kind: &str, names: &[&str], attributes: &str| {
-        format!(
-            r#"{{"zarr_format": 3, "node_type": "array", "shape": {shape:?}, "data_type": "{kind}",
-            "chunk_grid": {{"name": "regular", "configuration": {{"chunk_shape": {shape:?}}}}},
-            "chunk_key_encoding": {{"name": "default", "configuration": {{"separator": "/"}}}},
-            "fill_value": 0, "codecs": [{{"name": "bytes", "configuration": {{"endian": "little"}}}}],
-            "dimension_names": {names:?}, "attributes": {attributes}}}"#
-        )
-        .into_bytes()
     };
     let shape = order.map(length);
     let mut values = Vec::new();
@@ -364,9 +366,9 @@ fn zarr(order: [&str; 3], units: &str) -> Vec<(String, Vec<u8>)> {
     let wavelengths = BANDS.iter().flat_map(|nm| nm.to_le_bytes()).collect();
     vec![
         ("s.zarr/zarr.json".into(), br#"{"zarr_format": 3, "node_type": "group", "attributes": {}}"#.to_vec()),
-        ("s.zarr/sky/zarr.json".into(), array(&shape, "float32", &order, "{}")),
+        ("s.zarr/sky/zarr.json".into(), zarr_array(&shape, "float32", &order, "{}")),
         ("s.zarr/sky/c/0/0/0".into(), values),
-        ("s.zarr/wavelength/zarr.json".into(), array(&[4], "float64", &["wavelength"], units)),
+        ("s.zarr/wavelength/zarr.json".into(), zarr_array(&[4], "float64", &["wavelength"], units)),
         ("s.zarr/wavelength/c/0".into(), wavelengths),
     ]
 }
@@ -388,6 +390,158 @@ fn zarr_resolves() {
     zarr_folder(["wavelength", "y", "x"], "{}").refused("map = \"s.zarr\"", &["in what unit"]);
     zarr_folder(["wavelength", "y", "x"], "{}")
         .refused("map = \"s.zarr/sky\"", &["sky is one Zarr array", "the folder of a group"]);
+}
+
+/// The plain store, with files added, and those without content left out.
+fn zarr_with(more: &[(&str, Vec<u8>)]) -> Folder {
+    let mut files = zarr(["wavelength", "y", "x"], r#"{"units": "nm"}"#);
+    files.retain(|(name, _)| more.iter().all(|(other, _)| name != other));
+    files.extend(
+        more.iter().filter(|(_, bytes)| !bytes.is_empty()).map(|(name, bytes)| (name.to_string(), bytes.clone())),
+    );
+    Folder::new(&files.iter().map(|(name, bytes)| (name.as_str(), bytes.clone())).collect::<Vec<_>>())
+}
+
+const OVER_SKY: [&str; 3] = ["wavelength", "y", "x"];
+
+#[test]
+fn zarr_attributes_that_are_not_applied_are_refused() {
+    let sky = |attributes: &str| {
+        zarr_with(&[("s.zarr/sky/zarr.json", zarr_array(&[4, 2, 3], "float32", &OVER_SKY, attributes))])
+    };
+    for attribute in [
+        r#""gain": 2.0"#,
+        r#""multiplier": 2"#,
+        r#""offset": 1.0"#,
+        r#""scale": "0.5""#,
+        r#""Scale_Factor": 10000.0"#,
+        r#""Data_Ignore_Value": -9999"#,
+        r#""data gain values": [2, 2, 2, 2]"#,
+    ] {
+        let name = attribute.split('"').nth(1).unwrap();
+        let folder = sky(&format!("{{{attribute}}}"));
+        folder.refused("map = \"s.zarr\"", &[&format!("`{name}` = "), "which is not applied", "`scale_factor`"]);
+    }
+    let (map, warnings) = sky(r#"{"gain": 1, "offset": [0, 0], "scale": "linear"}"#).map("map = \"s.zarr\"");
+    assert_spectral(&map);
+    assert_eq!(warnings, Vec::<String>::new());
+}
+
+#[test]
+fn zarr_wavelengths_in_air_are_converted() {
+    for attribute in [r#""long_name": "wavelength in air""#, r#""standard_name": "air_wavelength""#] {
+        let axis = zarr_array(&[4], "float64", &["wavelength"], &format!(r#"{{"units": "nm", {attribute}}}"#));
+        let (map, warnings) = zarr_with(&[("s.zarr/wavelength/zarr.json", axis)]).map("map = \"s.zarr\"");
+        let Texels::Spectral { nm, .. } = &map.texels else { panic!("{map:?}") };
+        assert!(nm.iter().zip(BANDS).all(|(a, b)| (a / b - 1.000_28).abs() < 2e-5), "{nm:?}");
+        assert!(warnings.len() == 1 && warnings[0].contains("converted to vacuum"), "{warnings:?}");
+    }
+}
+
+#[test]
+fn zarr_chunks_without_a_file_are_told_or_refused() {
+    let told = |folder: &Folder| {
+        let (_, mut warnings) = folder.map("map = \"s.zarr\"");
+        warnings.retain(|warning| !warning.contains("shines in none"));
+        warnings
+    };
+    let warnings = told(&zarr_with(&[("s.zarr/sky/c/0/0/0", vec![])]));
+    assert!(
+        warnings.len() == 1 && warnings[0].contains("no file of 1 of the 1 chunks of its array `sky`"),
+        "{warnings:?}"
+    );
+    assert!(warnings[0].contains("`c/0/0/0`") && warnings[0].contains("fill value, 0"), "{warnings:?}");
+    let v2 = |fill: &str| {
+        let metadata = format!(
+            r#"{{"zarr_format": 2, "shape": [4, 2, 3], "chunks": [4, 2, 2], "dtype": "<f4", "order": "C", "compressor": null,
+            "filters": null, "fill_value": {fill}}}"#
+        );
+        let names = br#"{"_ARRAY_DIMENSIONS": ["wavelength", "y", "x"]}"#.to_vec();
+        zarr_with(&[
+            ("s.zarr/sky/zarr.json", vec![]),
+            ("s.zarr/sky/c/0/0/0", vec![]),
+            ("s.zarr/sky/.zarray", metadata.into_bytes()),
+            ("s.zarr/sky/.zattrs", names),
+            ("s.zarr/sky/0.0.1", vec![0; 64]),
+        ])
+    };
+    v2("null")
+        .refused("map = \"s.zarr\"", &["no file of 1 of its 2 chunks, the first of them `0.0.0`", "no fill value"]);
+    v2("\"NaN\"")
+        .refused("map = \"s.zarr\"", &["no value at column 0, row 0 of band 1, and has no file of 1 of the 2 chunks"]);
+    let warnings = told(&v2("0"));
+    assert!(warnings.len() == 1 && warnings[0].contains("no file of 1 of the 2 chunks"), "{warnings:?}");
+}
+
+/// The same sky under CF's latitudes and longitudes, however its rows and columns are ordered and named.
+#[test]
+fn zarr_coordinates_say_where_rows_and_columns_lie() {
+    let doubles = |values: &[f64]| values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
+    // (names of the dimensions, of the coordinates, their attributes, latitudes, longitudes, order of rows, of columns)
+    let store = |[y, x]: [&str; 2], names: [&str; 2], attributes: [&str; 2], lat: &[f64], lon: &[f64]| {
+        let [of_y, of_x] = names.map(|name| format!("s.zarr/{name}"));
+        let array = |count: usize, over: &str, attributes: &str| zarr_array(&[count], "float64", &[over], attributes);
+        zarr_with(&[
+            ("s.zarr/sky/zarr.json", zarr_array(&[4, 2, 3], "float32", &["wavelength", y, x], "{}")),
+            (&format!("{of_y}/zarr.json"), array(2, y, attributes[0])),
+            (&format!("{of_y}/c/0"), doubles(lat)),
+            (&format!("{of_x}/zarr.json"), array(3, x, attributes[1])),
+            (&format!("{of_x}/c/0"), doubles(lon)),
+        ])
+    };
+    let cf = [r#"{"units": "degrees_north"}"#, r#"{"standard_name": "longitude"}"#];
+    let (south, north) = ([-45.0, 45.0], [45.0, -45.0]);
+    for (dimensions, names, attributes, lat, lon, rows, columns) in [
+        (["lat", "lon"], ["lat", "lon"], ["{}", "{}"], north, [-120.0, 0.0, 120.0], [0, 1], [0, 1, 2]),
+        (["y", "x"], ["y", "x"], cf, south, [-120.0, 0.0, 120.0], [1, 0], [0, 1, 2]),
+        (["y", "x"], ["phi", "lam"], cf, south, [0.0, 120.0, 240.0], [1, 0], [2, 0, 1]),
+        (["lat", "lon"], ["lat", "lon"], ["{}", "{}"], north, [120.0, 0.0, -120.0], [0, 1], [2, 1, 0]),
+        (["lat", "lon"], ["lat", "lon"], ["{}", "{}"], north, [240.0, 120.0, 0.0], [0, 1], [0, 2, 1]),
+        // Without a word about what they are, rows go down.
+        (["y", "x"], ["y", "x"], ["{}", "{}"], south, [240.0, 120.0, 0.0], [0, 1], [0, 1, 2]),
+    ] {
+        let (map, warnings) = store(dimensions, names, attributes, &lat, &lon).map("map = \"s.zarr\"");
+        let Texels::Spectral { radiance, .. } = &map.texels else { panic!("{map:?}") };
+        let expected: Vec<f32> = rows
+            .iter()
+            .flat_map(|y| columns.iter().flat_map(move |x| (0..4).map(move |band| value(*x, *y, band))))
+            .collect();
+        assert_eq!(radiance[..], expected, "{dimensions:?} {lon:?}");
+        assert_eq!(warnings, Vec::<String>::new());
+    }
+    // A part of the sphere is taken as all of it, and told of.
+    let (_, warnings) = store(["lat", "lon"], ["lat", "lon"], ["{}", "{}"], &[10.0, 20.0], &[170.0, 180.0, 190.0])
+        .map("map = \"s.zarr\"");
+    assert_eq!(warnings.len(), 2, "{warnings:?}");
+    assert!(
+        warnings[0].contains("latitudes `lat` from 20 to 10")
+            && warnings[1].contains("longitudes `lon` from 170 to 190")
+    );
+}
+
+#[test]
+fn radiance_headers_are_applied_refused_or_told() {
+    let texels = [[128, 64, 0, 129]; 2];
+    let folder = |line: &str| Folder::new(&[("a.hdr", hdr([2, 1], &format!("#?RADIANCE\n{line}"), &texels))]);
+    folder("GAMMA=2.2").refused("map = \"a.hdr\"", &["GAMMA=2.2", "not linear"]);
+    for (line, words) in
+        [("GAMMA=1.0", None), ("PIXASPECT=2", Some("PIXASPECT=2")), ("VIEW= -vtv -vh 45", Some("VIEW=-vtv -vh 45"))]
+    {
+        let (_, warnings) = folder(line).map("map = \"a.hdr\"");
+        assert_eq!(warnings.len(), usize::from(words.is_some()), "{line}: {warnings:?}");
+        assert!(words.is_none_or(|words| warnings[0].contains(words)), "{warnings:?}");
+    }
+}
+
+#[test]
+fn envi_titles_of_plots_convert_maps() {
+    let titles = "z plot titles = {Wavelength (nm), Radiance (uW/cm^2/sr/nm)}\n";
+    let bytes = [b"12345".to_vec(), 2f32.to_le_bytes().repeat(24)].concat();
+    let folder = Folder::new(&[("a.img", bytes), ("a.hdr", envi_header("bsq", 4, 0, titles))]);
+    let (map, warnings) = folder.map("map = \"a.img\"");
+    let Texels::Spectral { radiance, .. } = &map.texels else { panic!("{map:?}") };
+    assert!(radiance.iter().all(|v| (v - 0.02).abs() < 1e-8), "{radiance:?}");
+    assert!(warnings.len() == 1 && warnings[0].contains("converted to W m-2 sr-1 nm-1"), "{warnings:?}");
 }
 
 #[test]
@@ -419,6 +573,14 @@ fn wrong_maps() {
         ("gap.hdr", header("data ignore value = 0\n")),
         ("bare.img", data(101)),
         ("bare.hdr", spoilt("wavelength =", "fwhm =")),
+        ("units.img", data(101)),
+        ("units.hdr", spoilt("wavelength units = Micrometers\n", "")),
+        ("two.img", data(101)),
+        ("two.bil", data(101)),
+        ("two.hdr", header("")),
+        ("nested.zarr/.zgroup", b"{}".to_vec()),
+        ("nested.zarr/inner/.zgroup", b"{}".to_vec()),
+        ("empty.zarr/.zgroup", b"{}".to_vec()),
     ]);
     for (map, words) in [
         ("text.exr", &["text.exr", "no map in a known format", "OpenEXR, Radiance"][..]),
@@ -430,7 +592,11 @@ fn wrong_maps() {
         ("short.img", &["short.img has 100 bytes", "promises 101"]),
         ("alone.hdr", &["header without its data", "alone.img"]),
         ("gap.img", &["no value at column 0, row 0 of band 1"]),
-        ("bare.img", &["lacks `wavelength`"]),
+        ("bare.img", &["lacks `wavelength`", "`wavelength = {"]),
+        ("units.img", &["lacks `wavelength units`", "`wavelength units = Nanometers`"]),
+        ("two.hdr", &["two.img", "two.bil", "name the file of the data"]),
+        ("nested.zarr", &["no array of three dimensions, but the groups inner", "STORE/GROUP"]),
+        ("empty.zarr", &["no array of three dimensions", "over y, x and `wavelength`"]),
         ("wavenumber.img", &["does not say in what unit its radiance is", "data units"]),
     ] {
         folder.refused(&format!("map = \"{map}\""), words);

@@ -219,6 +219,19 @@ fn wrong_media() {
 }
 
 #[test]
+fn chunks_of_grids_without_a_file_are_told() {
+    // Chunks of nothing but the fill value are not written.
+    let scene =
+        with_grids(&filled(BALL, "[media.gas]\nabsorption = 1\ndensity = { grid = \"d.zarr\" }")).expect("a scene");
+    let told: Vec<&String> = scene.warnings.iter().filter(|warning| warning.contains("no file")).collect();
+    assert_eq!(told.len(), 1, "{:?}", scene.warnings);
+    assert!(
+        told[0].starts_with("d.zarr has no file of 8 of the 8 chunks") && told[0].ends_with("fill value, 3"),
+        "{told:?}"
+    );
+}
+
+#[test]
 fn wrong_grids() {
     #[rustfmt::skip]
     let cases: &[(&str, &str, &[&str])] = &[

@@ -98,8 +98,11 @@ fn channels_resolve_in_their_order() {
     let um = ("channels.unit", "um");
     let bounds = good(BASE, &[], &[("channels.intervals", "[[8, 12.5], [3, 5]]"), um]).channels.bounds;
     assert_eq!(bounds, [[8000.0, 12500.0], [3000.0, 5000.0]]);
-    let equal = ("channels.equal", "{ from = 8, to = 14, unit = \"um\", count = 3 }");
-    assert_eq!(good(BASE, &[], &[equal]).channels.bounds, [[8e3, 10e3], [10e3, 12e3], [12e3, 14e3]]);
+    for unit in ["um", "\u{b5}m", "\u{3bc}m"] {
+        let equal = format!("{{ from = 8, to = 14, unit = \"{unit}\", count = 3 }}");
+        let bounds = good(BASE, &[], &[("channels.equal", equal.as_str())]).channels.bounds;
+        assert_eq!(bounds, [[8e3, 10e3], [10e3, 12e3], [12e3, 14e3]], "{unit}");
+    }
 }
 
 /// Area, and the sum of triangle normals times areas (0 for a closed surface).

@@ -118,3 +118,25 @@ fn mistakes_name_their_line() {
         assert!(problem.message.contains(words), "{text:?}: {problem}");
     }
 }
+
+#[test]
+fn titles_of_plots_say_the_unit_where_data_units_do_not() {
+    let unit = |more: &str| {
+        let header = read(&format!("{SMALL}interleave = bsq\n{more}\n"))?;
+        Ok::<_, Box<Problem>>(header.unit().map(|stated| stated.meaning))
+    };
+    let titles = |text: &str| format!("z plot titles = {{Wavelength (nm), {text}}}");
+    assert_eq!(unit(""), Ok(None));
+    assert_eq!(unit(&titles("Reflectance")), Ok(None));
+    let radiance = Some(Meaning::Unit(unit::parse("uW/cm^2/sr/nm").unwrap()));
+    assert_eq!(unit(&titles("Radiance (uW/cm^2/sr/nm)")), Ok(radiance));
+    assert_eq!(unit(&titles("Reflectance (percent)")), Ok(Some(Meaning::Unit(unit::parse("%").unwrap()))));
+    assert_eq!(unit(&titles("Reflectance (bananas)")), Ok(Some(Meaning::Unknown)));
+    assert_eq!(unit(&titles("Absorbance")), Ok(Some(Meaning::Logarithm)));
+    assert_eq!(unit("data units = Bananas"), Ok(Some(Meaning::Unknown)));
+    let both = |data: &str| unit(&format!("{}\ndata units = {data}", titles("Radiance (uW/cm^2/sr/nm)")));
+    assert_eq!(both("uW / (cm2 sr nm)"), Ok(radiance));
+    assert_eq!(both("Radiance"), Ok(radiance));
+    let problem = both("W m-2 sr-1 nm-1").unwrap_err();
+    assert!(problem.line == Some(7) && problem.message.contains("`z plot titles` says `Radiance (uW"), "{problem}");
+}

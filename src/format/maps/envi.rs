@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::{Bands, Map, checked_size, spectral, whole, with_help};
 use crate::error::Problem;
 use crate::format::envi::{header_path, is_header, parse};
-use crate::format::unit;
+use crate::format::unit::{Meaning, Stated};
 
 /// The header of the data file at `path`, if it is one of ENVI's.
 pub fn header_of(path: &Path) -> Option<PathBuf> {
@@ -13,10 +13,24 @@ pub fn header_of(path: &Path) -> Option<PathBuf> {
 }
 
 /// The data file of the header at `path`.
-fn data_of(path: &Path) -> Option<PathBuf> {
+fn data_of(path: &Path) -> Result<PathBuf, Box<Problem>> {
     let bare = path.with_extension("");
     let names = ["img", "dat", "bil", "bip", "bsq", "raw"].map(|extension| bare.with_extension(extension));
-    std::iter::once(bare).chain(names).find(|name| name.is_file())
+    let mut found: Vec<PathBuf> = std::iter::once(bare.clone()).chain(names).filter(|name| name.is_file()).collect();
+    // Where a header is called m.img.hdr, both are one.
+    found.dedup();
+    match &found[..] {
+        [one] => Ok(one.clone()),
+        [] => {
+            let name = bare.display();
+            Err(with_help(path, "is an ENVI header without its data".to_owned(), &format!("put {name}.img beside it")))
+        }
+        several => {
+            let names: Vec<String> = several.iter().map(|name| name.display().to_string()).collect();
+            let message = format!("may be the header of any of {}", names.join(", "));
+            Err(with_help(path, message, "name the file of the data that is meant as the map"))
+        }
+    }
 }
 
 /// The raster of the header at `path`; `data` is its file of numbers, where that is known.
@@ -25,19 +39,32 @@ pub fn read(path: &Path, data: Option<&Path>) -> Result<Map, Box<Problem>> {
     let header = parse(&bytes(path)?, path)?;
     let data_path = match data {
         Some(data) => data.to_owned(),
-        None => data_of(path).ok_or_else(|| {
-            let name = path.with_extension("").display().to_string();
-            with_help(path, "is an ENVI header without its data".to_owned(), &format!("put {name}.img beside it"))
-        })?,
+        None => data_of(path)?,
     };
     let size = checked_size(path, header.samples as u64, header.lines as u64)?;
     let Some(axis) = header.axis else {
-        return Err(whole(path, "lacks `wavelength units`".to_owned()));
+        let help = "say in what its wavelengths are, e.g. `wavelength units = Nanometers`";
+        return Err(with_help(path, "lacks `wavelength units`".to_owned(), help));
     };
-    let nm = header.wavelength_nm.as_ref().ok_or_else(|| whole(path, "lacks `wavelength`".to_owned()))?;
+    let nm = header.wavelength_nm.as_ref().ok_or_else(|| {
+        with_help(
+            path,
+            "lacks `wavelength`".to_owned(),
+            "list that of each band, e.g. `wavelength = { 400, 500, 600 }`",
+        )
+    })?;
     let mut warnings: Vec<String> = header.notes.clone();
-    let density = match header.get("data units").map(str::trim).filter(|text| !text.is_empty()) {
-        Some(text) => super::radiance_of(path, text, unit::parse(text), axis, &mut warnings)?,
+    let density = match header.unit() {
+        Some(Stated { meaning, text, .. }) => {
+            let measure = match meaning {
+                Meaning::Unit(measure) => Some(*measure),
+                Meaning::Unknown => None,
+                Meaning::Logarithm => {
+                    return Err(header.problem("z plot titles", "speaks of logarithms: write radiances"));
+                }
+            };
+            super::radiance_of(path, text, measure, axis, &mut warnings)?
+        }
         None => super::radiance_unsaid(path, axis)?,
     };
     let bytes = bytes(&data_path)?;

@@ -7,9 +7,10 @@ use std::path::Path;
 use image::ImageDecoder;
 use image::codecs::hdr::HdrDecoder;
 
-use super::{Content, Map, checked_size, to_srgb, whole};
+use super::{Content, Map, checked_size, to_srgb, whole, with_help};
 use crate::error::Problem;
 use crate::format::primaries::Primaries;
+use crate::format::table::shown;
 
 /// The picture at `path`, with the exposure and colour correction of its header undone.
 pub fn read(path: &Path) -> Result<Map, Box<Problem>> {
@@ -19,12 +20,23 @@ pub fn read(path: &Path) -> Result<Map, Box<Problem>> {
     let decoder = HdrDecoder::new_nonstrict(BufReader::new(file)).map_err(|e| broken(&e))?;
     let meta = decoder.metadata();
     let mut primaries = None;
+    let mut warnings = Vec::new();
     for (key, value) in &meta.custom_attributes {
         let numbers: Option<Vec<f64>> = value.split_whitespace().map(|word| word.parse().ok()).collect();
         match (key.trim(), numbers.as_deref()) {
             ("EXPOSURE", Some([_])) | ("COLORCORR", Some([_, _, _])) => {}
             ("PRIMARIES", Some(&[rx, ry, gx, gy, bx, by, wx, wy])) => {
                 primaries = Some(Primaries([[rx, ry], [gx, gy], [bx, by], [wx, wy]]));
+            }
+            ("GAMMA" | "PIXASPECT", Some([value])) if *value == 1.0 => {}
+            ("GAMMA", _) => {
+                let message = format!("says GAMMA={}, so its numbers are not linear", shown(value));
+                return Err(with_help(path, message, "save it with linear values, without that line"));
+            }
+            (key @ ("VIEW" | "PIXASPECT"), _) => {
+                let value = shown(value.trim());
+                warnings
+                    .push(format!("says {key}={value}, which is not applied: it is taken as a map of all directions"));
             }
             // The decoder passes over what it cannot parse.
             (key @ ("EXPOSURE" | "COLORCORR" | "PRIMARIES"), _) => {
@@ -37,7 +49,6 @@ pub fn read(path: &Path) -> Result<Map, Box<Problem>> {
     let mut rgb = vec![0f32; 3 * meta.width as usize * meta.height as usize];
     decoder.read_image(bytemuck::cast_slice_mut(&mut rgb)).map_err(|e| broken(&e))?;
 
-    let mut warnings = Vec::new();
     let (r, g, b) = meta.color_correction.unwrap_or((1.0, 1.0, 1.0));
     let exposure = meta.exposure.unwrap_or(1.0);
     let factors = [r, g, b].map(|c| c * exposure);

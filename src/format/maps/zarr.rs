@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::{Bands, Map, checked_size, spectral, whole, with_help};
 use crate::error::Problem;
-use crate::format::unit::{Density, Unit};
+use crate::format::unit::{self, Density, Unit};
 use crate::format::zarr::{self, Variable};
 
 /// The array that is read where a store has several.
@@ -46,8 +46,11 @@ pub fn read(path: &Path) -> Result<Map, Box<Problem>> {
         return Err(with_help(path, message, "name the dimension of the spectrum `wavelength`"));
     };
     let mut warnings = Vec::new();
-    let [y, x] = plane(path, &dimensions, spectrum, &mut warnings)?;
     let shape = radiance.shape.clone();
+    let coordinate = |i: usize, of: &Coordinate| of.find(&arrays, &dimensions[i], shape[i]);
+    let is_row = |i: usize| known(&ROWS, &dimensions[i]) || coordinate(i, &LATITUDE).is_some();
+    let is_column = |i: usize| known(&COLUMNS, &dimensions[i]) || coordinate(i, &LONGITUDE).is_some();
+    let [y, x] = plane(path, &dimensions, spectrum, [&is_row, &is_column], &mut warnings)?;
     let size = checked_size(path, shape[x], shape[y])?;
     if radiance.count().is_none_or(|count| count > MOST_NUMBERS) {
         return Err(whole(path, format!("has an array of {shape:?} numbers, but at most {MOST_NUMBERS} are read")));
@@ -55,28 +58,28 @@ pub fn read(path: &Path) -> Result<Map, Box<Problem>> {
     let axis = axis(path, &arrays, &dimensions[spectrum], shape[spectrum])?;
     let bands = bands(path, &arrays, axis, &mut warnings)?;
     let density = density(path, radiance, axis.unit()?, &mut warnings)?;
-    // Latitudes grow upward, and rows go down.
-    let upside_down = match arrays.iter().find(|array| array.name == dimensions[y] && array.shape == [shape[y]]) {
-        Some(rows) if ["lat", "latitude"].contains(&dimensions[y].to_lowercase().as_str()) => {
-            let latitudes = rows.values()?;
-            latitudes.first() < latitudes.last()
-        }
-        _ => false,
+    let rows = match coordinate(y, &LATITUDE) {
+        Some(array) => from_north(path, array, &mut warnings)?,
+        None => (0..shape[y] as usize).collect(),
+    };
+    let columns = match coordinate(x, &LONGITUDE) {
+        Some(array) => from_west(path, array, &mut warnings)?,
+        None => (0..shape[x] as usize).collect(),
     };
 
     let values = radiance.values()?;
+    let lost = radiance.lost_chunks()?;
     let stride = |dimension: usize| shape[dimension + 1..].iter().product::<u64>() as usize;
     let (by_band, by_row, by_column) = (stride(spectrum), stride(y), stride(x));
-    let (width, height) = (size[0] as usize, size[1] as usize);
     let mut planes: Vec<Vec<f32>> = Vec::with_capacity(bands.nm.len());
     for (band, &nm) in bands.nm.iter().enumerate() {
-        let mut plane = Vec::with_capacity(width * height);
-        for row in 0..height {
-            let from = if upside_down { height - 1 - row } else { row };
-            for column in 0..width {
-                let value = values[band * by_band + from * by_row + column * by_column];
+        let mut plane = Vec::with_capacity(rows.len() * columns.len());
+        for (row, from_row) in rows.iter().enumerate() {
+            for (column, from_column) in columns.iter().enumerate() {
+                let value = values[band * by_band + from_row * by_row + from_column * by_column];
                 if value.is_nan() {
-                    let message = format!("has no value at column {column}, row {row} of band {}", band + 1);
+                    let why = lost.map(|words| format!(", and {words}")).unwrap_or_default();
+                    let message = format!("has no value at column {column}, row {row} of band {}{why}", band + 1);
                     return Err(with_help(path, message, "fill the gaps: light comes from every direction"));
                 }
                 plane.push(density.apply(value, nm) as f32);
@@ -84,6 +87,7 @@ pub fn read(path: &Path) -> Result<Map, Box<Problem>> {
         }
         planes.push(plane);
     }
+    warnings.extend(lost);
     let planes: Vec<&[f32]> = planes.iter().map(Vec::as_slice).collect();
     let content = spectral(path, &bands, &planes, &mut warnings)?;
     Ok(Map { size, content, warnings })
@@ -96,7 +100,16 @@ fn the_array<'a>(path: &Path, arrays: &'a [Variable]) -> Result<&'a Variable, Bo
     }
     match cubes[..] {
         [array] => Ok(array),
-        [] => Err(whole(path, "has no array of three dimensions".to_owned())),
+        [] => {
+            let groups = zarr::groups(path);
+            let help = match &groups[..] {
+                [] => "a map is an array over y, x and `wavelength`: pick one time, height, … of an array with more",
+                _ => "if the map is in one of its groups, name that: \"STORE/GROUP\"",
+            };
+            let inside =
+                if groups.is_empty() { String::new() } else { format!(", but the groups {}", groups.join(", ")) };
+            Err(with_help(path, format!("has no array of three dimensions{inside}"), help))
+        }
         _ => {
             let names: Vec<&str> = cubes.iter().map(|array| array.name.as_str()).collect();
             let message = format!("has several arrays of three dimensions: {}", names.join(", "));
@@ -105,24 +118,129 @@ fn the_array<'a>(path: &Path, arrays: &'a [Variable]) -> Result<&'a Variable, Bo
     }
 }
 
-/// Which dimensions are rows and columns: by their names, or else in their order, which is said.
+/// Latitude or longitude, as the conventions of CF tell an array of them.
+struct Coordinate {
+    /// Of the array; the second is also its `standard_name`.
+    names: [&'static str; 2],
+    units: [&'static str; 6],
+}
+
+const LATITUDE: Coordinate = Coordinate {
+    names: ["lat", "latitude"],
+    units: ["degrees_north", "degree_north", "degree_n", "degrees_n", "degreen", "degreesn"],
+};
+const LONGITUDE: Coordinate = Coordinate {
+    names: ["lon", "longitude"],
+    units: ["degrees_east", "degree_east", "degree_e", "degrees_e", "degreee", "degreese"],
+};
+
+impl Coordinate {
+    /// The array of these over a dimension of `count`: the one of its name, or another over it.
+    fn find<'a>(&self, arrays: &'a [Variable], dimension: &str, count: u64) -> Option<&'a Variable> {
+        let text = |array: &Variable, key: &str| {
+            array.attributes.get(key).and_then(|value| value.as_str()).unwrap_or("").trim().to_lowercase()
+        };
+        let is_such = |array: &&Variable| {
+            array.shape == [count]
+                && (self.names.contains(&array.name.to_lowercase().as_str())
+                    || text(array, "standard_name") == self.names[1]
+                    || self.units.contains(&text(array, "units").as_str()))
+        };
+        let over = |array: &&Variable| array.dimensions.first().is_some_and(|name| name == dimension);
+        let mut such = arrays.iter().filter(is_such);
+        such.clone().find(|array| array.name == dimension).or_else(|| such.find(over))
+    }
+}
+
+/// The places that an array gives, in degrees.
+fn degrees(path: &Path, array: &Variable) -> Result<Vec<f64>, Box<Problem>> {
+    let in_radians = array.units().is_some_and(|(text, _)| text.to_lowercase().starts_with("rad"));
+    let mut places = array.values()?;
+    if in_radians {
+        places.iter_mut().for_each(|place| *place = place.to_degrees());
+    }
+    match places.iter().find(|place| !place.is_finite()) {
+        None => Ok(places),
+        Some(wrong) => Err(whole(path, format!("has {wrong} among its coordinates `{}`", array.name))),
+    }
+}
+
+/// How far, in steps, places may be from where rows and columns are, before it is said.
+const OFF: f64 = 0.01;
+
+/// Rows of the array from the north to the south.
+fn from_north(path: &Path, array: &Variable, warnings: &mut Vec<String>) -> Result<Vec<usize>, Box<Problem>> {
+    let places = degrees(path, array)?;
+    let descends = |order: &[usize]| order.windows(2).all(|pair| places[pair[0]] > places[pair[1]]);
+    let mut order: Vec<usize> = (0..places.len()).collect();
+    if !descends(&order) {
+        order.reverse();
+    }
+    if !descends(&order) {
+        let message = format!("has latitudes `{}` that neither ascend nor descend", array.name);
+        return Err(with_help(path, message, "sort it by latitude"));
+    }
+    let step = 180.0 / places.len() as f64;
+    let is_there =
+        |(row, from): (usize, &usize)| (places[*from] - (90.0 - (row as f64 + 0.5) * step)).abs() <= OFF * step;
+    if !order.iter().enumerate().all(is_there) {
+        warnings.push(format!(
+            "has latitudes `{}` from {} to {} degrees: its rows are taken as {} equal ones from 90 to -90",
+            array.name,
+            places[order[0]],
+            places[order[order.len() - 1]],
+            order.len()
+        ));
+    }
+    Ok(order)
+}
+
+/// Columns of the array from 180 degrees west over Greenwich to 180 degrees east.
+fn from_west(path: &Path, array: &Variable, warnings: &mut Vec<String>) -> Result<Vec<usize>, Box<Problem>> {
+    let places = degrees(path, array)?;
+    let step = 360.0 / places.len() as f64;
+    // -180 and 180 are one, also where rounding has been at them.
+    let east = |i: usize| (places[i] + 180.0 + 1e-3 * step).rem_euclid(360.0) - 180.0 - 1e-3 * step;
+    let mut order: Vec<usize> = (0..places.len()).collect();
+    order.sort_by(|a, b| east(*a).total_cmp(&east(*b)));
+    let is_around = order.windows(2).all(|pair| (east(pair[1]) - east(pair[0]) - step).abs() <= OFF * step);
+    if !is_around {
+        // A part of the sphere is not cut where its longitudes pass 180.
+        order.sort();
+        if places.first() > places.last() {
+            order.reverse();
+        }
+    }
+    let first = places[order[0]];
+    if !is_around || (east(order[0]) - (-180.0 + 0.5 * step)).abs() > OFF * step {
+        warnings.push(format!(
+            "has longitudes `{}` from {first} to {} degrees: its columns are taken as {} equal ones from -180 to 180",
+            array.name,
+            places[order[order.len() - 1]],
+            order.len()
+        ));
+    }
+    Ok(order)
+}
+
+/// Which dimensions are rows and columns: by their names and coordinates, or else in their order, which is said.
 fn plane(
     path: &Path,
     dimensions: &[String],
     spectrum: usize,
+    [is_row, is_column]: [&dyn Fn(usize) -> bool; 2],
     warnings: &mut Vec<String>,
 ) -> Result<[usize; 2], Box<Problem>> {
     let others: Vec<usize> = (0..3).filter(|i| *i != spectrum).collect();
-    let is = |names: &[&str], i: usize| names.contains(&dimensions[i].to_lowercase().as_str());
     let (a, b) = (others[0], others[1]);
-    if is(&ROWS, b) && is(&COLUMNS, a) {
+    if is_row(b) && is_column(a) {
         return Ok([b, a]);
     }
-    if (is(&ROWS, a) && is(&ROWS, b)) || (is(&COLUMNS, a) && is(&COLUMNS, b)) {
+    if (is_row(a) && is_row(b)) || (is_column(a) && is_column(b)) {
         let message = format!("has an array over {}, of which two are the same", dimensions.join(", "));
         return Err(with_help(path, message, "name the dimensions `y` and `x`"));
     }
-    if !is(&ROWS, a) && !is(&COLUMNS, b) {
+    if !is_row(a) && !is_column(b) {
         warnings.push(format!(
             "has an array over {}: `{}` is taken as rows from the top, `{}` as columns",
             dimensions.join(", "),
@@ -187,7 +305,18 @@ fn bands(
 ) -> Result<Bands, Box<Problem>> {
     let unit = axis.unit()?;
     let centres = axis.array.values()?;
-    let nm = |x: f64| if x > 0.0 { unit.to_nm(x) } else { f64::NAN };
+    let says_air = |key: &str| {
+        let text = axis.array.attributes.get(key).and_then(|value| value.as_str()).unwrap_or("");
+        unit::is_in_air(text) && !text.to_lowercase().contains("vac")
+    };
+    let in_air = says_air("long_name") || says_air("standard_name");
+    warnings.extend(in_air.then(|| unit::FROM_AIR.to_owned()));
+    let in_nm = |x: f64, unit: Unit| match unit.to_nm(x) {
+        _ if x <= 0.0 => f64::NAN,
+        nm if in_air => unit::vacuum_nm(nm),
+        nm => nm,
+    };
+    let nm = |x: f64| in_nm(x, unit);
     let count = centres.len() as u64;
     let of = |name: &str| arrays.iter().find(|array| array.name == name);
     let stated = axis.array.attributes.get("bounds").and_then(|name| name.as_str());
@@ -204,7 +333,7 @@ fn bands(
                     .ok_or_else(|| with_help(path, format!("gives bounds of wavelengths in \"{text}\""), ""))?,
                 None => unit,
             };
-            let edge = |x: f64| if x > 0.0 { own.to_nm(x) } else { f64::NAN };
+            let edge = |x: f64| in_nm(x, own);
             let values = array.values()?;
             Some(values.as_chunks::<2>().0.iter().map(|[a, b]| [edge(*a), edge(*b)]).collect())
         }

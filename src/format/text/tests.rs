@@ -75,6 +75,27 @@ fn comments_may_say_the_unit_of_the_values() {
 }
 
 #[test]
+fn comments_about_factors_and_air_are_told_once() {
+    let notes = |text: &str| csv(text, None).unwrap().notes;
+    for comment in ["scale factor: 0.001", "multiply by 1e-3 to get radiance", "values x 1000", "wavelengths in air"] {
+        let notes = notes(&format!("# made up\n# {comment}\n# {comment}\nnm,v\n300,3\n900,9\n"));
+        let [note] = &notes[..] else { panic!("{comment}: {notes:?}") };
+        assert!(note.contains(&format!("`# {comment}` on line 2, which is not applied")), "{note}");
+    }
+    // Where the header says so, they are converted.
+    let converted = notes("# wavelengths in air\nair wavelength (nm),v\n300,3\n900,9\n");
+    assert!(converted.len() == 1 && converted[0].contains("converted to vacuum"), "{converted:?}");
+    assert_eq!(notes("# by A. Nonymous, 2020\nnm,v\n300,3\n900,9\n"), Vec::<String>::new());
+}
+
+#[test]
+fn an_empty_cell_says_nothing_also_of_one_column() {
+    let table = csv("nm,v\n400,1\n500,\n600,3\n", None).unwrap();
+    assert_eq!((table.nm, table.value), (vec![400.0, 600.0], vec![1.0, 3.0]));
+    assert!(csv("nm,v\n400,1\n500\n600,3\n", None).is_err(), "a row without the cell");
+}
+
+#[test]
 fn an_index_is_two_columns() {
     let index = |text: &str| parse_index(text.as_bytes(), Path::new("nk.csv"));
     for text in ["400,1.5,0\n500,1.4,0.25\n", "k,nm,x\n400,1,2\n500,1,2\n", "um,k,x,n\n0.4,0,9,1.5\n0.5,0.25,,1.4\n"] {
@@ -124,7 +145,7 @@ fn mistakes_name_their_line() {
         ("nm,v\n400,1\n500,x", Some(3), "`x` is not a finite number"),
         ("400,1\n500,nan", Some(2), "finite"),
         ("400,1\n500,inf", Some(2), "finite"),
-        ("400,1\n500,", Some(2), "finite"),
+        ("400,1\n500,", None, "1 values"),
         ("400,1\n500,1,1", Some(2), "cells"),
         ("400,1\n-500,1", Some(2), "greater than 0"),
         ("1e-32nm,v\n1e-320,1\n500,1", Some(2), "cannot be represented"),

@@ -1,29 +1,102 @@
 //! How units are spelt: in words, in powers, in brackets at the end of names.
 
-use super::{ATMOSPHERE, COUNT, ELECTRONVOLT, KELVIN, LUMEN, METRE, Measure, SECOND, STERADIAN, WATT};
+use super::{ATMOSPHERE, COUNT, ELECTRONVOLT, FACTORS, KELVIN, LUMEN, METRE, Measure, SECOND, STERADIAN, WATT};
 
 fn words(text: &str) -> impl Iterator<Item = &str> {
     text.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty())
 }
 
-pub(super) fn is_logarithm(text: &str) -> bool {
-    let lower = text.to_lowercase();
-    let mut all = words(&lower);
-    let begins = all.next() == Some("log")
-        && all
-            .next()
-            .is_some_and(|next| ["rad", "refl", "trans", "irr", "int"].iter().any(|start| next.starts_with(start)));
-    let always = ["log10", "ln", "db", "decibel", "decibels", "absorbance"];
-    begins || lower.contains("log(") || words(&lower).any(|word| always.contains(&word))
+/// How the names of quantities begin that tables hold.
+const QUANTITIES: [&str; 17] = [
+    "radian", "irradian", "intens", "flux", "refl", "trans", "emis", "absor", "extinc", "scatter", "atten", "coef",
+    "cross", "power", "albedo", "value", "kappa",
+];
+
+fn is_quantity(word: &str) -> bool {
+    QUANTITIES.iter().any(|start| word.starts_with(start))
 }
 
-/// Whether what stands in brackets can hardly be anything but a unit, or says that there is none.
-pub(super) fn looks_like_unit(inner: &str) -> bool {
+/// Whether the name of a column says that its numbers are logarithms, or Kubelka and Munk's function, of the values.
+pub(super) fn is_logarithm(text: &str) -> bool {
+    let lower = text.to_lowercase();
+    let all: Vec<&str> = words(&lower).collect();
+    let always = ["log10", "ln", "db", "decibel", "decibels", "absorbance", "kubelka"];
+    if lower.contains("log(") || lower.starts_with("-log") || all.iter().any(|word| always.contains(word)) {
+        return true;
+    }
+    // Timber has logs too: "log, oak".
+    let is_of = |word: &str| is_quantity(word) || ["irr", "int"].iter().any(|start| word.starts_with(start));
+    let is_letter = |word: &str| matches!(word, "r" | "t" | "1");
+    if matches!(all[..], ["log", next, ..] if is_of(next) || (is_letter(next) && !lower.starts_with("log,"))) {
+        return true;
+    }
+    let before_log = lower.trim_end_matches([')', ']']).strip_suffix("log").map(str::trim_end);
+    let before_log = before_log.and_then(|before| before.strip_suffix([',', '(', '[', '_']));
+    if before_log.is_some_and(|before| words(before).any(|word| is_of(word) || is_letter(word))) {
+        return true;
+    }
+    // `OD 2` is a filter, of which the column may hold the transmittance.
+    let mut pairs = words(text).zip(words(text).skip(1).map(Some).chain([None]));
+    if pairs.any(|(word, next)| word == "OD" && next.is_none_or(|next| next.parse::<f64>().is_err())) {
+        return true;
+    }
+    // Of an absorption, `Abs (cm-1)`, and of a share, `Abs (%)`, the unit speaks.
+    let of_number = bracketed(text).and_then(parse).is_none_or(|measure| measure == Measure::ONE);
+    let bare = lower.split(['(', '[']).next().unwrap_or("").replace(' ', "");
+    let squeezed = lower.replace(' ', "");
+    all.windows(2).any(|pair| pair == ["optical", "density"])
+        || (of_number && matches!(bare.trim_end_matches('.'), "abs" | "od"))
+        || matches!(squeezed.as_str(), "k/s" | "f(r)" | "f(r\u{221e})")
+}
+
+/// Whether the words of a name make it a share in percent: the first or the last is that word. `None` where a number stands
+/// before it, which may be that of a mixture.
+pub(super) fn is_percent(text: &str) -> Option<bool> {
+    let lower = text.to_lowercase().replace("per cent", "percent").replace('_', " ");
+    let is = |word: &str| ["percent", "pct", "perc", "%"].contains(&word.trim_end_matches('.'));
+    let all: Vec<&str> = lower.split_whitespace().collect();
+    let at_end = match lower.trim_end().strip_suffix('%') {
+        Some(before) => Some(before.trim_end()),
+        None => {
+            all.last().filter(|word| is(word)).map(|word| lower.trim_end().strip_suffix(word).unwrap_or("").trim_end())
+        }
+    };
+    match at_end {
+        Some(before) if before.ends_with(|c: char| c.is_ascii_digit()) => None,
+        Some(_) => Some(true),
+        None => Some(
+            all.first().is_some_and(|word| is(word))
+                || lower.strip_prefix('%').is_some_and(|rest| rest.trim_start().starts_with(char::is_alphabetic)),
+        ),
+    }
+}
+
+/// Whether what stands in brackets after `before` can hardly be anything but a unit, or says that there is none.
+pub(super) fn looks_like_unit(before: &str, inner: &str) -> bool {
     const RELATIVE: [&str; 9] =
         ["a.u.", "au", "a. u.", "arb. units", "arb", "arbitrary units", "relative", "normalized", "normalised"];
+    // What is said of a quantity, and changes no number.
+    const PLAIN: &str = "no unit units n a 0 1 mean average avg median measured calculated simulated total direct diffuse specular \
+                         hemispherical spectral";
     let is_symbol = |word: &str| symbol(word.trim_end_matches(|c: char| c.is_ascii_digit())).is_some();
+    // cm-1, and not the A1 of a sample.
+    let is_power = |word: &str| {
+        let symbol_of = word.trim_end_matches(|c: char| c.is_ascii_digit());
+        symbol_of.len() < word.len() && symbol_of.strip_suffix('-').is_some_and(|name| symbol(name).is_some())
+    };
+    let lower = before.to_lowercase();
+    // Absorptions by temperature are called 300, 300 K, kappa_300K; samples by smaller numbers.
+    let is_kelvin = |word: &str| word.trim_end_matches('k').parse::<f64>().is_ok_and(|kelvin| kelvin >= 50.0);
+    let of_temperature = match words(&lower).collect::<Vec<_>>()[..] {
+        [only] | [only, "k"] => is_kelvin(only),
+        [.., last] => last.ends_with('k') && is_kelvin(last),
+        [] => false,
+    };
+    let of_quantity = of_temperature || words(&lower).any(is_quantity);
     RELATIVE.contains(&inner.to_lowercase().as_str())
         || (inner.contains(['/', '^', '*']) && words(inner).any(is_symbol))
+        || inner.split_whitespace().any(is_power)
+        || (of_quantity && words(&inner.to_lowercase()).any(|word| PLAIN.split(' ').all(|plain| plain != word)))
 }
 
 /// A unit of power at the end of a name without brackets: `radiance W/m2/sr/nm`.
@@ -71,6 +144,45 @@ pub(super) fn has_factor(text: &str) -> bool {
         let number = after[..end].replace("10^", "1e");
         alone && number.parse::<f64>().is_ok_and(|factor| factor != 1.0)
     })
+}
+
+/// Whether a sentence states a factor, or an offset, other than none.
+pub(super) fn states_a_factor(text: &str) -> bool {
+    /// What may stand between the word and its number.
+    const BETWEEN: [&str; 12] =
+        ["factor", "factors", "of", "by", "is", "was", "are", "all", "value", "values", "data", "the"];
+    let lower = text.to_lowercase();
+    let scales = |word: &str| FACTORS.iter().any(|start| word.starts_with(start)) || word.starts_with("divide");
+    let offsets = |word: &str| word.starts_with("offset");
+    let number = |word: &str| {
+        word.trim_start_matches(['x', '*'])
+            .trim_end_matches(['.', ',', ';', ')'])
+            .replace("10^", "1e")
+            .parse::<f64>()
+            .ok()
+    };
+    let changes = |word: &str, value: f64| if offsets(word) { value != 0.0 } else { value != 1.0 };
+    // As keys of a list: `radiance scale to nm: 0.001`.
+    if let Some((key, value)) = lower.split_once([':', '='])
+        && let Some(word) =
+            words(key.rsplit([';', ',']).next().unwrap_or("")).find(|word| scales(word) || offsets(word))
+        && let Some(value) = value.split_whitespace().next().and_then(number)
+    {
+        return changes(word, value);
+    }
+    let all: Vec<&str> = lower
+        .split(|c: char| c.is_whitespace() || matches!(c, ':' | '=' | '('))
+        .filter(|word| !word.is_empty())
+        .collect();
+    let stated = all.iter().enumerate().filter(|(_, word)| scales(word) || offsets(word)).any(|(i, word)| {
+        // One more word may be what is scaled: multiply radiance by 1000.
+        let mut after = all[i + 1..].iter().filter(|word| !BETWEEN.contains(word)).take(2);
+        after.any(|next| number(next).is_some_and(|value| changes(word, value)))
+    });
+    let of_values = all.iter().any(|word| {
+        is_quantity(word) || ["data", "number", "column", "unit", "y"].iter().any(|start| word.starts_with(start))
+    });
+    stated || (of_values && has_factor(&lower))
 }
 
 /// One form for the many ways to write the same characters: superscripts, minus signs, dots, µ and Å, LaTeX.
@@ -207,8 +319,8 @@ fn tokens(text: &str) -> Option<Vec<Token>> {
                 tokens.push(Token::Per);
                 i += 1;
             }
-            '%' => {
-                tokens.push(Token::Name("%".to_owned()));
+            '%' | '\u{2030}' => {
+                tokens.push(Token::Name(c.to_string()));
                 i += 1;
             }
             '^' | '-' | '+' | '0'..='9' | '_' if after_name => {
@@ -311,8 +423,16 @@ fn product(tokens: &[Token], at: &mut usize, depth: usize) -> Option<Measure> {
                 *at += 1;
                 match name.to_lowercase().as_str() {
                     "per" => {
-                        sign = -1;
-                        continue;
+                        let share = match tokens.get(*at) {
+                            Some(Token::Name(of)) if of.eq_ignore_ascii_case("cent") => 0.01,
+                            Some(Token::Name(of)) if of.eq_ignore_ascii_case("mille") => 1e-3,
+                            _ => {
+                                sign = -1;
+                                continue;
+                            }
+                        };
+                        *at += 1;
+                        Measure { factor: share, ..Measure::ONE }
                     }
                     "inverse" | "reciprocal" => {
                         sign = -1;
@@ -344,60 +464,16 @@ fn product(tokens: &[Token], at: &mut usize, depth: usize) -> Option<Measure> {
 
 /// A unit by symbol, with an SI prefix, or by name.
 fn symbol(name: &str) -> Option<Measure> {
-    const NANO: f64 = 1e-9;
     let lower = name.to_lowercase();
-    let base = |name: &str| -> Option<Measure> {
-        Some(match name {
-            "m" => Measure::of(METRE, 1.0),
-            "W" => Measure::of(WATT, 1.0),
-            "s" => Measure::of(SECOND, 1.0),
-            "sr" => Measure::of(STERADIAN, 1.0),
-            "Hz" => Measure { powers: Measure::ONE.times(Measure::of(SECOND, 1.0), -1)?.powers, factor: 1.0 },
-            "eV" => Measure::of(ELECTRONVOLT, 1.0),
-            "J" => Measure::of(WATT, 1.0).times(Measure::of(SECOND, 1.0), 1)?,
-            "K" => Measure::of(KELVIN, 1.0),
-            "lm" => Measure::of(LUMEN, 1.0),
-            "cd" => Measure::of(LUMEN, 1.0).times(Measure::of(STERADIAN, 1.0), -1)?,
-            "lx" => Measure::of(LUMEN, 1.0).times(Measure::of(METRE, 1.0), -2)?,
-            "mol" => Measure::of(COUNT, 6.022_140_76e23),
-            "erg" => Measure::of(WATT, 1e-7).times(Measure::of(SECOND, 1.0), 1)?,
-            // 1e-26 W m-2 Hz-1
-            "Jy" => Measure::of(WATT, 1e-26).times(Measure::of(SECOND, 1.0), 1)?.times(Measure::of(METRE, 1.0), -2)?,
-            _ => return None,
-        })
-    };
     // Spellings by their whole name first.
-    let whole = match lower.as_str() {
-        "%" | "percent" | "pct" => Measure { factor: 0.01, ..Measure::ONE },
-        "unitless" | "dimensionless" | "fraction" | "none" | "ratio" | "reflectance" | "transmittance" => Measure::ONE,
-        "atm" | "atmosphere" | "atmospheres" => Measure::of(ATMOSPHERE, 1.0),
-        "bar" => Measure::of(ATMOSPHERE, 1.0 / 1.013_25),
-        "hpa" | "mbar" => Measure::of(ATMOSPHERE, 1.0 / 1013.25),
-        "pa" => Measure::of(ATMOSPHERE, 1.0 / 101_325.0),
-        "photon" | "photons" | "ph" | "quanta" | "molecule" | "molecules" | "molec" | "mole" | "moles" | "counts"
-        | "dn" | "count" => Measure::of(COUNT, 1.0),
-        "steradian" | "steradians" | "ster" | "str" => Measure::of(STERADIAN, 1.0),
-        "sr" => Measure::of(STERADIAN, 1.0),
-        "angstrom" | "angstroms" | "\u{e5}ngstr\u{f6}m" | "\u{e5}ngstrom" | "angstr\u{f6}m" | "ang" | "\u{e5}" => {
-            Measure::of(METRE, 0.1 * NANO)
-        }
-        "nm" => Measure::of(METRE, NANO),
-        "um" | "micron" | "microns" | "mic" | "mu" | "mum" => Measure::of(METRE, 1e-6),
-        "hz" => base("Hz")?,
-        "kelvin" | "kelvins" | "degk" => Measure::of(KELVIN, 1.0),
-        "electronvolt" | "electronvolts" => Measure::of(ELECTRONVOLT, 1.0),
-        "lumen" | "lumens" => Measure::of(LUMEN, 1.0),
-        "lux" => base("lx")?,
-        "kayser" | "kaysers" => Measure::ONE.times(Measure::of(METRE, 0.01), -1)?,
-        "ev" => Measure::of(ELECTRONVOLT, 1.0),
-        "sec" | "second" | "seconds" => Measure::of(SECOND, 1.0),
-        _ => Measure { factor: 0.0, ..Measure::ONE },
-    };
-    if whole.factor > 0.0 {
+    if let Some(whole) = spelt_out(&lower) {
         return Some(whole);
     }
+    if name == "Mb" {
+        return long_name("barn").and_then(|barn| Measure { factor: 1e6, ..Measure::ONE }.times(barn, 1));
+    }
     if matches!(name, "A" | "AA" | "\u{c5}") {
-        return Some(Measure::of(METRE, 0.1 * NANO));
+        return Some(Measure::of(METRE, 1e-10));
     }
     if let Some(measure) = base(name) {
         return Some(measure);
@@ -449,6 +525,68 @@ fn symbol(name: &str) -> Option<Measure> {
     None
 }
 
+/// A unit that is spelt in no other way, in small letters.
+fn spelt_out(lower: &str) -> Option<Measure> {
+    Some(match lower {
+        "%" | "percent" | "pct" | "perc" => Measure { factor: 0.01, ..Measure::ONE },
+        "\u{2030}" | "permille" | "promille" => Measure { factor: 1e-3, ..Measure::ONE },
+        "ppm" | "ppmv" => Measure { factor: 1e-6, ..Measure::ONE },
+        "ppb" | "ppbv" => Measure { factor: 1e-9, ..Measure::ONE },
+        "unitless" | "dimensionless" | "fraction" | "none" | "ratio" | "reflectance" | "transmittance" => Measure::ONE,
+        "atm" | "atmosphere" | "atmospheres" => Measure::of(ATMOSPHERE, 1.0),
+        "bar" => Measure::of(ATMOSPHERE, 1.0 / 1.013_25),
+        "kpa" => Measure::of(ATMOSPHERE, 1.0 / 101.325),
+        "torr" | "mmhg" => Measure::of(ATMOSPHERE, 1.0 / 760.0),
+        // Loschmidt's number of molecules in a cubic metre (CODATA 2018).
+        "amagat" | "amagats" => Measure::of(COUNT, 2.686_780_111e25).times(Measure::of(METRE, 1.0), -3)?,
+        "inch" | "inches" => Measure::of(METRE, 0.0254),
+        "ft" | "foot" | "feet" => Measure::of(METRE, 0.3048),
+        "hpa" | "mbar" => Measure::of(ATMOSPHERE, 1.0 / 1013.25),
+        "pa" => Measure::of(ATMOSPHERE, 1.0 / 101_325.0),
+        "photon" | "photons" | "ph" | "quanta" | "molecule" | "molecules" | "molec" | "mole" | "moles" | "counts"
+        | "dn" | "count" => Measure::of(COUNT, 1.0),
+        "steradian" | "steradians" | "ster" | "str" => Measure::of(STERADIAN, 1.0),
+        "sr" => Measure::of(STERADIAN, 1.0),
+        "angstrom" | "angstroms" | "\u{e5}ngstr\u{f6}m" | "\u{e5}ngstrom" | "angstr\u{f6}m" | "ang" | "\u{e5}" => {
+            Measure::of(METRE, 1e-10)
+        }
+        "nm" => Measure::of(METRE, 1e-9),
+        "um" | "micron" | "microns" | "mic" | "mu" | "mum" => Measure::of(METRE, 1e-6),
+        "hz" => base("Hz")?,
+        "kelvin" | "kelvins" | "degk" => Measure::of(KELVIN, 1.0),
+        "electronvolt" | "electronvolts" => Measure::of(ELECTRONVOLT, 1.0),
+        "lumen" | "lumens" => Measure::of(LUMEN, 1.0),
+        "lux" => base("lx")?,
+        "kayser" | "kaysers" => Measure::ONE.times(Measure::of(METRE, 0.01), -1)?,
+        "ev" => Measure::of(ELECTRONVOLT, 1.0),
+        "sec" | "second" | "seconds" => Measure::of(SECOND, 1.0),
+        _ => return None,
+    })
+}
+
+/// An SI unit, or another one that takes prefixes, by its symbol.
+fn base(name: &str) -> Option<Measure> {
+    Some(match name {
+        "m" => Measure::of(METRE, 1.0),
+        "W" => Measure::of(WATT, 1.0),
+        "s" => Measure::of(SECOND, 1.0),
+        "sr" => Measure::of(STERADIAN, 1.0),
+        "Hz" => Measure { powers: Measure::ONE.times(Measure::of(SECOND, 1.0), -1)?.powers, factor: 1.0 },
+        "eV" => Measure::of(ELECTRONVOLT, 1.0),
+        "J" => Measure::of(WATT, 1.0).times(Measure::of(SECOND, 1.0), 1)?,
+        "K" => Measure::of(KELVIN, 1.0),
+        "lm" => Measure::of(LUMEN, 1.0),
+        "cd" => Measure::of(LUMEN, 1.0).times(Measure::of(STERADIAN, 1.0), -1)?,
+        "lx" => Measure::of(LUMEN, 1.0).times(Measure::of(METRE, 1.0), -2)?,
+        "mol" => Measure::of(COUNT, 6.022_140_76e23),
+        "flick" => long_name(name)?,
+        "erg" => Measure::of(WATT, 1e-7).times(Measure::of(SECOND, 1.0), 1)?,
+        // 1e-26 W m-2 Hz-1
+        "Jy" => Measure::of(WATT, 1e-26).times(Measure::of(SECOND, 1.0), 1)?.times(Measure::of(METRE, 1.0), -2)?,
+        _ => return None,
+    })
+}
+
 fn long_name(name: &str) -> Option<Measure> {
     let name = name.strip_suffix('s').unwrap_or(name);
     Some(match name {
@@ -456,6 +594,11 @@ fn long_name(name: &str) -> Option<Measure> {
         "watt" => Measure::of(WATT, 1.0),
         "hertz" => Measure::ONE.times(Measure::of(SECOND, 1.0), -1)?,
         "electronvolt" | "ev" => Measure::of(ELECTRONVOLT, 1.0),
+        "flick" => {
+            Measure::of(WATT, 1e10).times(Measure::of(METRE, 1.0), -3)?.times(Measure::of(STERADIAN, 1.0), -1)?
+        }
+        // Of the cross section of one molecule; a single b is more often a name.
+        "barn" => Measure::ONE.times(Measure::of(METRE, 1e-14), 2)?,
         "joule" => Measure::of(WATT, 1.0).times(Measure::of(SECOND, 1.0), 1)?,
         _ => return None,
     })

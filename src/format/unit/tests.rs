@@ -141,6 +141,11 @@ fn units_of_values() {
         // c/λ² = 299,792,458 / (5e-6)² Hz a metre.
         ("W m-2 sr-1 Hz-1", 299_792_458.0 / 25e-12 * 1e-9),
         ("10^-6 W m-2 sr-1 nm-1", 1e-6),
+        // 1 W cm-2 sr-1 um-1
+        ("flick", 10.0),
+        ("uflick", 1e-5),
+        ("\u{b5}flick", 1e-5),
+        ("microflicks", 1e-5),
     ] {
         let got = per_nm(text).unwrap_or_else(|| panic!("{text} is not understood"));
         assert!((got - expected).abs() < 1e-12 * expected, "{text}: {got}, expected {expected}");
@@ -154,6 +159,24 @@ fn units_of_values() {
     assert_eq!(absorption("cm-1 atm-1"), Some(Density::Plain(100.0)));
     assert_eq!(absorption("1/km"), Some(Density::Plain(1e-3)));
     assert_eq!(absorption("cm2/molecule"), None);
+    for (text, factor) in [
+        ("1/inch", 1.0 / 0.0254),
+        ("1/ft", 1.0 / 0.3048),
+        ("%/cm", 1.0),
+        ("kPa-1 cm-1", 100.0 * 101.325),
+        ("Torr-1 cm-1", 100.0 * 760.0),
+        ("cm-1/Torr", 100.0 * 760.0),
+        // Of 1 atm a share of 1e-6 is a ppm.
+        ("ppm-1 m-1", 1e6),
+    ] {
+        let Some(Density::Plain(found)) = absorption(text) else { panic!("{text}: {:?}", absorption(text)) };
+        assert!((found / factor - 1.0).abs() < 1e-12, "{text}: {found}, expected {factor}");
+    }
+    for (text, factor) in [("per mille", 1e-3), ("\u{2030}", 1e-3), ("ppm", 1e-6), ("perc.", 0.01), ("per cent", 0.01)]
+    {
+        let found = parse(text).and_then(|measure| measure.to(Kind::Number));
+        assert_eq!(found, Some(Density::Plain(factor)), "{text}");
+    }
 }
 
 #[test]
@@ -163,6 +186,13 @@ fn units_in_names_of_columns() {
         ("Reflectance %", Kind::Number, 0.01),
         ("%R", Kind::Number, 0.01),
         ("% Transmittance", Kind::Number, 0.01),
+        ("percent", Kind::Number, 0.01),
+        ("Percent Reflectance", Kind::Number, 0.01),
+        ("reflectance_percent", Kind::Number, 0.01),
+        ("R pct.", Kind::Number, 0.01),
+        ("reflectance (per mille)", Kind::Number, 1e-3),
+        ("radiance (flick)", Kind::Radiance, 10.0),
+        ("300 (kPa-1 m-1)", Kind::Absorption, 101.325),
         ("Radiance [uW/cm2/sr/nm]", Kind::Radiance, 0.01),
         ("radiance W/m2/sr/um", Kind::Radiance, 1e-3),
         // 1e-7 W, 1e4 cm2 a m2, 10 A a nm.
@@ -180,14 +210,62 @@ fn units_in_names_of_columns() {
     assert!((jansky.apply(1.0, 500.0) / 1.199_169_832e-14 - 1.0).abs() < 1e-12);
     let photons = Stated::in_name("photons/s/m2/nm/sr").expect("a unit");
     assert!(matches!(photons.meaning, Meaning::Unit(measure) if measure.to(Kind::Radiance).is_none()));
-    for name in ["Sample #1", "leaf (upper side)", "oak (2/3)", "log, oak", "max x", "linen", "x2", "r2"] {
+    for name in [
+        "Sample #1",
+        "leaf (upper side)",
+        "leaf 1 (upper side)",
+        "oak (2/3)",
+        "log, oak",
+        "oak (log)",
+        "max x",
+        "linen",
+        "x2",
+        "r2",
+        "reflectance (no unit)",
+        "reflectance (0-1)",
+        "radiance (direct)",
+        "absorption",
+        "Abs. coefficient",
+        "absolute",
+        "OD 2 filter",
+        "period",
+        "k",
+        "reflectance of bog oak",
+    ] {
         assert_eq!(Stated::in_name(name), None, "{name}");
+    }
+    for name in ["Abs (cm-1)", "Abs (%)"] {
+        assert!(matches!(Stated::in_name(name).map(|stated| stated.meaning), Some(Meaning::Unit(_))), "{name}");
     }
     for (name, meaning) in [
         ("log10 radiance", Meaning::Logarithm),
         ("log(1/R)", Meaning::Logarithm),
         ("transmittance (dB)", Meaning::Logarithm),
         ("log_trans", Meaning::Logarithm),
+        ("OD", Meaning::Logarithm),
+        ("od", Meaning::Logarithm),
+        ("filter OD", Meaning::Logarithm),
+        ("optical density", Meaning::Logarithm),
+        ("Optical Density (a.u.)", Meaning::Logarithm),
+        ("Abs", Meaning::Logarithm),
+        ("Abs.", Meaning::Logarithm),
+        ("Abs (AU)", Meaning::Logarithm),
+        ("-log R", Meaning::Logarithm),
+        ("-log(R)", Meaning::Logarithm),
+        ("log R", Meaning::Logarithm),
+        ("log 1/R", Meaning::Logarithm),
+        ("reflectance, log", Meaning::Logarithm),
+        ("Reflectance (log)", Meaning::Logarithm),
+        ("K/S", Meaning::Logarithm),
+        ("F(R)", Meaning::Logarithm),
+        ("radiance (bananas)", Meaning::Unknown),
+        ("reflectance (0-100)", Meaning::Unknown),
+        ("300 (cm-1 bananas)", Meaning::Unknown),
+        ("300 K (bananas)", Meaning::Unknown),
+        ("kappa_300K (bananas)", Meaning::Unknown),
+        ("sample (cm-1 bananas)", Meaning::Unknown),
+        ("clay with water 10 %", Meaning::Unknown),
+        ("clay 10 percent", Meaning::Unknown),
         ("radiance (W/m2/sr/furlong)", Meaning::Unknown),
         ("radiance (a.u.)", Meaning::Unknown),
         ("L_mW_m2_sr_nm", Meaning::Unknown),
@@ -224,9 +302,16 @@ fn units_in_sentences() {
 #[test]
 fn cross_sections_are_absorptions_at_a_temperature() {
     let per_atm = |text: &str| parse(text).and_then(|measure| measure.cross_section_per_atmosphere(273.15));
-    for text in ["cm2/molecule", "cm^2 molecule^-1", "cm2"] {
+    // A cubic metre of an amagat has as many; a megabarn is 1e-18 cm2.
+    for (text, expected) in [
+        ("cm2/molecule", 2.686_780_111e21),
+        ("cm^2 molecule^-1", 2.686_780_111e21),
+        ("cm2", 2.686_780_111e21),
+        ("Mb", 2.686_780_111e3),
+        ("cm-1 amagat-1", 100.0),
+    ] {
         let found = per_atm(text).unwrap_or_else(|| panic!("{text} is a cross section"));
-        assert!((found / 2.686_780_111e21 - 1.0).abs() < 1e-9, "{text}: {found}");
+        assert!((found / expected - 1.0).abs() < 1e-9, "{text}: {found}");
     }
     assert_eq!([per_atm("cm-1"), per_atm("cm2/g"), per_atm("K")], [None; 3]);
 }
@@ -238,5 +323,50 @@ fn air_becomes_vacuum() {
         assert!((vacuum_nm(air) - vacuum).abs() < 2e-4, "{air}: {}", vacuum_nm(air));
     }
     assert_eq!(vacuum_nm(150.0), 150.0);
+    // Its index is what they differ by.
+    assert!((air_index(vacuum_nm(588.995_095)) * 588.995_095 - vacuum_nm(588.995_095)).abs() < 1e-9);
+    assert_eq!(air_index(150.0), 1.0);
     assert!(is_in_air("wavelength in air (nm)") && is_in_air("wl_air_nm") && !is_in_air("wavelength, dairy"));
+}
+
+#[test]
+fn sentences_about_factors_and_air() {
+    for text in [
+        "# scale factor: 0.001",
+        "# multiply by 1e-3 to get radiance",
+        "# values x 1000",
+        "# Reflectance * 10000",
+        "# Divide by 100.",
+        "# gain = 2",
+        "# offset: -0.5",
+        "# all values were multiplied by 10^4",
+        "# multiply radiance by 1000",
+    ] {
+        assert!(states_a_factor(text), "{text}");
+    }
+    for text in [
+        "# scale factor: 1",
+        "# offset = 0",
+        "# a scale model of 1 m",
+        "# reflectance of oak, 3 scans",
+        "# multiplier: none",
+        "# 2 x 3 samples",
+        "# divided into two",
+        "# King factor included; phase = 0.0279",
+        "# scaled to a luminance of 1000 cd m-2",
+        "# gain: auto",
+        "# made in 2020",
+    ] {
+        assert!(!states_a_factor(text), "{text}");
+    }
+    for (text, expected) in [
+        ("# wavelengths in air", true),
+        ("# Wavelength (air), radiance", true),
+        ("# air wavelengths, nm", true),
+        ("# wavelengths in vacuum, converted from those in air", false),
+        ("# dried in air", false),
+        ("# wavelengths of air-dried soil, in air-tight boxes", false),
+    ] {
+        assert_eq!(speaks_of_air(text), expected, "{text}");
+    }
 }

@@ -300,7 +300,7 @@ pub static CHANNELS: Section = Section {
             "unit",
             Choice(&["nm", "um"]),
             "\"nm\"",
-            "Of `intervals`, the micrometre for short; `equal` has its own.",
+            "Of `intervals`, the micrometre for short (`\"µm\"` too); `equal` has its own.",
         ),
         Key::one_of("responses", File, "The responses of a sensor, one channel each; see [Responses](#responses)."),
         Key::optional(
@@ -355,7 +355,12 @@ pub static EQUAL: Section = Section {
             .unit("nm, or as `unit` says")
             .range("(0, 1e6], more than `from`"),
         Key::required("count", Whole, "How many channels.").range("[1, 65536]"),
-        Key::default("unit", Choice(&["nm", "um"]), "\"nm\"", "Of `from` and `to`: nanometres or micrometres."),
+        Key::default(
+            "unit",
+            Choice(&["nm", "um"]),
+            "\"nm\"",
+            "Of `from` and `to`: nanometres or micrometres (`\"µm\"` too).",
+        ),
     ],
     later: &[],
     at: "channels.equal",
