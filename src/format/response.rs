@@ -45,6 +45,10 @@ pub fn parse_responses(bytes: &[u8], path: &Path) -> Result<Responses, Box<Probl
     }
     let name = |column: usize| table.names.get(column).map_or("", String::as_str);
     let is_long = count == 3 && name(0).eq_ignore_ascii_case("band");
+    if !is_long && table.names.iter().any(|name| name.eq_ignore_ascii_case("band")) {
+        let help = "write the three columns `band,wavelength_nm,response`, in this order";
+        return Err(wrong(Some(table.line), "has a column `band`, but not the columns of long responses".into(), help));
+    }
     let axis = usize::from(is_long);
     let unit = Unit::from_header(name(axis)).map_err(|other| {
         let message = format!("gives its wavelengths as {other}, from which none follows");
@@ -275,6 +279,7 @@ mod tests {
             ("nm,a,a\n400,1,1\n500,1,1\n", Some(1), "two channels named \"a\""),
             ("Frequency,a\n400,1\n500,1\n", Some(1), "`Frequency`"),
             ("band,nm,response\n", None, "no responses"),
+            ("nm,band,response\n400,a,0\n450,a,1\n", Some(1), "long responses"),
             ("nm,log10 a\n400,0\n500,1\n", Some(1), "logarithms"),
             ("nm,filter OD\n400,4\n500,0.1\n600,4\n", Some(1), "logarithms"),
             ("band,nm,response\na,400,1\na,500,1\na,450,1\na,600,1\n", Some(4), "follows"),

@@ -528,7 +528,8 @@ impl<'a> Spectra<'a> {
                          with the temperature: `nu (cm-1),300 K (cm2/molecule)`"
                             .to_owned()
                     } else {
-                        format!("convert them to {}, or correct the header", quantity.unit())
+                        let unit = if quantity.unit().is_empty() { "numbers without a unit" } else { quantity.unit() };
+                        format!("convert them to {unit}, or correct the header")
                     };
                     user.error_help(format!("{path} {message}"), help);
                     return None;
