@@ -53,8 +53,13 @@ pub fn read_map(path: &Path) -> Result<Map, Box<Problem>> {
             }
         }
         let (nm, planes): (Vec<f64>, Vec<&[f32]>) = bands.into_iter().unzip();
-        let spans = emissive.iter().map(|(_, plane)| attribute(&plane.name).and_then(|text| interval(&text)));
-        let content = spectral(path, &Bands { nm, spans: spans.collect() }, &planes, &mut warnings)?;
+        let responses: Vec<Option<String>> = emissive.iter().map(|(_, plane)| attribute(&plane.name)).collect();
+        let spans: Option<Vec<[f64; 2]>> = responses.iter().map(|text| interval(text.as_ref()?)).collect();
+        if spans.is_none() && responses.iter().any(Option::is_some) {
+            let what = "has responses of bands that are not 1 over an interval each: they are not applied, and bands count at their wavelengths";
+            warnings.push(what.to_owned());
+        }
+        let content = spectral(path, &Bands { nm, spans }, &planes, &mut warnings)?;
         return Ok(Map { size, content, warnings });
     }
     // Whether a picture is transparent matters to nobody who looks at the sky.
@@ -185,7 +190,7 @@ mod tests {
     use exr::meta::header::LayerAttributes;
     use exr::prelude::{SpecificChannels, WritableImage};
 
-    use super::{emissive_band, read_map};
+    use super::{emissive_band, interval, read_map};
 
     #[test]
     fn what_attributes_say_is_told_or_refused() {
@@ -209,6 +214,21 @@ mod tests {
         assert!(white.warnings[0].contains("100 cd/m2"), "{:?}", white.warnings);
         let exposed = write(&|all| drop(all.other.insert(Text::from("EV"), AttributeValue::F32(2.0)))).unwrap();
         assert!(exposed.warnings[0].contains("`EV`"), "{:?}", exposed.warnings);
+    }
+
+    #[test]
+    fn responses_that_are_intervals() {
+        for (text, expected) in [
+            ("400nm:1;410.5nm:1;", Some([400.0, 410.5])),
+            ("400,25nm:1.0; 410nm:1", Some([400.25, 410.0])),
+            ("400nm:0;405nm:1;410nm:0;", None),
+            ("400nm:1;405nm:1;410nm:1;", None),
+            ("410nm:1;400nm:1;", None),
+            ("400:1;410:1;", None),
+            ("", None),
+        ] {
+            assert_eq!(interval(text), expected, "{text}");
+        }
     }
 
     #[test]
