@@ -58,7 +58,11 @@ impl Choices {
             gain => format!(", {gain:.2} times the efficiency of one expected"),
         };
         let reason = if self.wavelengths_reason.is_empty() { "as always" } else { &self.wavelengths_reason };
-        format!("{} a channel and path{gain} ({reason})", self.wavelengths_per_channel)
+        let count = match self.wavelengths_per_channel {
+            1 => "1 wavelength".to_owned(),
+            several => format!("{several} wavelengths"),
+        };
+        format!("{count} a channel{gain} ({reason})")
     }
 
     /// Which paths, in a line, for people.

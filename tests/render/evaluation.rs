@@ -151,7 +151,7 @@ fn a_plan_decides_where_it_is_asked_to() {
     let (decided, _) = place.success(&[&plan[..], &["--pilot"]].concat());
     assert!(decided.contains("\npaths     roulette: a path that brings the mean"), "{decided}");
     assert!(decided.contains("\nused") && decided.contains("roulette on evaluation ("), "{decided}");
-    assert!(decided.contains("\nper path  1 a channel and path ("), "{decided}");
+    assert!(decided.contains("\nper path  1 wavelength a channel ("), "{decided}");
     let asked = ["--set", "integrator.evaluation=all", "--set", "integrator.wavelengths_per_channel=2"];
     let (plain, _) = place.success(&[&["plan", "scene.toml"][..], &asked].concat());
     assert!(
