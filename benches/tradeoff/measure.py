@@ -36,14 +36,14 @@ class Choice:
 def choices(channels, sweep):
     """What is compared, all paths at one wavelength first."""
     found = [
-        Choice("all", {"evaluation": "all"}),
-        Choice("auto", {"evaluation": "auto"}),
-        Choice("roulette", {"evaluation": "roulette"}),
+        Choice("all", {"evaluation": "all", "wavelengths_per_channel": 1}),
+        Choice("auto", {"evaluation": "auto", "wavelengths_per_channel": "auto"}),
+        Choice("roulette", {"evaluation": "roulette", "wavelengths_per_channel": 1}),
     ]
     if channels <= 32:
         found += [Choice(f"m={m}", {"evaluation": "all", "wavelengths_per_channel": m}) for m in (2, 4, 16)]
     if sweep:
-        found += [Choice(f"s x {factor:g}", {"evaluation": "roulette"}, factor) for factor in (0.125, 0.5, 2, 8)]
+        found += [Choice(f"s x {factor:g}", {"evaluation": "roulette", "wavelengths_per_channel": 1}, factor) for factor in (0.125, 0.5, 2, 8)]
     return found
 
 
@@ -139,7 +139,8 @@ def row(scene, channels, choice, turns, base):
         "variance": mean,
         "worst_variance": max(growth),
         "gain": of_all / (seconds * mean),
-        "predicted": chosen.get("gain"),
+        "predicted": chosen["gain"] * chosen["wavelengths_gain"] if chosen else None,
+        "wavelengths": chosen.get("wavelengths_per_channel"),
         "evaluated": chosen.get("evaluated"),
         "scale": chosen.get("scale"),
         "note": chosen.get("reason", ""),
@@ -160,7 +161,7 @@ def fewer(rows):
     return found
 
 
-FIELDS = ["scene", "channels", "choice", "microseconds", "error", "time", "variance", "worst_variance", "gain", "predicted", "evaluated", "scale", "note"]
+FIELDS = ["scene", "channels", "choice", "microseconds", "error", "time", "variance", "worst_variance", "gain", "predicted", "wavelengths", "evaluated", "scale", "note"]
 
 
 def page(rows, device):
