@@ -202,6 +202,12 @@ impl<'f> Primitives<'f> {
         {
             return Err(format!("`{at}` has copies by {name}, which is not supported: export them as nodes"));
         }
+        let hidden = node.extensions.iter().filter_map(|e| e.others.get("KHR_node_visibility"));
+        if hidden.into_iter().any(|visibility| visibility["visible"] == false) {
+            return Err(format!(
+                "`{at}` is hidden by KHR_node_visibility, which is not supported: export without what is hidden"
+            ));
+        }
         let Some(index) = node.mesh.map(|mesh| mesh.value()) else { return Ok(Vec::new()) };
         let of = file.root.meshes.get(index).ok_or_else(|| missing(&format!("{at}.mesh"), "mesh", index))?;
         if node.skin.is_some() {

@@ -186,6 +186,11 @@ fn mistakes_have_a_path() {
             r#""extensionsRequired": ["EXT_meshopt_compression"], "nodes""#,
             "requires the extension EXT_meshopt_compression",
         ),
+        (
+            r#"{"mesh": 0}"#,
+            r#"{"mesh": 0, "extensions": {"KHR_node_visibility": {"visible": false}}}"#,
+            "`nodes[0]` is hidden by KHR_node_visibility",
+        ),
         ("data:application/octet-stream;base64,", "../", "only files in the folder of this one are read"),
         ("data:application/octet-stream;base64,", "/etc/", "only files in the folder of this one are read"),
         ("base64,A", "base64,*", "`buffers[0].uri` is no base64"),
