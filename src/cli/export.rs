@@ -223,7 +223,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         None => format.check_target(&args.output)?,
     }
     // Before anything is written: it fails where a file of the cube is gone.
-    let missing = missing(&cube)?;
+    let missing = cube.progress()?.tiles_missing();
     let files = write(args, &view, format, output)?;
     if let (export::Format::Envi { .. }, None) = (format, args.blocks)
         && let Some(other) = export::other_header(&args.output)
@@ -453,7 +453,7 @@ fn write_png(args: &Args, cube: &Cube, output: &Said) -> Result<()> {
             }
         }
     };
-    let missing = missing(cube)?;
+    let missing = cube.progress()?.tiles_missing();
     let tone = picture(args, &view, &shown, args.exposure.map(Tone::Exposure), output)?;
     let Tone::Exposure(ev) = tone else { return Err(Error::Internal("colours have an exposure".into())) };
     output.event(
@@ -485,7 +485,7 @@ fn write_map(args: &Args, view: &View, output: &Said) -> Result<()> {
         (_, true) => (export::Map::Integrated, "radiance", "W m-2 sr-1"),
         _ => (export::Map::Radiance, "mean radiance", "W m-2 sr-1 nm-1"),
     };
-    let missing = missing(view.cube())?;
+    let missing = view.cube().progress()?.tiles_missing();
     let tone = picture(args, view, &Shown::Map(map), args.range.map(Tone::Range), output)?;
     let Tone::Range(range) = tone else { return Err(Error::Internal("a colour map has ends".into())) };
     let channels = view.channels();
@@ -508,12 +508,6 @@ fn write_map(args: &Args, view: &View, output: &Said) -> Result<()> {
     let (file, [width, height], [low, high]) = (args.output.display(), view.size(), range);
     output.text(&format!("{file}: {width} x {height} pixels, {shows}, {low:.6} to {high:.6} {unit} ({how})\n"))?;
     say_missing(missing, output)
-}
-
-/// How many tiles have no samples, of how many.
-fn missing(cube: &Cube) -> Result<[u32; 2]> {
-    let progress = cube.progress()?;
-    Ok([progress.tiles - progress.tiles_started, progress.tiles])
 }
 
 fn say_missing([missing, tiles]: [u32; 2], output: &Said) -> Result<()> {

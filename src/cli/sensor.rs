@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 
 use super::Output;
-use crate::cube::{Cube, Existing, Progress, integrate};
+use crate::cube::{Cube, Existing, integrate};
 use crate::files::shown;
 use crate::format::response;
 use crate::scene::load_sensor;
@@ -195,8 +195,7 @@ fn integrate_with(args: &Args, file: &Path, output: &Output) -> Result<()> {
         ))?;
     }
     let made = Cube::open(&args.output)?;
-    let Progress { tiles, tiles_started, .. } = made.progress()?;
-    let missing = tiles - tiles_started;
+    let [missing, tiles] = made.progress()?.tiles_missing();
     let wide = |(name, error): &(String, Option<f64>)| json!({ "band": name, "relative_error": error });
     let left_out = |(name, share): &(String, f64)| json!({ "band": name, "covered": share });
     output.event(

@@ -133,6 +133,11 @@ impl Progress {
         let tiles_started = samples.iter().filter(|&&n| n > 0).count() as u32;
         Progress { tiles: samples.len() as u32, tiles_started, samples: [least, most], missing, behind }
     }
+
+    /// How many tiles have no samples, of how many.
+    pub fn tiles_missing(&self) -> [u32; 2] {
+        [self.tiles - self.tiles_started, self.tiles]
+    }
 }
 
 impl Cube {

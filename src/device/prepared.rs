@@ -257,6 +257,11 @@ impl Prepared {
         self.surfaces.is_some()
     }
 
+    /// Whether refraction leaves some paths to one channel each.
+    pub fn disperses(&self) -> bool {
+        self.surfaces.as_ref().is_some_and(|surfaces| surfaces.dispersion)
+    }
+
     /// Scattering events that are saved before they are evaluated: a path's, or one.
     fn vertices_at_once(&self) -> u32 {
         if self.evaluator == Evaluator::Pt { 1 } else { self.frame.max_bounces }

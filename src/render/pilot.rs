@@ -1,8 +1,9 @@
 //! What a few samples of a scene decide before it is rendered: at how many wavelengths of a channel paths are evaluated, and which of
 //! them are worth it.
 //!
-//! The theory is in docs/METHOD.md, Several wavelengths a channel and Roulette on evaluation. Nothing here looks at a clock: what paths cost is known by the kind of
-//! device, how they vary is measured on paths that are never counted in the picture, so that the choice is the same every time.
+//! The theory is in docs/METHOD.md, Several wavelengths a channel and Roulette on evaluation. Nothing here looks at a clock: what paths
+//! cost is known by the kind of device, how they vary is measured on paths that are never counted in the picture, so that the choice is
+//! the same every time.
 
 use std::sync::Arc;
 
@@ -233,7 +234,7 @@ impl Several {
 
 /// Why one wavelength a channel is enough, where no sample needs to be asked.
 fn one_by_rule(scene: &Scene, prepared: &Prepared, cost: f64) -> Option<String> {
-    if prepared.surfaces.as_ref().is_some_and(|surfaces| surfaces.dispersion) {
+    if prepared.disperses() {
         return Some("behind dispersion a path counts at its own wavelength only".into());
     }
     if prepared.path_iterations().saturating_mul(TRIED_WAVELENGTHS) > LOOP_LIMIT {
@@ -262,13 +263,21 @@ fn sources(scene: &Scene) -> Vec<usize> {
 
 /// Of each channel: variance of a sample as the nets of the render's sampler make it, from the difference of two.
 fn net_variances(worker: &mut Worker, channels: usize, scene: &Scene) -> Result<Vec<f64>> {
-    let (units, net) = (pixels(&scene.film), scene.integrator.epoch.min(LARGEST_NET));
+    let net = net_samples(scene);
+    let [first, second] = nets(worker, &pixels(&scene.film), net)?;
+    Ok(differences(&first, &second, channels, net))
+}
+
+/// Samples of a net: those of a full epoch of the render, as far as they are tried.
+fn net_samples(scene: &Scene) -> u32 {
+    scene.integrator.epoch.min(LARGEST_NET)
+}
+
+/// Two nets of `net` samples of the first of `units`, as [`values`].
+fn nets(worker: &mut Worker, units: &[UnitRect], net: u32) -> Result<[Vec<f32>; 2]> {
     let some = &units[..units.len().min((NET_SAMPLES / net) as usize)];
-    let mut nets = Vec::new();
-    for i in 0..2 {
-        nets.push(values(worker, some, FIRST_EPOCH + SINGLES + i, net)?);
-    }
-    Ok(differences(&nets[0], &nets[1], channels, net))
+    let mut of = |i: u32| values(worker, some, FIRST_EPOCH + SINGLES + i, net);
+    Ok([of(0)?, of(1)?])
 }
 
 fn kept() -> Error {
@@ -277,7 +286,7 @@ fn kept() -> Error {
 
 /// All paths, where no sample needs to be asked.
 fn all_by_rule(scene: &Scene, prepared: &Prepared, software: bool) -> Option<Choices> {
-    let reason = if prepared.surfaces.as_ref().is_some_and(|surfaces| surfaces.dispersion) {
+    let reason = if prepared.disperses() {
         "dispersion leaves paths to one channel each, of which the few that they are tried in do not tell".to_owned()
     } else {
         let cost = evaluation_cost(prepared, software);
@@ -337,7 +346,7 @@ struct Trial {
 impl Trial {
     fn run(worker: &mut Worker, prepared: &Prepared, scene: &Scene) -> Result<Trial> {
         let (units, count) = (pixels(&scene.film), prepared.channels);
-        let net = scene.integrator.epoch.min(LARGEST_NET);
+        let net = net_samples(scene);
         let representatives = representatives(prepared);
         let even = (0..count.min(MOST_CHANNELS)).map(|i| i * count / count.min(MOST_CHANNELS));
         let mut channels: Vec<usize> = even.chain(representatives.iter().copied()).collect();
@@ -358,10 +367,7 @@ impl Trial {
             add(&values);
             radiance.extend(kept(&values));
         }
-        let some = &units[..units.len().min((NET_SAMPLES / net) as usize)];
-        let nets = [0, 1].map(|i| values(worker, some, FIRST_EPOCH + SINGLES + i, net).map(|values| kept(&values)));
-        let [first, second] = nets;
-        let (first, second) = (first?, second?);
+        let [first, second] = nets(worker, &units, net)?.map(|values| kept(&values));
         // The same paths, ended where they are scattered first.
         worker.limit_bounces(0);
         for epoch in 0..SINGLES {
@@ -386,7 +392,7 @@ impl Trial {
             scattered,
             energy,
             trying: TRYING * tried_channels(prepared) as f64 / count as f64,
-            samples: units.len() as u32 * SINGLES + 2 * some.len() as u32 * net,
+            samples: units.len() as u32 * SINGLES + 2 * (first.len() / channels.len()) as u32 * net,
         })
     }
 

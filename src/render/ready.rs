@@ -23,7 +23,7 @@ pub(super) struct Ready {
     pub tiles: Range<u32>,
     pub samples_limit: Option<u32>,
     pub gpus: Vec<Gpu>,
-    /// Whether the first of them is one.
+    /// Whether the first of them is a software device.
     pub software: bool,
     pub evaluator: Evaluator,
     pub prepared: Arc<Prepared>,

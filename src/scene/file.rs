@@ -17,7 +17,7 @@ use super::object::Objects;
 use super::overrides;
 use super::spectrum::Spectra;
 use super::tree::{Entry, Origin, Value};
-use super::{Evaluation, Evaluator, Integrator, Sampler, Scene, Wavelengths};
+use super::{Evaluation, Evaluator, Integrator, MOST_WAVELENGTHS, Sampler, Scene, Wavelengths};
 use crate::error::{Error, Problem, Result};
 
 /// Evaluations walk all records of a path, two a bounce and one more, in one loop of at most 32,768 iterations,
@@ -26,7 +26,6 @@ const MAX_BOUNCES: u32 = 16_383;
 const MAX_EPOCH: u32 = 1024;
 /// Of spectral MIS: the state of a path has a number for each.
 const MOST_TECHNIQUES: u32 = 16;
-pub const MOST_WAVELENGTHS: u32 = 16;
 
 /// Reads the scene in `file`. `overrides` are the `--set` arguments: a dotted key and the text of a TOML value; a bare
 /// word is a string.

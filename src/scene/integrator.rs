@@ -2,6 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+/// At how many wavelengths of a channel a path may be evaluated, at most.
+pub const MOST_WAVELENGTHS: u32 = 16;
+
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Integrator {
     /// Scattering events; next-event estimation at the last one included.

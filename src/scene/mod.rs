@@ -40,8 +40,8 @@ use serde::{Deserialize, Serialize};
 
 pub use decode::join as dotted_key;
 pub use draft::Draft;
-pub use file::{MOST_WAVELENGTHS, load, parse, read};
-pub use integrator::{Evaluation, Evaluator, Integrator, Sampler, Wavelengths};
+pub use file::{load, parse, read};
+pub use integrator::{Evaluation, Evaluator, Integrator, MOST_WAVELENGTHS, Sampler, Wavelengths};
 pub use light::{Cone, Light, Profile};
 
 pub use crate::format::phase::PhaseTable;

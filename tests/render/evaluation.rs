@@ -37,6 +37,11 @@ material = "comb"
 "#;
 const ROULETTE: &[&str] = &["--set", "integrator.evaluation=roulette"];
 
+fn radiance(mut files: crate::cube_files::Files) -> crate::cube_files::Files {
+    files.retain(|name, _| name.starts_with("radiance/c"));
+    files
+}
+
 fn choices(place: &Place, name: &str) -> Option<Value> {
     let file = fs::read(place.path().join(name).join(".spectile/choices.json")).ok()?;
     Some(serde_json::from_slice(&file).expect("JSON"))
@@ -81,10 +86,6 @@ fn few_channels_need_no_pilot() {
         let set = format!("integrator.evaluation={evaluation}");
         arrays(&place.render(name, &["--spp", "4", "--set", &set]))
     };
-    let radiance = |mut files: crate::cube_files::Files| {
-        files.retain(|name, _| name.starts_with("radiance/c"));
-        files
-    };
     assert!(radiance(with("auto.zarr", "auto")) == radiance(with("all.zarr", "all")));
     let chosen = choices(&place, "auto.zarr").expect("a choice");
     assert_eq!((&chosen["scale"], &chosen["samples"]), (&Value::Null, &Value::from(0)), "{chosen}");
@@ -120,10 +121,6 @@ fn several_wavelengths_are_chosen_where_they_pay() {
     assert!(render("resumed.zarr", &["--spp", "256", "--resume", "--devices", "2"]) == straight);
     // As if it had been asked for.
     let same = format!("integrator.wavelengths_per_channel={count}");
-    let radiance = |mut files: crate::cube_files::Files| {
-        files.retain(|name, _| name.starts_with("radiance/c"));
-        files
-    };
     assert!(radiance(render("asked.zarr", &["--spp", "256", "--set", &same])) == radiance(straight));
     let errors = |name: &str| {
         let (info, _) = place.success(&["info", name, "--json"]);

@@ -97,7 +97,7 @@ pub const REGISTERS: Part = Part {
 pub const LAYOUT: Part = Part {
     name: "spectral tables",
     defines: |scene, work, defines| {
-        if work == Work::Generate && !scene.surfaces.as_ref().is_some_and(|surfaces| surfaces.dispersion) {
+        if work == Work::Generate && !scene.disperses() {
             return;
         }
         let tables = &scene.tables;

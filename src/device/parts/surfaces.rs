@@ -173,7 +173,7 @@ pub const TABLES_IN_EVALUATION: Part = Part {
 
 pub const DISPERSION: Part = Part {
     name: "dispersion",
-    used: |scene| scene.surfaces.as_ref().is_some_and(|surfaces| surfaces.dispersion),
+    used: |scene| scene.disperses(),
     effect: |_| "16 bytes a path".into(),
     is_planned: true,
     modules: &[
