@@ -1,7 +1,11 @@
 // What a ray has met.
 
 fn surface_at(ray: Ray, hit: Hit) -> Surface {
+#if INSTANCES
+    let p = primitive_met(hit);
+#else
     let p = load_primitive(hit.primitive);
+#endif
     let material = p.tag & 0x00ffffffu;
 #if SHAPES
     if ((p.tag >> 24u) != 0u) {

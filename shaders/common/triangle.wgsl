@@ -50,7 +50,11 @@ fn intersect_triangle(ray: ShearedRay, a_in: vec3<f32>, b_in: vec3<f32>, c_in: v
 fn nearer(ray: ShearedRay, hit: Hit, primitive: u32, a: vec3<f32>, b: vec3<f32>, c: vec3<f32>) -> Hit {
     let found = intersect_triangle(ray, a, b, c);
     if (found.x > 0.0 && found.x < hit.distance) {
+#if INSTANCES
+        return Hit(found.x, primitive, found.y, found.z, NONE);
+#else
         return Hit(found.x, primitive, found.y, found.z);
+#endif
     }
     return hit;
 }

@@ -68,6 +68,10 @@ struct Hit {
     // Barycentric weights of the second and third vertex (triangles only).
     u: f32,
     v: f32,
+#if INSTANCES
+    // The instance that it is a part of, or NONE.
+    instance: u32,
+#endif
 }
 
 // What a ray can meet: three vertices, or a shape as shapes.wgsl has it.

@@ -4,7 +4,11 @@ fn emit(list: ptr<function, RecordList>, path: Path, meeting: Meeting, site: Sit
     if (site.surface.emitter == NONE) {
         return;
     }
+#if PLACED_LIGHTS
+    let emitter = emitter_met(site.surface.emitter, meeting.hit.instance);
+#else
     let emitter = emitters[site.surface.emitter];
+#endif
     if (!site.from_front && (emitter.spectrum & EMITS_BOTH_SIDES) == 0u) {
         return;
     }

@@ -252,8 +252,9 @@ impl Plan<'_> {
             "spectra": facts::table_bounds(self.prepared),
             "factored_obstacles": self.prepared.obstacles,
             "storage_buffers": self.storage_buffers(),
-            "primitives": self.prepared.accel.primitives.len(),
-            "bvh_nodes": self.prepared.accel.nodes.len(),
+            "primitives": self.prepared.accel.primitives.len() - self.prepared.accel.instances,
+            "instances": self.prepared.accel.instances,
+            "bvh_nodes": self.prepared.accel.node_count,
             "emitters": self.prepared.emitters.len(),
             "wave_paths": self.waves.paths,
             "path_bytes": self.waves.path_bytes(),
@@ -305,10 +306,14 @@ impl Plan<'_> {
             None if pilot::is_needed(self.scene, p) => wrapped("paths", UNDECIDED),
             None => String::new(),
         };
+        let copies = match p.accel.instances {
+            0 => String::new(),
+            n => format!(" and {n} instances (assemblies: {})", self.scene.assemblies.len()),
+        };
         text += &format!(
-            "geometry  {} primitives, {} BVH nodes in {} levels, {} emitters\n",
-            p.accel.primitives.len(),
-            p.accel.nodes.len(),
+            "geometry  {} primitives{copies}, {} BVH nodes in {} levels, {} emitters\n",
+            p.accel.primitives.len() - p.accel.instances,
+            p.accel.node_count,
             p.accel.depth,
             p.emitters.len()
         );

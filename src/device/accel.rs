@@ -3,7 +3,7 @@
 //! Device units: the scene recentred and scaled by a power of two to about [-1, 1], in f64, before anything becomes f32,
 //! so that a scene far from the origin, or measured in micrometres, loses nothing.
 
-use glam::{DVec3, Vec3A};
+use glam::{DAffine3, DMat3, DVec3, Vec3A};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
@@ -14,12 +14,14 @@ use obvhs::ploc::PlocBuilder;
 use obvhs::{Boundable, BvhBuildParams};
 
 use crate::device::words::{HAS_COORDINATES, HAS_NORMALS, NONE, Primitive};
-use crate::scene::{Attributes, Scene, Shape};
+use crate::scene::{Attributes, Object, Scene, Shape};
 
 /// Kinds of primitives in the high byte of [`Primitive::tag`]; 0 is a triangle.
 const KIND_SPHERE: u32 = 1;
 const KIND_DISK: u32 = 2;
 const KIND_CYLINDER: u32 = 3;
+/// An instance: the columns of its matrix in the places of corners.
+const KIND_INSTANCE: u32 = 4;
 
 /// The largest number of materials: ids have 24 bits beside the primitive's kind, and one stands for none.
 pub const MAX_MATERIALS: usize = (1 << 24) - 1;
@@ -43,67 +45,275 @@ impl DeviceSpace {
     pub fn length(&self, metres: f64) -> f32 {
         (metres * self.scale) as f32
     }
+
+    /// Around what lies within `bounds`.
+    fn around([min, max]: [DVec3; 2]) -> DeviceSpace {
+        let half = (0.5 * (max - min)).max_element();
+        let scale = if half > 0.0 { (-half.log2().ceil()).exp2() } else { 1.0 };
+        let radius = (0.5 * (max - min)).length() * scale;
+        DeviceSpace { center: 0.5 * (min + max), scale, radius: radius.max(f64::from(f32::MIN_POSITIVE)) }
+    }
+
+    /// From the world into device units.
+    fn of_world(&self) -> DAffine3 {
+        DAffine3::from_scale(DVec3::splat(self.scale)) * DAffine3::from_translation(-self.center)
+    }
+}
+
+/// An emitting primitive: its index into [`Accel::primitives`], its object, and its area in device units.
+pub type Emitting = (u32, usize, f64);
+
+/// An instance that emits.
+#[derive(Debug, Clone, Copy)]
+pub struct Luminous {
+    /// Its place among [`Accel::primitives`].
+    pub primitive: u32,
+    pub assembly: usize,
 }
 
 /// Everything a ray can meet, ready for the device.
 pub struct Accel {
     pub space: DeviceSpace,
-    /// CWBVH nodes, 80 bytes each; the root is the first. At least one.
+    /// CWBVH nodes, 80 bytes each: the world's, whose root is the first, then those of each assembly; at least one. Behind them, five
+    /// in the place of one, where the space of each instance begins in the world and the root of its assembly.
     pub nodes: Vec<[u32; 20]>,
-    /// Levels of nodes: a traversal never has more of them waiting.
+    /// How many of them are nodes.
+    pub node_count: usize,
+    /// What a traversal has waiting at most.
     pub depth: u32,
-    /// In the order of the BVH's leaves.
+    /// In the order of the leaves of the world's tree, then of each assembly's, whose units are those of its own bounds.
     pub primitives: Vec<Primitive>,
+    /// How many of them are instances.
+    pub instances: usize,
     /// Texture coordinates, normals and axes of those that carry some, found by [`Primitive::attributes`].
     pub attributes: Vec<f32>,
     /// The object of each primitive.
     pub objects: Vec<u32>,
-    /// The emitting primitives: (index into `primitives`, object, area in device units).
-    pub emitters: Vec<(u32, usize, f64)>,
+    /// The emitting primitives of the world.
+    pub emitters: Vec<Emitting>,
+    /// Those of each assembly, areas in its own units; and the instances of assemblies that have some.
+    pub emitters_of: Vec<Vec<Emitting>>,
+    pub luminous: Vec<Luminous>,
     /// Whether anything but triangles occurs.
     pub has_shapes: bool,
     /// Triangles without area, which no ray can meet and which were left out.
     pub degenerate: usize,
 }
 
+/// A tree, and what stands in its leaves.
+struct Tree {
+    nodes: Vec<[u32; 20]>,
+    depth: u32,
+    primitives: Vec<Primitive>,
+}
+
+impl Tree {
+    /// Over primitives and the boxes around them.
+    fn over(loose: &[Primitive], boxes: &[Aabb]) -> Tree {
+        let (nodes, order, depth) = build_nodes(boxes);
+        Tree { nodes, depth, primitives: order.iter().map(|&i| loose[i as usize]).collect() }
+    }
+}
+
+/// What is collected of a scene's objects.
+#[derive(Default)]
+struct Collected {
+    attributes: Vec<f32>,
+    /// Triangles without area.
+    degenerate: usize,
+}
+
+impl Collected {
+    /// The primitives of those `objects` that are parts of `assembly`, or of none, in the units of `space`; the object stands in for
+    /// the emitter.
+    fn primitives(&mut self, objects: &[Object], assembly: Option<usize>, space: &DeviceSpace) -> Vec<Primitive> {
+        let mut loose = Vec::new();
+        for (index, object) in objects.iter().enumerate().filter(|(_, object)| object.assembly == assembly) {
+            let first = loose.len();
+            let material = object.material.map_or(NO_MATERIAL, |m| m as u32);
+            let triangles = collect(&object.shape, material, index as u32, space, &mut loose);
+            for (primitive, triangle) in loose[first..].iter_mut().zip(&triangles) {
+                primitive.attributes = attach(&object.attributes, *triangle, &mut self.attributes);
+            }
+            let all = if let Shape::Mesh(mesh) = &object.shape { mesh.triangles.len() } else { 1 };
+            self.degenerate += all - triangles.len();
+        }
+        loose
+    }
+}
+
+/// Nodes and primitives, one tree after the other.
+#[derive(Default)]
+struct Packed {
+    nodes: Vec<[u32; 20]>,
+    primitives: Vec<Primitive>,
+}
+
+/// Words of a node that count from the first: its first child, and its first primitive.
+const NODE_CHILDREN: usize = 4;
+const NODE_PRIMITIVES: usize = 5;
+
+impl Packed {
+    /// Appends a tree and gives the place of its root.
+    fn push(&mut self, tree: &Tree) -> usize {
+        let (root, first) = (self.nodes.len(), self.primitives.len());
+        self.nodes.extend(tree.nodes.iter().map(|node| {
+            let mut node = *node;
+            node[NODE_CHILDREN] += root as u32;
+            node[NODE_PRIMITIVES] += first as u32;
+            node
+        }));
+        self.primitives.extend(&tree.primitives);
+        root
+    }
+}
+
+/// An instance among the primitives of the world, and where its space begins there.
+struct Stub {
+    primitive: Primitive,
+    bounds: Aabb,
+    at: [f32; 3],
+    assembly: usize,
+}
+
 impl Accel {
     /// Builds the structure; never fails, an empty scene gives one empty node.
     pub fn build(scene: &Scene) -> Accel {
         let space = device_space(scene);
-        let mut loose = Vec::new();
-        let (mut degenerate, mut attributes) = (0, Vec::new());
-        for (index, object) in scene.objects.iter().enumerate() {
-            let first = loose.len();
-            let triangles = collect(
-                &object.shape,
-                object.material.map_or(NO_MATERIAL, |m| m as u32),
-                index as u32,
-                &space,
-                &mut loose,
-            );
-            for (primitive, triangle) in loose[first..].iter_mut().zip(&triangles) {
-                primitive.attributes = attach(&object.attributes, *triangle, &mut attributes);
-            }
-            let all = if let Shape::Mesh(mesh) = &object.shape { mesh.triangles.len() } else { 1 };
-            degenerate += all - triangles.len();
+        let mut collected = Collected::default();
+        let mut loose = collected.primitives(&scene.objects, None, &space);
+        let mut boxes: Vec<Aabb> = loose.iter().map(Boundable::aabb).collect();
+        let mut stubs = Vec::new();
+        let mut assemblies = Vec::with_capacity(scene.assemblies.len());
+        for (id, assembly) in scene.assemblies.iter().enumerate() {
+            let own = DeviceSpace::around(scene.bounds_of(id).unwrap_or_default());
+            let parts = collected.primitives(&scene.objects, Some(id), &own);
+            let of_parts: Vec<Aabb> = parts.iter().map(Boundable::aabb).collect();
+            let around = of_parts.iter().fold(Aabb::INVALID, |all, one| all.union(one));
+            assemblies.push(Tree::over(&parts, &of_parts));
+            let of_own = own.of_world().inverse();
+            // Whose material and boundary it is does not matter: a ray meets what is in it.
+            let object = scene.objects.iter().position(|object| object.assembly == Some(id)).unwrap_or(0);
+            let placed = assembly.instances.iter();
+            stubs.extend(placed.map(|to_world| stub(space.of_world() * *to_world * of_own, around, id, object)));
         }
-        let has_shapes = loose.iter().any(|p| p.tag >> 24 != 0);
-        let (nodes, order, depth) = build_nodes(&loose);
-        let mut primitives: Vec<Primitive> = order.iter().map(|&i| loose[i as usize]).collect();
+        for (i, stub) in stubs.iter().enumerate() {
+            // Its number, for now.
+            loose.push(Primitive { attributes: i as u32, ..stub.primitive });
+            boxes.push(stub.bounds);
+        }
+        let world = Tree::over(&loose, &boxes);
+        let mut packed = Packed::default();
+        packed.push(&world);
+        let roots: Vec<usize> = assemblies.iter().map(|tree| packed.push(tree)).collect();
+        let inner = assemblies.iter().map(|tree| tree.depth).max();
+        // What is left of the leaf in which the instance stands waits too.
+        let depth = world.depth + inner.map_or(0, |depth| depth + 1);
+        let Packed { mut nodes, mut primitives } = packed;
+        let node_count = nodes.len();
+        let placements: Vec<[u32; 4]> = stubs
+            .iter()
+            .map(|stub| {
+                let [x, y, z] = stub.at.map(f32::to_bits);
+                [x, y, z, roots[stub.assembly] as u32]
+            })
+            .collect();
+        nodes.extend(placements.chunks(5).map(|five| {
+            let mut node = [0; 20];
+            node[..4 * five.len()].copy_from_slice(five.as_flattened());
+            node
+        }));
         let objects = primitives.iter().map(|primitive| primitive.emitter).collect();
-        let mut emitters = Vec::new();
+        let (mut emitters, mut emitters_of) = (Vec::new(), vec![Vec::new(); scene.assemblies.len()]);
         for (index, primitive) in primitives.iter_mut().enumerate() {
             // `collect` left the object here; from now on it is the emitter.
             let object = primitive.emitter as usize;
             primitive.emitter = NONE;
-            if scene.objects[object].emission.is_some() {
-                primitive.emitter = emitters.len() as u32;
-                emitters.push((index as u32, object, area(primitive)));
+            if primitive.tag >> 24 != KIND_INSTANCE && scene.objects[object].emission.is_some() {
+                let among = scene.objects[object].assembly.map_or(&mut emitters, |assembly| &mut emitters_of[assembly]);
+                primitive.emitter = among.len() as u32;
+                among.push((index as u32, object, area(primitive)));
             }
         }
-        Accel { space, nodes, depth, primitives, attributes, objects, emitters, has_shapes, degenerate }
+        let mut luminous = Vec::new();
+        for (index, primitive) in primitives.iter_mut().enumerate().filter(|(_, p)| p.tag >> 24 == KIND_INSTANCE) {
+            let assembly = stubs[primitive.attributes as usize].assembly;
+            primitive.attributes += 5 * node_count as u32;
+            if !emitters_of[assembly].is_empty() {
+                primitive.emitter = (emitters.len() + luminous.len()) as u32;
+                luminous.push(Luminous { primitive: index as u32, assembly });
+            }
+        }
+        let has_shapes = primitives.iter().any(|p| !matches!(p.tag >> 24, 0 | KIND_INSTANCE));
+        let Collected { attributes, degenerate } = collected;
+        let instances = stubs.len();
+        Accel {
+            space,
+            nodes,
+            node_count,
+            depth,
+            primitives,
+            instances,
+            attributes,
+            objects,
+            emitters,
+            emitters_of,
+            luminous,
+            has_shapes,
+            degenerate,
+        }
+    }
+
+    /// What emits in an instance, with areas in the device units of the world.
+    pub fn placed_emitters(&self, instance: &Luminous) -> impl Iterator<Item = Emitting> {
+        let stub = self.primitives[instance.primitive as usize];
+        let linear = DMat3::from_cols(vector(stub.a), vector(stub.b), vector(stub.c));
+        let scale2 = linear.x_axis.length_squared();
+        let keeps_shape = {
+            let gram = linear.transpose() * linear * scale2.recip();
+            (gram - DMat3::IDENTITY).to_cols_array().iter().all(|difference| difference.abs() < 1e-5)
+        };
+        self.emitters_of[instance.assembly].iter().map(move |&(primitive, object, area)| {
+            let p = &self.primitives[primitive as usize];
+            let placed = if keeps_shape || p.tag >> 24 != 0 {
+                scale2 * area
+            } else {
+                let [b, c] = [p.b, p.c].map(|corner| linear * (vector(corner) - vector(p.a)));
+                0.5 * b.cross(c).length()
+            };
+            (primitive, object, placed)
+        })
+    }
+
+    /// Everything that emits, with areas in the device units of the world.
+    pub fn all_emitters(&self) -> impl Iterator<Item = Emitting> {
+        self.emitters.iter().copied().chain(self.luminous.iter().flat_map(|instance| self.placed_emitters(instance)))
     }
 }
+
+/// An instance of `assembly`, which fills `bounds` in its own units; `to_device` leads from those to the world's.
+fn stub(to_device: DAffine3, bounds: Aabb, assembly: usize, object: usize) -> Stub {
+    let m = to_device.matrix3.as_mat3();
+    let at = to_device.translation.as_vec3();
+    let (low, high) = (DVec3::from(bounds.min.as_dvec3()), DVec3::from(bounds.max.as_dvec3()));
+    let [low, high] = crate::scene::box_around(&to_device, [low, high]).map(|p| p.as_vec3a());
+    // Corners are moved in f32.
+    let reach =
+        low.abs().max(high.abs()).max_element() + (m.x_axis.abs() + m.y_axis.abs() + m.z_axis.abs()).max_element();
+    let margin = Vec3A::splat(PLACING_ERROR * reach);
+    let primitive = Primitive {
+        a: m.x_axis.to_array(),
+        b: m.y_axis.to_array(),
+        c: m.z_axis.to_array(),
+        tag: KIND_INSTANCE << 24 | NO_MATERIAL,
+        emitter: object as u32,
+        ..Primitive::default()
+    };
+    Stub { primitive, bounds: Aabb::new(low - margin, high + margin), at: at.to_array(), assembly }
+}
+
+/// Of what a corner goes through when it is moved in f32, relative to the largest number on the way: eight roundings.
+const PLACING_ERROR: f32 = 4.8e-7;
 
 /// The corners of a box around `shapes`; `None` without any.
 pub fn bounds<'a>(shapes: impl Iterator<Item = &'a Shape>) -> Option<[DVec3; 2]> {
@@ -113,13 +323,8 @@ pub fn bounds<'a>(shapes: impl Iterator<Item = &'a Shape>) -> Option<[DVec3; 2]>
 }
 
 fn device_space(scene: &Scene) -> DeviceSpace {
-    let Some([min, max]) = bounds(scene.objects.iter().map(|object| &object.shape)) else {
-        return DeviceSpace { center: scene.camera.position, scale: 1.0, radius: 1.0 };
-    };
-    let half = (0.5 * (max - min)).max_element();
-    let scale = if half > 0.0 { (-half.log2().ceil()).exp2() } else { 1.0 };
-    let radius = (0.5 * (max - min)).length() * scale;
-    DeviceSpace { center: 0.5 * (min + max), scale, radius: radius.max(f64::from(f32::MIN_POSITIVE)) }
+    let alone = DeviceSpace { center: scene.camera.position, scale: 1.0, radius: 1.0 };
+    scene.bounds().map_or(alone, DeviceSpace::around)
 }
 
 /// Appends what a primitive carries, as `shaders/common/attributes.wgsl` reads it, and gives the word that finds it.
@@ -239,15 +444,15 @@ const PADDED_FROM: usize = 100;
 const MAX_COINCIDENT: usize = 256;
 
 /// The nodes, for each place in the leaves the primitive that stands there, and the tree's depth.
-fn build_nodes(primitives: &[Primitive]) -> (Vec<[u32; 20]>, Vec<u32>, u32) {
-    if primitives.is_empty() {
+fn build_nodes(boxes: &[Aabb]) -> (Vec<[u32; 20]>, Vec<u32>, u32) {
+    if boxes.is_empty() {
         return (vec![[0; 20]], Vec::new(), 1);
     }
-    let clustered = (most_coincident(primitives) <= MAX_COINCIDENT)
-        .then(|| clustered(primitives))
+    let clustered = (most_coincident(boxes) <= MAX_COINCIDENT)
+        .then(|| clustered(boxes))
         // Nested boxes become chains instead of trees.
         .filter(|bvh| depth(bvh) <= MAX_DEPTH);
-    let bvh = clustered.unwrap_or_else(|| bvh2_to_cwbvh(&balanced(primitives), 3, true, false));
+    let bvh = clustered.unwrap_or_else(|| bvh2_to_cwbvh(&balanced(boxes), 3, true, false));
     let nodes = bvh.nodes.iter().map(|node| bytemuck::cast(*node)).collect();
     let depth = depth(&bvh) as u32;
     (nodes, bvh.primitive_indices, depth)
@@ -263,15 +468,15 @@ impl Boundable for Padded {
 }
 
 /// As obvhs's `build_cwbvh`, but for what happens to the boxes meanwhile.
-fn clustered(primitives: &[Primitive]) -> CwBvh {
+fn clustered(own: &[Aabb]) -> CwBvh {
     let settings = BvhBuildParams::medium_build();
-    let padding = if primitives.len() < PADDED_FROM { 0.0 } else { PADDING };
-    let padded = |primitive: &Primitive| {
-        let Aabb { min, max } = primitive.aabb();
+    let padding = if own.len() < PADDED_FROM { 0.0 } else { PADDING };
+    let padded = |Aabb { min, max }: &Aabb| {
+        let (min, max) = (*min, *max);
         let margin = Vec3A::splat(padding * (max - min).max_element());
         Padded(Aabb { min: min - margin, max: max + margin })
     };
-    let boxes: Vec<Padded> = primitives.iter().map(padded).collect();
+    let boxes: Vec<Padded> = own.iter().map(padded).collect();
     let mut tree = PlocBuilder::with_capacity(boxes.len()).build(
         settings.ploc_search_distance,
         &boxes,
@@ -281,20 +486,19 @@ fn clustered(primitives: &[Primitive]) -> CwBvh {
     );
     ReinsertionOptimizer::default().run(&mut tree, settings.reinsertion_batch_ratio, None);
     for node in tree.nodes.iter_mut().filter(|node| node.is_leaf()) {
-        let own = node.first_index as usize..(node.first_index + node.prim_count) as usize;
-        let own = tree.primitive_indices[own].iter().map(|&i| primitives[i as usize].aabb());
-        node.set_aabb(own.fold(Aabb::INVALID, |all, one| all.union(&one)));
+        let held = node.first_index as usize..(node.first_index + node.prim_count) as usize;
+        let held = tree.primitive_indices[held].iter().map(|&i| own[i as usize]);
+        node.set_aabb(held.fold(Aabb::INVALID, |all, one| all.union(&one)));
     }
     tree.refit_all();
     bvh2_to_cwbvh(&tree, settings.max_prims_per_leaf.clamp(1, 3), true, false)
 }
 
 /// The largest number of primitives that share one bounding box (by hashes: a collision may only overstate it).
-fn most_coincident(primitives: &[Primitive]) -> usize {
-    let mut hashes: Vec<u64> = primitives
+fn most_coincident(boxes: &[Aabb]) -> usize {
+    let mut hashes: Vec<u64> = boxes
         .iter()
-        .map(|p| {
-            let Aabb { min, max } = p.aabb();
+        .map(|Aabb { min, max }| {
             let bits = min.to_array().into_iter().chain(max.to_array()).map(|x| u64::from(x.to_bits()));
             // Fowler, Noll and Vo's prime, a word at a time.
             bits.fold(0xcbf2_9ce4_8422_2325, |h: u64, b| (h ^ b).wrapping_mul(0x0100_0000_01b3).rotate_left(29))
@@ -318,11 +522,10 @@ fn depth(bvh: &CwBvh) -> usize {
 }
 
 /// A binary tree by median splits along the widest axis: as deep as log2 of the number of primitives, whatever they are.
-fn balanced(primitives: &[Primitive]) -> Bvh2 {
-    let boxes: Vec<Aabb> = primitives.iter().map(Boundable::aabb).collect();
-    let mut order: Vec<u32> = (0..primitives.len() as u32).collect();
+fn balanced(boxes: &[Aabb]) -> Bvh2 {
+    let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
     let mut nodes = vec![Bvh2Node::default()];
-    let mut open = vec![(0usize, 0..primitives.len())];
+    let mut open = vec![(0usize, 0..boxes.len())];
     while let Some((at, range)) = open.pop() {
         let bounds = order[range.clone()].iter().fold(Aabb::INVALID, |b, &i| b.union(&boxes[i as usize]));
         if range.len() == 1 {
@@ -374,7 +577,8 @@ mod tests {
             .map(|i| triangle([i as f32, 0.0, 0.0], [i as f32 + 1e-6, 0.0, 0.0], [i as f32, 0.0, 1.0]))
             .collect();
         for primitives in [one, coincident, nested, grid, flat] {
-            let (nodes, order, _) = build_nodes(&primitives);
+            let boxes: Vec<Aabb> = primitives.iter().map(Boundable::aabb).collect();
+            let (nodes, order, _) = build_nodes(&boxes);
             let mut seen = order.clone();
             seen.sort_unstable();
             assert!(seen.iter().enumerate().all(|(i, &p)| i as u32 == p), "each primitive stands in one leaf");
@@ -406,7 +610,8 @@ mod tests {
                 walls.extend([triangle(a, b, c), triangle(a, c, d)]);
             }
         }
-        let (nodes, primitive_indices, _) = build_nodes(&walls);
+        let boxes: Vec<Aabb> = walls.iter().map(Boundable::aabb).collect();
+        let (nodes, primitive_indices, _) = build_nodes(&boxes);
         let nodes = nodes.into_iter().map(bytemuck::cast).collect();
         let bvh = CwBvh { nodes, primitive_indices, ..CwBvh::default() };
         const RAYS: u32 = 2_000;

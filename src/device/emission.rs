@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use crate::device::accel::Accel;
+use crate::device::accel::{Accel, Emitting};
 use crate::device::parts::media::{absorption, extent};
 use crate::scene::{Cone, Light, Medium, Profile, Scene, Sides};
 use crate::spectral::{Curve, planck};
@@ -24,8 +24,8 @@ impl<'a> Emitted<'a> {
     /// Of the primitives and `lamps` (indices of the scene's lights).
     pub fn of(scene: &Scene, accel: &Accel, lamps: &[usize], environment: Option<&'a Curve>) -> Emitted<'a> {
         let mut areas = vec![0.0; scene.spectra.len()];
-        for emitter in &accel.emitters {
-            areas[radiance(scene, emitter)] += area(scene, emitter);
+        for emitter in accel.all_emitters() {
+            areas[radiance(scene, &emitter)] += area(scene, &emitter);
         }
         // What comes from afar lights the cross-section of a sphere around everything.
         let cross_section = accel.space.radius.powi(2);
@@ -67,12 +67,12 @@ fn flux_over_pi(cone: &Cone) -> f64 {
 }
 
 /// The spectrum that an emitting primitive has in the scene.
-pub fn radiance(scene: &Scene, &(_, object, _): &(u32, usize, f64)) -> usize {
+pub fn radiance(scene: &Scene, &(_, object, _): &Emitting) -> usize {
     scene.objects[object].emission.as_ref().expect("emitters come from emitting objects").radiance
 }
 
 /// Its emitting area in device units.
-pub fn area(scene: &Scene, &(_, object, area): &(u32, usize, f64)) -> f64 {
+pub fn area(scene: &Scene, &(_, object, area): &Emitting) -> f64 {
     let both = scene.objects[object].emission.as_ref().is_some_and(|emission| emission.sides == Sides::Both);
     area * if both { 2.0 } else { 1.0 }
 }

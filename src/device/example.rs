@@ -6,12 +6,11 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 
-use crate::device::accel;
 use crate::device::part::{PARTS, Part};
 use crate::scene::{
-    Absorber, Attributes, Bsdf, Component, Cone, Emission, Environment, EnvironmentMap, Field, Grid, Interior, Light,
-    Material, Medium, Mesh, Object, Phase, PhaseTable, Placement, Profile, Reflectance, Scattering, Scene, Shape,
-    Sides, Spectrum, Temperature, Texels, Texture, TextureKind, Weight,
+    Absorber, Assembly, Attributes, Bsdf, Component, Cone, Emission, Environment, EnvironmentMap, Field, Grid,
+    Interior, Light, Material, Medium, Mesh, Object, Phase, PhaseTable, Placement, Profile, Reflectance, Scattering,
+    Scene, Shape, Sides, Spectrum, Temperature, Texels, Texture, TextureKind, Weight,
 };
 use crate::spectral::{Curve, Outside};
 
@@ -46,7 +45,7 @@ pub struct Exhibit {
 impl Exhibit {
     fn behind_camera(scene: &Scene) -> Exhibit {
         let camera = scene.camera.position;
-        let [low, high] = accel::bounds(scene.objects.iter().map(|object| &object.shape)).unwrap_or([camera; 2]);
+        let [low, high] = scene.bounds().unwrap_or([camera; 2]);
         let size = SIZE * (high.max(camera) - low.min(camera)).length();
         let size = if size > 0.0 { size } else { SIZE };
         let mut exhibit = Exhibit { scene: scene.clone(), at: camera - 2.0 * size * scene.camera.forward, size };
@@ -66,6 +65,21 @@ impl Exhibit {
 
     fn ball(&self) -> Shape {
         Shape::Sphere { center: self.at, radius: 0.01 * self.size }
+    }
+
+    pub fn add_instances(&mut self) {
+        let black = self.material(Bsdf::Black, None);
+        self.object(self.ball(), Some(black), Attributes::default());
+        let name = "example".to_owned();
+        self.scene.objects.last_mut().expect("just pushed").assembly = Some(self.scene.assemblies.len());
+        self.scene.assemblies.push(Assembly { name, instances: vec![DAffine3::IDENTITY; 2] });
+    }
+
+    pub fn add_luminous_instances(&mut self) {
+        self.add_instances();
+        let radiance = self.spectrum(Curve::Constant(DARK));
+        let emission = Emission { radiance, sides: Sides::Front, texture: None };
+        self.scene.objects.last_mut().expect("just pushed").emission = Some(emission);
     }
 
     pub fn add_black_ball(&mut self) {
@@ -328,7 +342,15 @@ impl Exhibit {
 
     fn object(&mut self, shape: Shape, material: Option<usize>, attributes: Attributes) {
         let name = "of everything".to_owned();
-        self.scene.objects.push(Object { name, shape, attributes, material, emission: None, interior: None });
+        self.scene.objects.push(Object {
+            name,
+            shape,
+            attributes,
+            material,
+            emission: None,
+            interior: None,
+            assembly: None,
+        });
     }
 
     fn last(&mut self) -> &mut Object {

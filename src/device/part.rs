@@ -5,7 +5,8 @@ use std::ops::Deref;
 
 use crate::device::example::Exhibit;
 use crate::device::parts::{
-    attributes, camera, geometry, heat, lights, media, opacity, paths, scattering, sky, spectra, surfaces, textures,
+    attributes, camera, geometry, heat, instances, lights, media, opacity, paths, scattering, sky, spectra, surfaces,
+    textures,
 };
 use crate::device::prepared::Prepared;
 use crate::device::text::{Defines, Module};
@@ -45,6 +46,8 @@ pub const PARTS: &[&Part] = &[
     &geometry::BVH,
     &geometry::FEW,
     &geometry::SHAPES,
+    &instances::INSTANCES,
+    &instances::LIGHTS,
     &lights::NEXT_EVENT,
     &camera::THIN_LENS,
     &camera::ORTHOGRAPHIC,

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use crate::device::accel::{Accel, MAX_MATERIALS};
+use crate::device::accel::{Accel, Emitting, MAX_MATERIALS};
 use crate::device::emission::Emitted;
 use crate::device::evaluator;
 use crate::device::integration::Integration;
@@ -135,7 +135,7 @@ impl Prepared {
     fn flatten(scene: &Scene, seed: u64, evaluator: Evaluator, integration: Option<Integration>) -> Result<Prepared> {
         let heat = heat::as_emission(scene);
         let scene = &*heat.scene;
-        let accel = Accel::build(scene);
+        let mut accel = Accel::build(scene);
         if scene.materials.len() > MAX_MATERIALS {
             return Err(Error::input(&scene.file, format!("more than {MAX_MATERIALS} materials")));
         }
@@ -174,7 +174,7 @@ impl Prepared {
             Some(_) => Vec::new(),
         };
         let (lamps, of_lamps) = lamps(scene, &accel, &picks, source);
-        let emitters = emitters(scene, &accel, &picks, &heat, radiators.as_ref(), of_lamps, source);
+        let emitters = emitters(scene, &mut accel, &picks, &heat, radiators.as_ref(), of_lamps, source);
         let features =
             Features { registers: in_registers && fit_registers(&tables, &ids), ..features(scene, &accel, &tables) };
         let suns = scene.lights.iter().filter(|light| matches!(light, Light::Sun { .. })).count() as u32;
@@ -320,6 +320,7 @@ impl General {
             || sky.is_some()
             || !scene.media.is_empty()
             || scene.materials.iter().any(|material| material.opacity.is_some())
+            || !accel.luminous.is_empty()
             || !heat.by_angle.is_empty()
             || !heat.radiating.is_empty();
         if !is_general {
@@ -344,20 +345,21 @@ impl General {
     }
 }
 
-/// Emitting primitives, then lamps, then the spectra of what emits by angle, behind all that can be chosen.
+/// Emitting primitives of the world, instances that emit, lamps; then, behind all that can be chosen, the spectra of what emits by
+/// angle, and the emitters of each assembly with their number before them, which its primitives are told of.
 fn emitters(
     scene: &Scene,
-    accel: &Accel,
+    accel: &mut Accel,
     picks: &LightPicks,
     heat: &Heat,
     radiators: Option<&Radiators>,
     lamps: Vec<Emitter>,
     source: impl Fn(usize) -> u32,
 ) -> Vec<Emitter> {
-    let first_row = accel.emitters.len() + lamps.len();
+    let first_row = picks.cdf.len();
     let rows = heat.by_angle.iter().flatten().flatten();
     let rows = rows.map(|&spectrum| Emitter { primitive: source(spectrum), ..Emitter::default() });
-    let primitives = accel.emitters.iter().zip(&picks.emitters).map(|(&(primitive, object, area), &pick)| {
+    let emitter = |&(primitive, object, area): &Emitting, pick: f64, pick_end: f32| {
         let emission = scene.objects[object].emission.as_ref().expect("emitters come from emitting objects");
         let sides = if emission.sides == Sides::Both { EMITS_BOTH_SIDES } else { 0 };
         let spectrum = match (heat.kinds[object], radiators) {
@@ -365,17 +367,44 @@ fn emitters(
             (heat::Kind::ByPlace(place), Some(radiators)) => radiators.words[place] | EMITS_BY_PLACE,
             _ => source(emission.radiance),
         };
-        Emitter { primitive, spectrum: spectrum | sides, pick: pick as f32, area: area as f32, ..Emitter::default() }
+        Emitter { primitive, spectrum: spectrum | sides, pick: pick as f32, area: area as f32, pick_end }
+    };
+    let mut intervals = picks.emitters.iter().zip(&picks.cdf);
+    let mut all: Vec<Emitter> =
+        accel.emitters.iter().zip(intervals.by_ref()).map(|(of, (&pick, &end))| emitter(of, pick, end)).collect();
+    // Where the table of the assembly begins is known when all else is there.
+    let placed = accel.luminous.iter().zip(intervals.by_ref()).map(|(instance, (&pick, &pick_end))| Emitter {
+        primitive: instance.primitive,
+        pick: pick as f32,
+        pick_end,
+        ..Emitter::default()
     });
-    let chosen = primitives.chain(lamps).zip(&picks.cdf).map(|(emitter, &pick_end)| Emitter { pick_end, ..emitter });
-    chosen.chain(rows).collect()
+    all.extend(placed);
+    all.extend(lamps.into_iter().zip(intervals).map(|(lamp, (_, &pick_end))| Emitter { pick_end, ..lamp }));
+    all.extend(rows);
+    for (assembly, (of, (ends, within))) in accel.emitters_of.iter().zip(&picks.within).enumerate() {
+        let table = all.len() as u32;
+        for (i, _) in accel.luminous.iter().enumerate().filter(|(_, instance)| instance.assembly == assembly) {
+            all[accel.emitters.len() + i].spectrum = table;
+        }
+        if of.is_empty() {
+            continue;
+        }
+        all.push(Emitter { primitive: of.len() as u32, ..Emitter::default() });
+        let entries = of.iter().zip(within).zip(ends);
+        all.extend(entries.map(|((of, &pick), &end)| emitter(of, pick, end)));
+        for (i, (primitive, ..)) in of.iter().enumerate() {
+            accel.primitives[*primitive as usize].emitter = table + 1 + i as u32;
+        }
+    }
+    all
 }
 
 /// The scene's lights as the device has them, and their places among the emitters.
 fn lamps(scene: &Scene, accel: &Accel, picks: &LightPicks, source: impl Fn(usize) -> u32) -> (Vec<Lamp>, Vec<Emitter>) {
     let place = |towards: DVec3| towards.as_vec3().to_array();
     let (mut lamps, mut emitters) = (Vec::new(), Vec::new());
-    for (&light, &pick) in picks.lamps.iter().zip(&picks.emitters[accel.emitters.len()..]) {
+    for (&light, &pick) in picks.lamps.iter().zip(&picks.emitters[accel.emitters.len() + accel.luminous.len()..]) {
         let light = &scene.lights[light];
         let spectrum = source(light.spectrum()) | EMITTER_IS_LAMP;
         let mut emitter = Emitter {
@@ -431,10 +460,13 @@ fn features(scene: &Scene, accel: &Accel, tables: &SpectralTables) -> Features {
         orthographic: matches!(scene.camera.projection, Projection::Orthographic { .. }),
         gaussian: scene.film.filter == Filter::Gaussian,
         independent: scene.integrator.sampler == Sampler::Independent,
-        emitters: !accel.emitters.is_empty(),
+        emitters: !accel.emitters.is_empty() || !accel.luminous.is_empty(),
         environment: scene.environment.as_ref().is_some_and(|e| e.uniform().is_some()),
         shapes: accel.has_shapes,
-        few_triangles: !accel.has_shapes && scene.media.is_empty() && geometry::are_few(&accel.primitives),
+        few_triangles: !accel.has_shapes
+            && accel.instances == 0
+            && scene.media.is_empty()
+            && geometry::are_few(&accel.primitives),
         roulette: scene.integrator.russian_roulette_start > 0,
         strata: tables.stratum_bits > 0,
         knots: tables.has_knots(),
@@ -477,7 +509,7 @@ fn frame(
         film_size: [scene.film.width as f32, scene.film.height as f32],
         max_bounces: bounces,
         roulette_start: scene.integrator.russian_roulette_start,
-        emitter_count: (accel.emitters.len() + picks.lamps.len()) as u32,
+        emitter_count: picks.cdf.len() as u32,
         environment_pick: picks.environment as f32,
         environment_spectrum,
         max_records: 0,

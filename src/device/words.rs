@@ -65,6 +65,10 @@ constants! {
         KIND_DISK = 2;
         KIND_CYLINDER = 3;
     }
+    /// One more kind: its corners are the columns of a matrix.
+    INSTANCES {
+        KIND_INSTANCE = 4;
+    }
     /// Bits of [`Primitive::attributes`].
     ATTRIBUTES {
         HAS_COORDINATES = 0x8000_0000;

@@ -69,7 +69,8 @@ pub fn import(source: &Path, folder: &Path) -> Result<Summary> {
         let path = new.aside().join(name);
         std::fs::write(&path, text).map_err(|error| Error::storage(&path, error))
     };
-    write("scene.toml", scene.toml(source))?;
+    let assemblies = scene.write_assemblies()?;
+    write("scene.toml", scene.toml(source, &assemblies))?;
     write("IMPORT.md", scene.report.page(source))?;
     new.finish()?;
     Ok(summary(&scene.report))

@@ -3,6 +3,9 @@
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
+use glam::DAffine3;
+
+use super::geometry::similarity;
 use super::report::Report;
 use super::text;
 use crate::format::csv_table;
@@ -51,6 +54,31 @@ impl Section {
     }
 }
 
+/// Objects that are placed together.
+#[derive(Debug)]
+pub struct Assembly {
+    name: String,
+    objects: Vec<Section>,
+    places: Vec<DAffine3>,
+}
+
+impl Assembly {
+    pub fn place(&mut self, to_world: DAffine3) {
+        self.places.push(to_world);
+    }
+
+    /// Whether it can be placed so: round shapes keep their form.
+    pub fn takes(&self, to_world: &DAffine3) -> bool {
+        let is_round = |object: &Section| {
+            object.entries.iter().any(|(key, _)| ["sphere", "disk", "cylinder"].contains(&key.as_str()))
+        };
+        similarity(to_world.matrix3).is_some() || !self.objects.iter().any(is_round)
+    }
+}
+
+/// So many places of an assembly stand in the scene itself; more in a file beside it.
+const PLACES_IN_SCENE: usize = 8;
+
 /// Everything of it.
 #[derive(Debug, Default)]
 pub struct Scene {
@@ -59,6 +87,7 @@ pub struct Scene {
     pub integrator: Option<Section>,
     pub materials: Vec<Section>,
     pub objects: Vec<Section>,
+    pub assemblies: Vec<Assembly>,
     pub lights: Vec<Section>,
     pub environment: Option<Section>,
     pub report: Report,
@@ -173,8 +202,46 @@ impl Scene {
         }
     }
 
+    /// Adds objects that are placed together; gives their place among [`Scene::assemblies`].
+    pub fn assemble(&mut self, wanted: &str, objects: Vec<Section>) -> usize {
+        let wanted = if wanted.is_empty() { "assembly" } else { wanted };
+        let name = (1..).map(|i| if i == 1 { wanted.to_owned() } else { format!("{wanted}-{i}") });
+        let name = name.into_iter().find(|name| self.assemblies.iter().all(|known| known.name != *name));
+        self.assemblies.push(Assembly { name: name.unwrap_or_default(), objects, places: Vec::new() });
+        self.assemblies.len() - 1
+    }
+
+    /// The sections of all assemblies that are placed; many places go into files.
+    pub fn write_assemblies(&mut self) -> Result<Vec<Section>> {
+        let mut sections = Vec::new();
+        for Assembly { name, objects, places } in std::mem::take(&mut self.assemblies) {
+            if places.is_empty() || objects.is_empty() {
+                continue;
+            }
+            let header = format!("[[assemblies.{}.objects]]", text::key(&name));
+            sections.extend(objects.into_iter().map(|object| Section { header: header.clone(), ..object }));
+            let instance = || Section::new("[[instances]]").with("assembly", text::quoted(&name));
+            if places.len() <= PLACES_IN_SCENE {
+                sections.extend(places.iter().map(|place| match *place == DAffine3::IDENTITY {
+                    true => instance(),
+                    false => instance().with("transform", text::transform(place)),
+                }));
+                continue;
+            }
+            let columns = (0..12).map(|i| format!("m{}{}", i / 4, i % 4));
+            let mut table = csv_table::Table::new(columns);
+            for DAffine3 { matrix3: m, translation: t } in &places {
+                let rows = (0..3).flat_map(|i| [m.x_axis[i], m.y_axis[i], m.z_axis[i], t[i]]);
+                table.row(rows.map(text::rounded));
+            }
+            let path = self.write("placements", &format!("{name}.csv"), table.finish().as_bytes())?;
+            sections.push(instance().with("placements", text::quoted(&path)));
+        }
+        Ok(sections)
+    }
+
     /// scene.toml.
-    pub fn toml(&self, source: &Path) -> String {
+    pub fn toml(&self, source: &Path, assemblies: &[Section]) -> String {
         let name = source.file_name().unwrap_or_default().to_string_lossy();
         let mut out =
             format!("# From {} by `spectile import`; IMPORT.md tells what became of it.\n", name.escape_debug());
@@ -188,7 +255,8 @@ impl Scene {
             .chain(&self.environment)
             .chain(&self.materials)
             .chain(&self.lights)
-            .chain(&self.objects);
+            .chain(&self.objects)
+            .chain(assemblies);
         all.for_each(|section| section.write(&mut out));
         out
     }

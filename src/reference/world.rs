@@ -209,7 +209,15 @@ mod tests {
 
     fn object(shape: Shape) -> Object {
         let attributes = crate::scene::Attributes::default();
-        Object { name: "test".into(), shape, attributes, material: Some(0), emission: None, interior: None }
+        Object {
+            name: "test".into(),
+            shape,
+            attributes,
+            material: Some(0),
+            emission: None,
+            interior: None,
+            assembly: None,
+        }
     }
 
     fn vector(rng: &mut Rng) -> DVec3 {

@@ -128,6 +128,9 @@ const LOOKED_AT: usize = 256;
 /// A lamp that shines from its front only, before which there is neither the camera nor anything else.
 fn turned_away(scene: &Scene, index: usize, object: &Object) -> Option<String> {
     let emission = object.emission.as_ref().filter(|emission| emission.sides == Sides::Front)?;
+    if object.assembly.is_some() {
+        return None;
+    }
     if !scene.spectra[emission.radiance].curve.max(1e-3, 1e15).gt(&0.0) {
         return None;
     }
@@ -137,7 +140,7 @@ fn turned_away(scene: &Scene, index: usize, object: &Object) -> Option<String> {
         let holds = |point: DVec3| point.cmpge(low).all() && point.cmple(high).all();
         let others = scene.objects.iter().enumerate().filter(|(other, _)| *other != index);
         eye.iter().any(|point| holds(*point))
-            || others.map(|(_, object)| object.shape.bounds()).any(|[a, b]| holds(0.5 * (a + b)))
+            || others.flat_map(|(_, object)| scene.boxes(object)).any(|[a, b]| holds(0.5 * (a + b)))
     };
     if let Shape::Mesh(mesh) = &object.shape
         && volume(mesh) < 0.0
@@ -164,7 +167,7 @@ fn turned_away(scene: &Scene, index: usize, object: &Object) -> Option<String> {
             .objects
             .iter()
             .enumerate()
-            .any(|(other, object)| other != index && corners(object.shape.bounds()).into_iter().any(before));
+            .any(|(other, object)| other != index && scene.boxes(object).flat_map(corners).any(before));
     (!seen).then(|| {
         format!(
             "{} shines from its front only, where the corners of its faces run counter-clockwise, and neither the camera nor any \

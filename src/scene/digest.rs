@@ -7,10 +7,10 @@ use glam::DVec3;
 use sha2::{Digest, Sha256};
 
 use super::{
-    Absorber, Attributes, Bsdf, Camera, Component, Cone, Emission, Environment, EnvironmentMap, Evaluation, Field,
-    Film, Filter, Grid, Integrator, Interior, Light, Material, Medium, Mesh, Object, Phase, PhaseTable, Placement,
-    Profile, Projection, Reflectance, Sampler, Scattering, Scene, Shape, Sides, Spectrum, Temperature, Texels, Texture,
-    TextureFilter, TextureKind, Wavelengths, Weight,
+    Absorber, Assembly, Attributes, Bsdf, Camera, Component, Cone, Emission, Environment, EnvironmentMap, Evaluation,
+    Field, Film, Filter, Grid, Integrator, Interior, Light, Material, Medium, Mesh, Object, Phase, PhaseTable,
+    Placement, Profile, Projection, Reflectance, Sampler, Scattering, Scene, Shape, Sides, Spectrum, Temperature,
+    Texels, Texture, TextureFilter, TextureKind, Wavelengths, Weight,
 };
 use crate::spectral::{Channels, Curve, Outside};
 
@@ -26,6 +26,7 @@ pub fn digest(scene: &Scene) -> String {
         materials,
         textures,
         objects,
+        assemblies,
         media,
         camera_medium,
         lights,
@@ -47,6 +48,11 @@ pub fn digest(scene: &Scene) -> String {
         hash.list(textures, Hash::texture);
     }
     hash.list(objects, Hash::object);
+    // Nothing without any, so that other scenes keep their digests.
+    if !assemblies.is_empty() {
+        hash.text("assemblies");
+        hash.list(assemblies, Hash::assembly);
+    }
     hash.list(media, Hash::medium);
     hash.option(*camera_medium, Hash::count);
     match environment {
@@ -326,7 +332,12 @@ impl Hash {
     }
 
     fn object(&mut self, object: &Object) {
-        let Object { name: _, shape, attributes, material, emission, interior } = object;
+        let Object { name: _, shape, attributes, material, emission, interior, assembly } = object;
+        // A tag that no shape has; nothing in the world itself.
+        if let Some(assembly) = assembly {
+            self.tag(103);
+            self.count(*assembly);
+        }
         self.attributes(attributes);
         self.shape(shape);
         self.option(*material, Hash::count);
@@ -348,6 +359,11 @@ impl Hash {
             hash.count(medium);
             hash.numbers(&to_grid.to_cols_array());
         });
+    }
+
+    fn assembly(&mut self, assembly: &Assembly) {
+        let Assembly { name: _, instances } = assembly;
+        self.list(instances, |hash, placed| hash.numbers(&placed.to_cols_array()));
     }
 
     /// Tags that no shape has, before the shape; nothing where there are none.

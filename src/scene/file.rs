@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::assembly;
 use super::camera;
 use super::channels;
 use super::context::Context;
@@ -120,6 +121,7 @@ fn decode<'a>(cx: &'a Context<'a>, root: &'a [Entry]) -> Option<Scene> {
     if let Some(items) = top.get("objects").and_then(|item| item.array()) {
         items.iter().for_each(|item| objects.add(item));
     }
+    let assemblies = assembly::decode(top.get("assemblies").as_ref(), top.get("instances").as_ref(), &mut objects);
     let objects = objects.finish();
     let (materials, textures) = materials.finish();
     let outer = top.get("camera").and_then(|item| camera::medium(&item));
@@ -137,6 +139,7 @@ fn decode<'a>(cx: &'a Context<'a>, root: &'a [Entry]) -> Option<Scene> {
         textures,
         spectra: spectra.finish(),
         objects,
+        assemblies,
         media: media.finish(),
         camera_medium: match camera_medium {
             Some(medium) => Some(medium?),

@@ -2,6 +2,7 @@
 //! f64, world space. Knows no GPU and no paths.
 
 pub mod arrays;
+mod assembly;
 mod blend;
 mod camera;
 mod channels;
@@ -43,6 +44,7 @@ pub use draft::Draft;
 pub use file::{load, parse, read};
 pub use integrator::{Evaluation, Evaluator, Integrator, MOST_WAVELENGTHS, Sampler, Wavelengths};
 pub use light::{Cone, Light, Profile};
+pub use transform::box_around;
 
 pub use crate::format::phase::PhaseTable;
 pub use relight::{NewChannels, Relit, relight};
@@ -59,6 +61,8 @@ pub type TextureId = usize;
 pub type MaterialId = usize;
 /// Index into [`Scene::media`].
 pub type MediumId = usize;
+/// Index into [`Scene::assemblies`].
+pub type AssemblyId = usize;
 
 /// Everything a render needs to know about what is rendered.
 #[derive(Debug, Clone)]
@@ -76,6 +80,8 @@ pub struct Scene {
     /// Only those that some material in use has.
     pub textures: Vec<Texture>,
     pub objects: Vec<Object>,
+    /// Only those that are placed.
+    pub assemblies: Vec<Assembly>,
     /// Only those that fill something.
     pub media: Vec<Medium>,
     /// What fills space outside all interiors.
@@ -334,6 +340,16 @@ pub struct Object {
     pub emission: Option<Emission>,
     /// What fills the inside of a closed shape: behind its geometric normal.
     pub interior: Option<Interior>,
+    /// Whose part it is: its geometry then is in the assembly's space.
+    pub assembly: Option<AssemblyId>,
+}
+
+/// Objects that are placed together, any number of times, and stored once.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Assembly {
+    pub name: String,
+    /// From its own space to the world, for each of its instances: at least one, none of them mirrored.
+    pub instances: Vec<DAffine3>,
 }
 
 /// A medium in its place. Where several interiors overlap, the innermost counts: the one that a path entered last.
@@ -462,7 +478,7 @@ pub struct Attributes {
     pub axes: Option<DMat3>,
 }
 
-/// World-space geometry, transforms applied.
+/// Geometry of the world, or of its assembly, transforms applied.
 ///
 /// Without texture coordinates the tangent of anisotropic materials ([`Attributes`]) is along the first edge (corner 0 to
 /// 1) of a triangle, which is that of growing u on quads and cubes.

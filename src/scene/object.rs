@@ -16,7 +16,7 @@ use super::spectrum::{Handle, Quantity, Spectra, report_in_file};
 use super::texture;
 use super::transform;
 use super::tree::Value;
-use super::{Attributes, Emission, Interior, MaterialId, MediumId, Object, Shape, Sides};
+use super::{AssemblyId, Attributes, Emission, Interior, MaterialId, MediumId, Object, Shape, Sides};
 use crate::error::Problem;
 use crate::format::gltf;
 use crate::format::mesh::{self, Format, Mesh, Part, Place};
@@ -29,6 +29,8 @@ pub struct Objects<'s, 'a> {
     /// `None` where the file is wrong, which has been said.
     meshes: HashMap<PathBuf, Option<Loaded>>,
     scene: Vec<Object>,
+    /// Whose part the next object is.
+    assembly: Option<AssemblyId>,
     /// Interiors so far.
     bodies: usize,
 }
@@ -74,7 +76,7 @@ enum Covering {
 
 impl<'s, 'a> Objects<'s, 'a> {
     pub fn new(spectra: &'s mut Spectra<'a>, materials: &'s mut Materials<'a>, media: &'s mut Media<'a>) -> Self {
-        Objects { spectra, materials, media, meshes: HashMap::new(), scene: Vec::new(), bodies: 0 }
+        Objects { spectra, materials, media, meshes: HashMap::new(), scene: Vec::new(), assembly: None, bodies: 0 }
     }
 
     /// Decodes one entry of `[[objects]]`.
@@ -124,7 +126,40 @@ impl<'s, 'a> Objects<'s, 'a> {
         let kind = shape.path.rsplit('.').next().unwrap_or_default();
         let attributes = shape::attributes(&local, self.needs(covering, &common));
         let name = format!("{} ({kind})", item.path);
-        self.push(&fields, name, (local, attributes), covering, &common);
+        self.place(&fields, name, (local, attributes), covering, &common);
+    }
+
+    /// Decodes one entry of an assembly's objects.
+    pub fn add_to(&mut self, assembly: AssemblyId, item: &Item<'a>) {
+        self.assembly = Some(assembly);
+        self.add(item);
+        self.assembly = None;
+        if let Some(interior) = item.member("interior") {
+            interior.error_help(
+                "is not supported within assemblies yet: nothing that is placed several times holds matter",
+                "remove it, or write the object as one of `[[objects]]`",
+            );
+        }
+    }
+
+    /// Adds an object that is already decoded.
+    pub fn push(&mut self, object: Object) {
+        self.scene.push(object);
+    }
+
+    /// Takes all but the first `count` objects away again.
+    pub fn forget_since(&mut self, count: usize) {
+        self.scene.truncate(count);
+    }
+
+    /// Objects so far.
+    pub fn count(&self) -> usize {
+        self.scene.len()
+    }
+
+    /// All but the first `count` objects.
+    pub fn since(&self, count: usize) -> &[Object] {
+        &self.scene[count..]
     }
 
     pub fn finish(self) -> Vec<Object> {
@@ -363,7 +398,7 @@ impl<'s, 'a> Objects<'s, 'a> {
                 ));
             }
         }
-        self.push(fields, name, (Shape::Mesh(mesh), attributes), covering, common);
+        self.place(fields, name, (Shape::Mesh(mesh), attributes), covering, common);
     }
 
     fn needs(&self, covering: Option<Covering>, common: &Common) -> Needs {
@@ -376,7 +411,7 @@ impl<'s, 'a> Objects<'s, 'a> {
     }
 
     /// Moves `local` into the world and adds it to the scene.
-    fn push(
+    fn place(
         &mut self,
         fields: &Fields<'a>,
         name: String,
@@ -434,7 +469,8 @@ impl<'s, 'a> Objects<'s, 'a> {
             sides,
             texture: texture.map(|texture| self.materials.textures().take(texture, self.spectra)),
         });
-        self.scene.push(Object { name, shape, attributes, material, emission, interior });
+        let assembly = self.assembly;
+        self.scene.push(Object { name, shape, attributes, material, emission, interior, assembly });
     }
 }
 

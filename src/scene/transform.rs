@@ -30,8 +30,7 @@ pub fn decode(item: &Item) -> Option<DAffine3> {
             DAffine3 { matrix3: rotate? * DMat3::from_diagonal(scale?), translation: translate? }
         }
     };
-    let determinant = affine.matrix3.determinant();
-    if determinant == 0.0 || !determinant.is_finite() {
+    if !is_invertible(&affine) {
         item.error_help(
             "flattens space: its determinant is 0 or cannot be represented",
             "use scales that are not 0, or a matrix that can be inverted",
@@ -39,6 +38,12 @@ pub fn decode(item: &Item) -> Option<DAffine3> {
         return None;
     }
     Some(affine)
+}
+
+/// Whether nothing is flattened, as far as can be represented.
+pub fn is_invertible(affine: &DAffine3) -> bool {
+    let determinant = affine.matrix3.determinant();
+    determinant != 0.0 && determinant.is_finite() && affine.translation.is_finite()
 }
 
 fn rotation(item: &Item) -> Option<DMat3> {
@@ -65,8 +70,13 @@ fn matrix(item: &Item) -> Option<DAffine3> {
         item.error_help(format!("the last row must be 0, 0, 0, 1, but is {:?}", &m[12..]), help);
         return None;
     }
+    Some(of_rows(&std::array::from_fn(|i| m[i])))
+}
+
+/// Of the first three rows of a matrix that acts on column vectors.
+pub fn of_rows(m: &[f64; 12]) -> DAffine3 {
     let column = |i: usize| DVec3::new(m[i], m[4 + i], m[8 + i]);
-    Some(DAffine3 { matrix3: DMat3::from_cols(column(0), column(1), column(2)), translation: column(3) })
+    DAffine3 { matrix3: DMat3::from_cols(column(0), column(1), column(2)), translation: column(3) }
 }
 
 /// The factor of a similarity (rotation, mirroring and one scale for all directions).
@@ -81,13 +91,7 @@ fn similarity(m: DMat3) -> Option<f64> {
 /// first edge stays the first.
 /// `Err` says what is wrong.
 pub fn apply(affine: &DAffine3, shape: Shape) -> Result<Shape, String> {
-    let factor = || {
-        similarity(affine.matrix3).ok_or_else(|| {
-            "must keep the shape of a sphere, disk or cylinder: rotations, mirrorings and one scale for all directions \
-             only"
-                .to_owned()
-        })
-    };
+    let factor = || similarity(affine.matrix3).ok_or_else(|| NOT_SIMILAR.to_owned());
     let moved = match shape {
         Shape::Mesh(mut mesh) => {
             mesh.positions.iter_mut().for_each(|p| *p = affine.transform_point3(*p));
@@ -118,7 +122,7 @@ pub fn apply(affine: &DAffine3, shape: Shape) -> Result<Shape, String> {
         Shape::Cylinder { from, to, radius } => far(from) || far(to) || *radius > FARTHEST,
     };
     if too_far {
-        return Err(format!("reaches beyond {FARTHEST:e}, farther than can be represented"));
+        return Err(beyond_farthest());
     }
     let vanished = match &moved {
         Shape::Mesh(_) => false,
@@ -129,6 +133,31 @@ pub fn apply(affine: &DAffine3, shape: Shape) -> Result<Shape, String> {
         return Err("shrinks the shape to nothing".to_owned());
     }
     Ok(moved)
+}
+
+const NOT_SIMILAR: &str =
+    "must keep the shape of a sphere, disk or cylinder: rotations, mirrorings and one scale for all directions only";
+
+fn beyond_farthest() -> String {
+    format!("reaches beyond {FARTHEST:e}, farther than can be represented")
+}
+
+/// What [`apply`] would say of shapes within `bounds`, some of them round where `is_round`.
+pub fn check(affine: &DAffine3, is_round: bool, bounds: [DVec3; 2]) -> Result<(), String> {
+    if is_round && similarity(affine.matrix3).is_none() {
+        return Err(NOT_SIMILAR.to_owned());
+    }
+    let far = |p: DVec3| !p.is_finite() || p.abs().max_element() > FARTHEST;
+    if box_around(affine, bounds).into_iter().any(far) { Err(beyond_farthest()) } else { Ok(()) }
+}
+
+/// A box around what `affine` makes of a box: exactly around its corners.
+pub fn box_around(affine: &DAffine3, [low, high]: [DVec3; 2]) -> [DVec3; 2] {
+    let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+    let m = affine.matrix3;
+    let reach = m.x_axis.abs() * half.x + m.y_axis.abs() * half.y + m.z_axis.abs() * half.z;
+    let middle = affine.transform_point3(middle);
+    [middle - reach, middle + reach]
 }
 
 /// Moves what a shape carries along with it.

@@ -6,13 +6,22 @@ use spectile::device::words::Primitive;
 use spectile::scene::Mesh;
 
 use super::{Random, black_mesh, f32s};
-use crate::tracer::{Ray, trace};
+use crate::tracer::{Hit, Ray, trace};
+
+fn vector(v: [f32; 3]) -> DVec3 {
+    DVec3::from(v.map(f64::from))
+}
+
+/// The corners of a triangle.
+pub fn corners(p: &Primitive) -> [DVec3; 3] {
+    [p.a, p.b, p.c].map(vector)
+}
 
 /// Distance along the ray to a triangle in f64, with barycentric weights allowed to miss by `slack`.
-fn distance_f64(p: &Primitive, ray: &Ray, slack: impl Fn(f64, f64) -> f64) -> Option<f64> {
-    let v = |a: [f32; 3]| DVec3::from(a.map(f64::from));
-    let (a, d, o) = (v(p.a), v(ray.direction), v(ray.origin));
-    let (e1, e2) = (v(p.b) - a, v(p.c) - a);
+pub fn distance_f64(corners: &[DVec3; 3], ray: &Ray, slack: impl Fn(f64, f64) -> f64) -> Option<f64> {
+    let [a, b, c] = *corners;
+    let (d, o) = (vector(ray.direction), vector(ray.origin));
+    let (e1, e2) = (b - a, c - a);
     let n = e1.cross(e2);
     let det = -d.dot(n);
     let s = o - a;
@@ -89,28 +98,43 @@ fn traversal_equals_brute_force() {
         })
         .collect();
     let hits = trace(&prepared, &rays);
-    // Rounding of sheared coordinates up to 4: three roundings of half an ulp of 4 move a vertex by 8e-7 at most, which is
-    // worth that times the longest edge over the determinant in barycentric weight, for each of two vertices of an edge.
-    let slack = |det: f64, edge: f64| 2.0 * 8e-7 * edge / det.abs();
+    // Rounding of sheared coordinates up to 4: three roundings of half an ulp of 4 move a vertex by 8e-7 at most.
+    let all: Vec<[DVec3; 3]> = prepared.accel.primitives.iter().map(corners).collect();
+    let (hit, missed) = assert_as_brute_force(&all, |hit| all[hit.primitive? as usize].into(), &rays, &hits, 8e-7);
+    assert!(hit > 3000 && missed > 1000, "{hit} hits, {missed} misses: a poor test");
+}
+
+/// Every hit of the unit `rays` lies between the nearest of slightly larger and of slightly smaller triangles than `all`, and where the
+/// triangle that was `met` says, whose vertices rounding moves by `rounding`. How many hit, how many missed.
+pub fn assert_as_brute_force(
+    all: &[[DVec3; 3]],
+    met: impl Fn(&Hit) -> Option<[DVec3; 3]>,
+    rays: &[Ray],
+    hits: &[Hit],
+    rounding: f64,
+) -> (usize, usize) {
+    // What a vertex is moved by is worth that times the longest edge over the determinant in barycentric weight, for each of two
+    // vertices of an edge.
+    let slack = |det: f64, edge: f64| 2.0 * rounding * edge / det.abs();
     let (mut hit, mut missed) = (0, 0);
-    for (ray, found) in rays.iter().zip(&hits) {
+    for (ray, found) in rays.iter().zip(hits) {
         assert!(!found.overflow);
         let nearest = |sign: f64| {
-            let each = prepared.accel.primitives.iter().filter_map(|p| distance_f64(p, ray, |d, e| sign * slack(d, e)));
+            let each = all.iter().filter_map(|p| distance_f64(p, ray, |d, e| sign * slack(d, e)));
             each.fold(f64::INFINITY, f64::min)
         };
         let (larger, smaller) = (nearest(1.0), nearest(-1.0));
-        match found.primitive {
-            Some(i) => {
-                let exact = distance_f64(&prepared.accel.primitives[i as usize], ray, slack);
+        match met(found) {
+            Some(corners) => {
+                let exact = distance_f64(&corners, ray, slack);
                 let exact = exact.unwrap_or_else(|| panic!("{ray:?} does not meet what {found:?} says"));
                 let distance = f64::from(found.distance);
                 // The same slack, of three weights, moves the distance by at most that share of the longest edge.
-                let p = &prepared.accel.primitives[i as usize];
-                let v = |a: [f32; 3]| DVec3::from(a.map(f64::from));
-                let (e1, e2) = (v(p.b) - v(p.a), v(p.c) - v(p.a));
-                let det = DVec3::from(ray.direction.map(f64::from)).dot(e1.cross(e2));
-                let tolerance = 2e-6 + 3.0 * slack(det, e1.length().max(e2.length())) * e1.length().max(e2.length());
+                let [a, b, c] = corners;
+                let (e1, e2) = (b - a, c - a);
+                let det = vector(ray.direction).dot(e1.cross(e2));
+                let edge = e1.length().max(e2.length());
+                let tolerance = 2.5 * rounding + 3.0 * slack(det, edge) * edge;
                 assert!((distance - exact).abs() <= tolerance, "{ray:?}: {found:?}, exactly {exact}, {tolerance:e}");
                 assert!(distance <= smaller + tolerance, "{ray:?}: {found:?} behind {smaller}");
                 assert!(distance >= larger - tolerance, "{ray:?}: {found:?} before {larger}");
@@ -122,5 +146,5 @@ fn traversal_equals_brute_force() {
             }
         }
     }
-    assert!(hit > 3000 && missed > 1000, "{hit} hits, {missed} misses: a poor test");
+    (hit, missed)
 }

@@ -4,6 +4,7 @@
 mod brute_force;
 mod closed_meshes;
 mod degenerate;
+mod instances;
 mod self_intersection;
 
 use std::f64::consts::TAU;

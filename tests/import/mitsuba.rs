@@ -167,7 +167,7 @@ fn lights_and_what_is_not_read() {
 }
 
 #[test]
-fn groups_become_copies() {
+fn groups_are_placed() {
     let found = imported(
         r#"
     <shape type="shapegroup" id="pair"><shape type="sphere"/>
@@ -177,6 +177,7 @@ fn groups_become_copies() {
     );
     let spheres: Vec<(DVec3, f64)> = found
         .scene
+        .copied()
         .objects
         .iter()
         .map(|object| match object.shape {
@@ -186,8 +187,9 @@ fn groups_become_copies() {
         .collect();
     assert_eq!(
         spheres,
-        [(DVec3::Y, 1.0), (DVec3::new(5.0, 1.0, 0.0), 1.0), (DVec3::ZERO, 2.0), (DVec3::X * 10.0, 2.0)]
+        [(DVec3::Y, 1.0), (DVec3::ZERO, 2.0), (DVec3::new(5.0, 1.0, 0.0), 1.0), (DVec3::X * 10.0, 2.0)]
     );
+    assert!(found.toml.contains("[[assemblies.pair.objects]]"), "{}", found.toml);
 }
 
 #[test]

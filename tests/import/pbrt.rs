@@ -69,6 +69,7 @@ Shape "cylinder" "float zmin" 0"#,
     );
     let spheres: Vec<(DVec3, f64)> = found
         .scene
+        .copied()
         .objects
         .iter()
         .filter_map(|object| match object.shape {
@@ -84,14 +85,24 @@ Shape "cylinder" "float zmin" 0"#,
         (DVec3::new(3.0, 2.0, 13.0), 1.0),
     ];
     assert_eq!(spheres, expected);
-    let Shape::Disk { center, normal, radius } = found.scene.objects[4].shape else { panic!("a disk") };
+    let Shape::Disk { center, normal, radius } = found.scene.objects[2].shape else { panic!("a disk") };
     near(center, DVec3::new(1.0, 2.0, 5.0));
     near(normal, DVec3::Z);
     assert!((radius - 2.0).abs() < 1e-9);
-    let Shape::Cylinder { from, to, .. } = found.scene.objects[5].shape else { panic!("a cylinder") };
+    let Shape::Cylinder { from, to, .. } = found.scene.objects[3].shape else { panic!("a cylinder") };
     near(from, DVec3::new(8.0, 8.0, 9.0));
     near(to, DVec3::new(8.0, 8.0, 10.0));
-    assert!(found.page.contains("an instance as a copy"), "{}", found.page);
+    let [ball] = &found.scene.assemblies[..] else { panic!("{:?}", found.scene.assemblies) };
+    assert_eq!((ball.name.as_str(), ball.instances.len()), ("ball", 2));
+    // What is stretched cannot be one of them; many places stand in a file.
+    let stretched = imported(
+        "ObjectBegin \"ball\" Shape \"sphere\" ObjectEnd\nObjectInstance \"ball\"\nScale 1 2 1\nObjectInstance \"ball\"",
+    );
+    assert!(stretched.page.contains("an instance that stretches a round shape"), "{}", stretched.page);
+    let many: String = (0..20).map(|i| format!("Translate {i} 0 0 ObjectInstance \"ball\"\n")).collect();
+    let many = imported(&format!("ObjectBegin \"ball\" Shape \"sphere\" ObjectEnd\n{many}"));
+    assert!(many.toml.contains("placements = \"placements/ball.csv\""), "{}", many.toml);
+    near(many.scene.assemblies[0].instances[19].translation, DVec3::new(190.0, 0.0, 0.0));
 }
 
 #[test]

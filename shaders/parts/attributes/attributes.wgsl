@@ -25,11 +25,22 @@ fn carried_at(hit: Hit, surface: Surface) -> Carried {
     if (word == 0u) {
         return carried;
     }
+#if INSTANCES
+    let p = primitive_met(hit);
+#else
     let p = load_primitive(hit.primitive);
+#endif
 #if SHAPES
     let kind = p.tag >> 24u;
     if (kind != 0u) {
-        let y = attribute_vector(at + 3u);
+        var axes = mat3x3<f32>(attribute_vector(at), attribute_vector(at + 3u), attribute_vector(at + 6u));
+#if INSTANCES
+        if (hit.instance != NONE) {
+            axes = placed(hit.instance).linear * axes;
+            axes = mat3x3<f32>(normalize(axes[0]), normalize(axes[1]), normalize(axes[2]));
+        }
+#endif
+        let y = axes[1];
         var place = surface.normal;
         if (kind == KIND_DISK) {
             place = (surface.position - p.a) / p.c.x;
@@ -38,7 +49,7 @@ fn carried_at(hit: Hit, surface: Surface) -> Carried {
         } else {
             carried.tangent = cross(y, surface.normal);
         }
-        let q = vec3<f32>(dot(attribute_vector(at), place), dot(y, place), dot(attribute_vector(at + 6u), place));
+        let q = vec3<f32>(dot(axes[0], place), dot(y, place), dot(axes[2], place));
         var v = 0.5 + turn_of(length(q.xz), q.y);
         if (kind == KIND_DISK) {
             v = 1.0 - length(q);
@@ -61,7 +72,13 @@ fn carried_at(hit: Hit, surface: Surface) -> Carried {
         at += 6u;
     }
     if ((word & HAS_NORMALS) != 0u) {
-        let normals = mat3x3<f32>(attribute_vector(at), attribute_vector(at + 3u), attribute_vector(at + 6u));
+        var normals = mat3x3<f32>(attribute_vector(at), attribute_vector(at + 3u), attribute_vector(at + 6u));
+#if INSTANCES
+        if (hit.instance != NONE) {
+            normals = matrix_of_normals(placed(hit.instance).linear) * normals;
+            normals = mat3x3<f32>(normalize(normals[0]), normalize(normals[1]), normalize(normals[2]));
+        }
+#endif
         let normal = normals * weights;
         if (dot(normal, surface.normal) > 0.0) {
             carried.normal = normalize(normal);

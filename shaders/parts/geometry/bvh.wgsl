@@ -34,20 +34,43 @@ fn planes(word: u32) -> vec4<f32> {
     return vec4<f32>(unpack4xU8(word));
 }
 
+// A ray as boxes are held against it.
+struct Slabs {
+    origin: vec3<f32>,
+    inverse: vec3<f32>,
+    negative: vec3<bool>,
+    octant4: u32,
+}
+
+fn slabs(origin: vec3<f32>, along: vec3<f32>) -> Slabs {
+    // A zero component becomes tiny, so that its reciprocal stays finite.
+    let tiny = abs(along) < vec3<f32>(1.0e-18);
+    let direction = select(along, select(vec3<f32>(1.0e-18), vec3<f32>(-1.0e-18), along < vec3<f32>(0.0)), tiny);
+    let negative = direction < vec3<f32>(0.0);
+    let octant = select(0u, 4u, negative.x) | select(0u, 2u, negative.y) | select(0u, 1u, negative.z);
+    return Slabs(origin, 1.0 / direction, negative, (7u - octant) * 0x01010101u);
+}
+
 // The nearest hit closer than `limit` (any hit, where `any_hit`). Sets `overflow` when it had to give up.
 fn traverse(ray: Ray, limit: f32, any_hit: bool, overflow: ptr<function, bool>) -> Hit {
-    var hit = Hit(limit, NONE, 0.0, 0.0);
+    var hit: Hit;
+    hit.distance = limit;
+    hit.primitive = NONE;
     if (!(limit > 0.0)) {
         return hit;
     }
     let sheared_ray = sheared(ray);
-    // A zero component becomes tiny, so that its reciprocal stays finite.
-    let tiny = abs(ray.direction) < vec3<f32>(1.0e-18);
-    let direction = select(ray.direction, select(vec3<f32>(1.0e-18), vec3<f32>(-1.0e-18), ray.direction < vec3<f32>(0.0)), tiny);
-    let inverse = 1.0 / direction;
-    let negative = direction < vec3<f32>(0.0);
-    let octant = select(0u, 4u, negative.x) | select(0u, 2u, negative.y) | select(0u, 1u, negative.z);
-    let octant4 = (7u - octant) * 0x01010101u;
+#if INSTANCES
+    // In the units of the instance that the ray is in, if it is in one; the rest of the world waits below `floor`.
+    var across = slabs(ray.origin, ray.direction);
+    var begin = 0.0;
+    var margin = vec3<f32>(0.0);
+    var instance = NONE;
+    var to: Placed;
+    var floor = 0u;
+#else
+    let across = slabs(ray.origin, ray.direction);
+#endif
 
     var stack: array<vec2<u32>, STACK_SIZE>;
     var stack_size = 0u;
@@ -64,7 +87,7 @@ fn traverse(ray: Ray, limit: f32, any_hit: bool, overflow: ptr<function, bool>) 
         steps += 1u;
         if (nodes_left.y > 0x00ffffffu) {
             let bit = firstLeadingBit(nodes_left.y);
-            let slot = (bit - 24u) ^ (octant4 & 0xffu);
+            let slot = (bit - 24u) ^ (across.octant4 & 0xffu);
             let rank = countOneBits(nodes_left.y & ~(0xffffffffu << slot) & 0xffu);
             let node = nodes_left.x + rank;
             nodes_left.y &= ~(1u << bit);
@@ -84,23 +107,29 @@ fn traverse(ray: Ray, limit: f32, any_hit: bool, overflow: ptr<function, bool>) 
             let n3 = load_node(node, 3u);
             let n4 = load_node(node, 4u);
             let exponents = (vec3<u32>(n0.w) >> vec3<u32>(0u, 8u, 16u)) & vec3<u32>(0xffu);
-            let scale = bitcast<vec3<f32>>(exponents << vec3<u32>(23u)) * inverse;
-            let base = (bitcast<vec3<f32>>(n0.xyz) - ray.origin) * inverse;
+            let scale = bitcast<vec3<f32>>(exponents << vec3<u32>(23u)) * across.inverse;
+            let base = (bitcast<vec3<f32>>(n0.xyz) - across.origin) * across.inverse;
+#if INSTANCES
+            let slack = (abs(base) + 255.0 * abs(scale)) * 4.8e-7 + margin * abs(across.inverse);
+            let base_lo = begin + (base - slack);
+            let base_hi = begin + (base + slack);
+#else
             let slack = (abs(base) + 255.0 * abs(scale)) * 4.8e-7;
             let base_lo = base - slack;
             let base_hi = base + slack;
+#endif
 
-            let x = select(n2, n2.zwxy, negative.x);
-            let y = select(n3, n3.zwxy, negative.y);
-            let z = select(n4, n4.zwxy, negative.z);
+            let x = select(n2, n2.zwxy, across.negative.x);
+            let y = select(n3, n3.zwxy, across.negative.y);
+            let z = select(n4, n4.zwxy, across.negative.z);
             var mask = hit_children(
                 array<vec4<f32>, 3>(planes(x.x), planes(y.x), planes(z.x)),
                 array<vec4<f32>, 3>(planes(x.z), planes(y.z), planes(z.z)),
-                scale, base_lo, base_hi, hit.distance, child_bits(n1.z, octant4));
+                scale, base_lo, base_hi, hit.distance, child_bits(n1.z, across.octant4));
             mask |= hit_children(
                 array<vec4<f32>, 3>(planes(x.y), planes(y.y), planes(z.y)),
                 array<vec4<f32>, 3>(planes(x.w), planes(y.w), planes(z.w)),
-                scale, base_lo, base_hi, hit.distance, child_bits(n1.w, octant4));
+                scale, base_lo, base_hi, hit.distance, child_bits(n1.w, across.octant4));
             nodes_left = vec2<u32>(n1.x, (mask & 0xff000000u) | (n0.w >> 24u));
             primitives_left = vec2<u32>(n1.y, mask & 0x00ffffffu);
         } else {
@@ -113,17 +142,61 @@ fn traverse(ray: Ray, limit: f32, any_hit: bool, overflow: ptr<function, bool>) 
             let bit = firstTrailingBit(primitives_left.y);
             primitives_left.y &= primitives_left.y - 1u;
             let primitive = primitives_left.x + bit;
+#if INSTANCES
+            var p = load_primitive(primitive);
+            if ((p.tag >> 24u) == KIND_INSTANCE) {
+                // What is left of the world waits, and what is left of this leaf.
+                if (stack_size + 2u > STACK_SIZE) {
+                    *overflow = true;
+                    break;
+                }
+                if (nodes_left.y > 0x00ffffffu) {
+                    stack[stack_size] = nodes_left;
+                    stack_size += 1u;
+                }
+                if (primitives_left.y != 0u) {
+                    stack[stack_size] = primitives_left;
+                    stack_size += 1u;
+                }
+                instance = primitive;
+                to = placed(primitive);
+                floor = stack_size;
+                let inside = entered(ray, to);
+                across = slabs(inside.ray.origin, inside.ray.direction);
+                begin = inside.begin;
+                margin = inside.margin;
+                nodes_left = vec2<u32>(to.root, 0x80000000u);
+                primitives_left.y = 0u;
+                break;
+            }
+            if (instance != NONE) {
+                p = moved(p, to);
+            }
+#else
             let p = load_primitive(primitive);
+#endif
 #if SHAPES
             if ((p.tag >> 24u) != 0u) {
                 let t = intersect_shape(ray, p, hit.distance);
                 if (t > 0.0) {
-                    hit = Hit(t, primitive, 0.0, 0.0);
+                    hit.distance = t;
+                    hit.primitive = primitive;
+#if INSTANCES
+                    hit.instance = instance;
+#endif
                 }
                 continue;
             }
 #endif
+#if INSTANCES
+            let before = hit.distance;
             hit = nearer(sheared_ray, hit, primitive, p.a, p.b, p.c);
+            if (hit.distance < before) {
+                hit.instance = instance;
+            }
+#else
+            hit = nearer(sheared_ray, hit, primitive, p.a, p.b, p.c);
+#endif
         }
 
         if (any_hit && hit.primitive != NONE) {
@@ -134,6 +207,14 @@ fn traverse(ray: Ray, limit: f32, any_hit: bool, overflow: ptr<function, bool>) 
             break;
         }
         if (nodes_left.y <= 0x00ffffffu) {
+#if INSTANCES
+            if (instance != NONE && stack_size == floor) {
+                instance = NONE;
+                across = slabs(ray.origin, ray.direction);
+                begin = 0.0;
+                margin = vec3<f32>(0.0);
+            }
+#endif
             if (stack_size == 0u) {
                 break;
             }

@@ -45,9 +45,17 @@ fn sphere_cap(center_distance2: f32, radius: f32) -> f32 {
 
 // The density over solid angle with which next-event estimation at `origin` finds this point.
 fn light_density(emitter_index: u32, origin: vec3<f32>, direction: vec3<f32>, distance: f32, normal: vec3<f32>) -> f32 {
+#if PLACED_LIGHTS
+    let emitter = emitter_met(emitter_index, light_in);
+#else
     let emitter = emitters[emitter_index];
+#endif
 #if SHAPES
+#if PLACED_LIGHTS
+    let shape = emitter_primitive(emitter);
+#else
     let shape = load_primitive(emitter.primitive);
+#endif
     if ((shape.tag >> 24u) == KIND_SPHERE) {
         let to_center = shape.a - origin;
         let cap = sphere_cap(dot(to_center, to_center), shape.b.x);
@@ -66,7 +74,11 @@ fn light_density(emitter_index: u32, origin: vec3<f32>, direction: vec3<f32>, di
 }
 
 fn sample_emitter(emitter: Emitter, origin: vec3<f32>, u: vec2<f32>) -> LightPoint {
+#if PLACED_LIGHTS
+    let shape = emitter_primitive(emitter);
+#else
     let shape = load_primitive(emitter.primitive);
+#endif
     var p: vec3<f32>;
     var n: vec3<f32>;
 #if SHAPES

@@ -84,7 +84,10 @@ struct Walked {
 
 // Follows `ray` up to the first surface with a material, nearer than `limit`; `around` and `way` note what it goes through.
 fn walk(ray: Ray, limit: f32, around: ptr<function, vec2<u32>>, way: ptr<function, Way>, overflow: ptr<function, bool>) -> Walked {
-    var walked = Walked(Hit(limit, NONE, 0.0, 0.0), ray, 0.0);
+    var walked: Walked;
+    walked.hit.distance = limit;
+    walked.hit.primitive = NONE;
+    walked.ray = ray;
     // Where the stretch begins: at the boundary itself, not where the rest of the ray starts.
     var begins = 0.0;
     for (var n = 0u; n < MOST_CROSSINGS; n += 1u) {

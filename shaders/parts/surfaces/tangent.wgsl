@@ -2,7 +2,11 @@
 // disk or cylinder; or as what the surface carries (`given`, not 0) says.
 
 fn surface_tangent(hit: Hit, surface: Surface, normal: vec3<f32>, given: vec3<f32>) -> vec3<f32> {
+#if INSTANCES
+    let p = primitive_met(hit);
+#else
     let p = load_primitive(hit.primitive);
+#endif
     var along = p.b - p.a;
 #if SHAPES
     let kind = p.tag >> 24u;

@@ -29,7 +29,11 @@ fn find_light(path: u32, seen_from: vec3<f32>, choice: f32, u: vec2<f32>) -> Aim
     aim.limit = 1.0;
 #lines AIM_AT_MAP
 #if CHOOSES
+#if PLACED_LIGHTS
+    let emitter = emitter_chosen(path, choose_emitter(choice));
+#else
     let emitter = emitters[choose_emitter(choice)];
+#endif
     aim.source = emitter.spectrum & SPECTRUM_MASK;
 #lines AIM_AT_EMITTER
 #endif

@@ -11,7 +11,10 @@ struct Followed {
 }
 
 fn follow(ray: Ray, limit: f32, overflow: ptr<function, bool>) -> Followed {
-    var way = Followed(Hit(limit, NONE, 0.0, 0.0), ray, 0.0);
+    var way: Followed;
+    way.hit.distance = limit;
+    way.hit.primitive = NONE;
+    way.ray = ray;
     for (var n = 0u; n < MOST_PASSED; n += 1u) {
         let left = select(limit - way.passed, INFINITE, limit == INFINITE);
         way.hit = traverse(way.ray, left, false, overflow);

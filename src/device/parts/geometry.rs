@@ -53,7 +53,7 @@ pub const BVH: Part = Part {
     used: |scene| !scene.features.few_triangles,
     effect: |scene| match scene.features.few_triangles {
         true => format!("every ray tests all {} triangles, constants of its kernel", scene.accel.primitives.len()),
-        false => format!("{} nodes, a stack of {} a ray", scene.accel.nodes.len(), scene.accel.depth),
+        false => format!("{} nodes, a stack of {} a ray", scene.accel.node_count, scene.accel.depth),
     },
     is_planned: true,
     modules: &[(Place::Traversal, module!("parts/geometry/bvh.wgsl"))],

@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_1_PI;
 
 use glam::DVec3;
 
-use crate::device::accel::Accel;
+use crate::device::accel::{Accel, Emitting};
 use crate::device::emission::{Emitted, area, radiance};
 use crate::device::part::{OnDevice, Part, Place, Records, SceneBuffer};
 use crate::device::text::module;
@@ -124,17 +124,20 @@ pub fn cone(direction: DVec3, cone: &Cone) -> Lamp {
 pub struct LightPicks {
     /// The environment's probability; multiples of 2⁻²⁴, like the random numbers that decide.
     pub environment: f64,
-    /// Upper ends of the emitters' intervals, which lie above the environment's. After the emitters, `lamps`.
+    /// Upper ends of the emitters' intervals, which lie above the environment's. After the emitters of the world the instances that
+    /// emit, then `lamps`.
     pub cdf: Vec<f32>,
     /// Probability of each emitter, then of each lamp, exactly what the device's choice amounts to.
     pub emitters: Vec<f64>,
     /// Indices into the scene's lights in the order of their intervals: suns last.
     pub lamps: Vec<usize>,
+    /// Within each assembly, upper ends and probabilities of what emits there, by areas in its own space.
+    pub within: Vec<(Vec<f32>, Vec<f64>)>,
 }
 
 /// q = ½ mean over channels of a light's share + ½ its normalised largest share over channels, where the share is its
 /// power over the total power in that channel. Channels without power are left out; if none has any, all lights are
-/// equally likely. `accel.emitters` and the scene's lights are the lights and, with its radiance integrated over the
+/// equally likely. The emitting primitives, the instances that emit and the scene's lights are the lights and, with its radiance integrated over the
 /// sphere, the environment.
 pub fn light_picks(scene: &Scene, accel: &Accel, environment: Option<&Curve>) -> LightPicks {
     let mut lamps: Vec<usize> = (0..scene.lights.len()).collect();
@@ -165,10 +168,14 @@ pub fn light_picks(scene: &Scene, accel: &Accel, environment: Option<&Curve>) ->
     let share_of = |spectrum: usize| {
         groups[..by_spectrum].iter().position(|g| g.0 == spectrum).map_or(0.0, |g| shares[g] / groups[g].1)
     };
-    let weights = accel.emitters.iter().map(|e| share_of(radiance(scene, e)) * area(scene, e));
+    let weight = |e: &Emitting| share_of(radiance(scene, e)) * area(scene, e);
+    let placed = accel.luminous.iter().map(|instance| accel.placed_emitters(instance).map(|e| weight(&e)).sum());
+    let weights = accel.emitters.iter().map(weight).chain(placed);
     let weights: Vec<f64> = weights.chain(shares[by_spectrum..groups.len()].iter().copied()).collect();
     let (cdf, emitters) = intervals(environment, &weights);
-    LightPicks { environment, cdf, emitters, lamps }
+    let within = accel.emitters_of.iter().map(|of| intervals(0.0, &of.iter().map(weight).collect::<Vec<f64>>()));
+    let within = within.collect();
+    LightPicks { environment, cdf, emitters, lamps, within }
 }
 
 /// Of an even share, what every source has at least where its spectrum may be exchanged after the render.

@@ -22,8 +22,8 @@ use super::text;
 use crate::error::Problem;
 use crate::{Error, Result};
 
-/// Shapes that instances may become.
-const MOST_INSTANCES: usize = 10_000;
+/// Shapes that instances may become where they are copies.
+const MOST_COPIES: usize = 10_000;
 
 /// What is known while a scene is translated.
 struct Importer<'n, 's> {
@@ -32,8 +32,10 @@ struct Importer<'n, 's> {
     objects: HashMap<&'n str, &'n Node>,
     /// Names of BSDFs that are materials already, by their element and whether v runs down.
     materials: HashMap<(*const Node, bool), bsdf::Made>,
-    /// Instances so far.
-    instances: usize,
+    /// Groups that are assemblies already; `None`: those that have others in them are not.
+    groups: HashMap<*const Node, Option<usize>>,
+    /// Copies so far.
+    copies: usize,
 }
 
 /// Translates the scene in the file `source`.
@@ -41,7 +43,7 @@ pub fn read(source: &Path, scene: &mut Scene) -> Result<()> {
     let root = xml::Files::default().read(source)?;
     let mut objects = HashMap::new();
     collect(&root, &mut objects)?;
-    let mut importer = Importer { scene, objects, materials: HashMap::new(), instances: 0 };
+    let mut importer = Importer { scene, objects, materials: HashMap::new(), groups: HashMap::new(), copies: 0 };
     importer.scene(&root)
 }
 

@@ -8,7 +8,7 @@ use super::bsdf::Made;
 use super::colour::Of;
 use super::values::{self, Plugin};
 use super::xml::{Node, inside};
-use super::{Importer, MOST_INSTANCES, at, serialized};
+use super::{Importer, MOST_COPIES, at, serialized};
 use crate::Result;
 use crate::format::mesh::{self as meshes, Format};
 use crate::import::geometry::{AROUND, Mesh, similarity};
@@ -134,21 +134,65 @@ impl<'n> Importer<'n, '_> {
         }
         for node in plugin.objects(&["ref", "shape"]) {
             let group = self.resolve(node)?;
-            for shape in group.children.iter().filter(|child| child.tag == "shape" || child.tag == "ref") {
-                self.instances += 1;
-                if self.instances > MOST_INSTANCES {
-                    let message = format!(
-                        "the scene has more than {MOST_INSTANCES} shapes in instances, each of which becomes a copy"
-                    );
-                    return Err(plugin.node.problem(message).into());
+            match self.group(group, depth)? {
+                Some(id) if self.scene.assemblies[id].takes(&to_world) => {
+                    self.scene.assemblies[id].place(to_world);
+                    self.scene.report.translated("shape `instance`", plugin.place());
                 }
-                if self.resolve(shape)?.tag == "shape" {
-                    self.shape(shape, &to_world, Some(depth + 1))?;
+                _ => {
+                    self.copy_group(plugin, group, &to_world, depth)?;
+                    self.scene
+                        .report
+                        .approximated(plugin.place(), "an instance as a copy: the same picture, in more memory");
                 }
             }
         }
-        self.scene.report.approximated(plugin.place(), "an instance as a copy: the same picture, in more memory");
         plugin.finish(&mut self.scene.report);
+        Ok(())
+    }
+
+    /// The assembly that a group is; `None` where it has others in it.
+    fn group(&mut self, group: &'n Node, depth: usize) -> Result<Option<usize>> {
+        if let Some(known) = self.groups.get(&std::ptr::from_ref(group)) {
+            return Ok(*known);
+        }
+        let mut parts = Vec::new();
+        let mut nested = false;
+        for child in group.children.iter().filter(|child| child.tag == "shape" || child.tag == "ref") {
+            let shape = self.resolve(child)?;
+            nested |= shape.tag == "shape" && Plugin::new(shape).kind() == "instance";
+            parts.push(child);
+        }
+        let id = if nested {
+            None
+        } else {
+            let before = std::mem::take(&mut self.scene.objects);
+            let added = parts.into_iter().try_for_each(|child| match self.resolve(child)?.tag == "shape" {
+                true => self.shape(child, &DAffine3::IDENTITY, Some(depth + 1)),
+                false => Ok(()),
+            });
+            let objects = std::mem::replace(&mut self.scene.objects, before);
+            added?;
+            Some(self.scene.assemble(&values::shown(group.attribute("id").unwrap_or("group")), objects))
+        };
+        self.groups.insert(std::ptr::from_ref(group), id);
+        Ok(id)
+    }
+
+    fn copy_group(&mut self, plugin: &Plugin<'n>, group: &'n Node, to_world: &DAffine3, depth: usize) -> Result<()> {
+        for shape in group.children.iter().filter(|child| child.tag == "shape" || child.tag == "ref") {
+            self.copies += 1;
+            if self.copies > MOST_COPIES {
+                let message = format!(
+                    "the scene has more than {MOST_COPIES} shapes in instances that stretch a round one or hold others, each of \
+                     which becomes a copy"
+                );
+                return Err(plugin.node.problem(message).into());
+            }
+            if self.resolve(shape)?.tag == "shape" {
+                self.shape(shape, to_world, Some(depth + 1))?;
+            }
+        }
         Ok(())
     }
 

@@ -23,6 +23,7 @@ use crate::{Error, Result};
 
 /// Shapes that instances may become, and files that a scene may be made of.
 const MOST_COPIES: usize = 100_000;
+const MOST_PLACES: usize = 10_000_000;
 const MOST_FILES: usize = 10_000;
 const DEEPEST: usize = 64;
 
@@ -66,6 +67,13 @@ struct Kept {
     line: usize,
 }
 
+/// An object of several shapes, which is an assembly from its first instance on.
+#[derive(Debug, Default)]
+struct Kind {
+    shapes: Vec<Kept>,
+    assembly: Option<usize>,
+}
+
 pub struct Importer<'s> {
     pub scene: &'s mut Scene,
     pub textures: HashMap<String, Colour>,
@@ -73,10 +81,11 @@ pub struct Importer<'s> {
     state: State,
     saved: Vec<(State, &'static str)>,
     systems: HashMap<String, DAffine3>,
-    objects: HashMap<String, Vec<Kept>>,
+    objects: HashMap<String, Kind>,
     /// The object that shapes go into.
     open: Option<(String, Vec<Kept>)>,
     copies: usize,
+    places: usize,
     files: usize,
     film: Parameters,
     camera: Option<(String, Parameters, DAffine3, At)>,
@@ -98,6 +107,7 @@ pub fn read(source: &Path, scene: &mut Scene) -> Result<()> {
         objects: HashMap::new(),
         open: None,
         copies: 0,
+        places: 0,
         files: 0,
         film: Parameters::default(),
         camera: None,
@@ -375,34 +385,59 @@ impl Importer<'_> {
             "ObjectEnd" => match (self.saved.pop(), self.open.take()) {
                 (Some((state, "ObjectEnd")), Some((name, kept))) => {
                     self.state = state;
-                    self.objects.insert(name, kept);
+                    self.objects.insert(name, Kind { shapes: kept, assembly: None });
                 }
                 _ => return Err(at.problem("`ObjectEnd` ends what has not begun").into()),
             },
             "ObjectInstance" => {
                 let name = tokens.text("a name", at)?;
-                let kept = self.objects.get(&name).cloned();
-                let kept = kept.ok_or_else(|| at.problem(format!("no object is named \"{}\"", shown(&name))))?;
-                self.copies += kept.len();
-                if self.copies > MOST_COPIES {
-                    let message = format!(
-                        "the scene has more than {MOST_COPIES} shapes in instances, each of which becomes a copy"
-                    );
-                    return Err(at.problem(message).into());
-                }
-                if !kept.is_empty() {
-                    self.scene
-                        .report
-                        .approximated(at.place(), "an instance as a copy: the same picture, in more memory");
-                }
-                for mut shape in kept {
-                    shape.to_world = self.state.ctm * shape.to_world;
-                    self.place(shape, at)?;
-                }
+                self.instance(&name, at)?;
             }
             _ => return Ok(false),
         }
         Ok(true)
+    }
+
+    /// Places an object; as copies of its shapes where these are stretched and round.
+    fn instance(&mut self, name: &str, at: &At) -> Result<()> {
+        let unknown = || at.problem(format!("no object is named \"{}\"", shown(name)));
+        let Kind { shapes, assembly } = self.objects.remove(name).ok_or_else(unknown)?;
+        self.places += 1;
+        if self.places > MOST_PLACES {
+            return Err(at.problem(format!("the scene has more than {MOST_PLACES} instances")).into());
+        }
+        let to_world = self.state.ctm;
+        if shapes.is_empty() {
+            self.objects.insert(name.to_owned(), Kind { shapes, assembly });
+            return Ok(());
+        }
+        let id = match assembly {
+            Some(id) => id,
+            None => {
+                let before = std::mem::take(&mut self.scene.objects);
+                let placed = shapes.iter().try_for_each(|shape| self.place(shape.clone(), at));
+                let parts = std::mem::replace(&mut self.scene.objects, before);
+                placed?;
+                self.scene.assemble(name, parts)
+            }
+        };
+        if self.scene.assemblies[id].takes(&to_world) {
+            self.scene.assemblies[id].place(to_world);
+            self.scene.report.translated("ObjectInstance", at.place());
+        } else {
+            self.copies += shapes.len();
+            if self.copies > MOST_COPIES {
+                let message = format!(
+                    "more than {MOST_COPIES} shapes are in instances that stretch a round one, each of which becomes a copy"
+                );
+                return Err(at.problem(message).into());
+            }
+            for shape in &shapes {
+                self.place(Kept { to_world: to_world * shape.to_world, ..shape.clone() }, at)?;
+            }
+        }
+        self.objects.insert(name.to_owned(), Kind { shapes, assembly: Some(id) });
+        Ok(())
     }
 
     fn shape(&mut self, kind: &str, parameters: &Parameters, at: &At) -> Result<()> {

@@ -11,7 +11,7 @@ use crate::scene;
 use crate::spectral::Response;
 
 fn object(shape: Shape, attributes: Attributes) -> Object {
-    Object { name: "o".into(), shape, attributes, material: Some(1), emission: None, interior: None }
+    Object { name: "o".into(), shape, attributes, material: Some(1), emission: None, interior: None, assembly: None }
 }
 
 fn material(bsdf: Bsdf) -> Material {
@@ -106,6 +106,7 @@ fn full() -> Scene {
             texture(TextureKind::Number, &[300.0, 310.0]),
         ],
         objects,
+        assemblies: Vec::new(),
         media,
         camera_medium: Some(0),
         lights: vec![

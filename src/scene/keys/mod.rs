@@ -277,6 +277,8 @@ pub static SECTIONS: &[&Section] = &[
     &CUBE,
     &CYLINDER,
     &TRANSFORM,
+    &ASSEMBLY,
+    &INSTANCE,
     &LIGHT,
     &POINT,
     &SPOT,

@@ -1,6 +1,6 @@
 //! Shapes, and where they are.
 
-use super::Kind::{Choice, Direction, File, List, Name, Number, Spectrum, Table, Text, Vector};
+use super::Kind::{Choice, Direction, File, List, ListOfTables, Name, Number, Spectrum, Table, Text, Vector};
 use super::{Key, Section};
 use crate::scene::Quantity;
 
@@ -109,6 +109,82 @@ material = "ball"
             invisible and no bounce. A mesh without `material` takes the names of materials in its file (OBJ: `usemtl`; \
             glTF: `name`, or `material N` for the one at index N that has none) as those of materials here. \
             Anything else needs one.",
+};
+
+pub static ASSEMBLY: Section = Section {
+    path: "assemblies.NAME",
+    heading: "`[assemblies.NAME]`",
+    summary: "objects that are placed many times",
+    about: "Its objects are stored once, in a space of their own, however often it is placed: a forest takes the memory of \
+            its trees, and 64 bytes a place.",
+    keys: &[Key::required("objects", ListOfTables, "As `[[objects]]`, in the assembly's own space.").tables(&[&OBJECT])],
+    later: &[],
+    at: "assemblies.tree",
+    examples: &[r#"
+[[assemblies.tree.objects]]
+cylinder = { from = [0, 0, 0], to = [0, 0, 1], radius = 0.1 }
+material = "floor"
+
+[[assemblies.tree.objects]]
+sphere = { center = [0, 0, 1.5], radius = 0.6 }
+material = "ball"
+
+[[instances]]
+assembly = "tree"
+"#],
+    notes: "Within assemblies objects have no `interior` yet. What emits does so in every place, with the same radiance \
+            whatever its size: each instance is one light of those that paths aim at.",
+};
+
+pub static INSTANCE: Section = Section {
+    path: "instances.N",
+    heading: "`[[instances]]`",
+    summary: "where an assembly is placed",
+    about: "Places an assembly in the world: once, by its `transform`, or as often as a file of `placements` has lines.",
+    keys: &[
+        Key::required("assembly", Name("assembly"), "One of `[assemblies]`."),
+        Key::optional("transform", Table, "none", "Scales, turns and moves it, after `placements` have.")
+            .tables(&[&TRANSFORM]),
+        Key::optional(
+            "placements",
+            File,
+            "one place",
+            "A CSV file with a line for each instance, whose first line names the columns: `x,y,z`, and then \
+             `yaw_degrees` and `scale` or not; or twelve, `m00` to `m23`: the first three rows of a matrix, as in \
+             `transform`. The assembly is scaled, turned by `yaw_degrees` about `up`, counter-clockwise as seen from \
+             its tip, and moved to x, y, z in metres.",
+        ),
+        Key::default("up", Direction, "[0, 1, 0]", "About which `yaw_degrees` turns. With `placements` only."),
+    ],
+    later: &[],
+    at: "instances.0",
+    examples: &[
+        r#"
+[[assemblies.post.objects]]
+cube = { min = [-0.1, -0.1, 0], max = [0.1, 0.1, 1] }
+material = "floor"
+
+[[instances]]
+assembly = "post"
+
+[[instances]]
+assembly = "post"
+transform = { rotate = [0, 0, 1, 45], translate = [1, 0, 0] }
+"#,
+        r#"
+[[assemblies.tree.objects]]
+sphere = { center = [0, 0, 1.5], radius = 0.6 }
+material = "ball"
+
+[[instances]]
+assembly = "tree"
+placements = "trees.csv"               # x,y,z,yaw_degrees,scale
+up = [0, 0, 1]
+"#,
+    ],
+    notes: "Spheres, disks and cylinders in an assembly ask for instances that keep their shape: one scale in all \
+            directions. Whether a thing is placed or copied changes what is rendered by rounding only: by some 1e-7 of the \
+            scene's size.",
 };
 
 const CENTER: Key = Key::required("center", Vector, "Its middle.").unit("m");

@@ -3,7 +3,7 @@
 use super::Kind::{
     Boolean, Choice, Direction, File, List, ListOfTables, Name, NamedTables, Number, Table, Vector, Whole,
 };
-use super::{ENVIRONMENT, Key, LIGHT, MATERIAL, MEDIUM, OBJECT, SPECTRUM, Section};
+use super::{ASSEMBLY, ENVIRONMENT, INSTANCE, Key, LIGHT, MATERIAL, MEDIUM, OBJECT, SPECTRUM, Section};
 
 pub static SCENE: Section = Section {
     path: "scene",
@@ -19,6 +19,9 @@ pub static SCENE: Section = Section {
         Key::optional("materials", NamedTables, "none", "What surfaces do with light.").tables(&[&MATERIAL]),
         Key::optional("objects", ListOfTables, "none", "Shapes: what reflects, shines or holds gas.")
             .tables(&[&OBJECT]),
+        Key::optional("assemblies", NamedTables, "none", "Objects that are placed many times, and stored once.")
+            .tables(&[&ASSEMBLY]),
+        Key::optional("instances", ListOfTables, "none", "Where assemblies are placed.").tables(&[&INSTANCE]),
         Key::optional("lights", ListOfTables, "none", "Light that comes from no surface.").tables(&[&LIGHT]),
         Key::optional("environment", Table, "black", "Light from all around.").tables(&[&ENVIRONMENT]),
         Key::optional("media", NamedTables, "none", "Matter that absorbs, scatters and emits.").tables(&[&MEDIUM]),
@@ -27,7 +30,7 @@ pub static SCENE: Section = Section {
     at: "",
     examples: &[EVERY_SECTION],
     notes: "Tables of the same kind stand in any order. What no object uses (a material, a spectrum, a medium) is \
-            checked, and then left out.",
+            checked, and then left out; an assembly that no instance places is left out without a look.",
 };
 
 const EVERY_SECTION: &str = r#"
@@ -58,6 +61,14 @@ wall = { diffuse = { reflectance = "white" } }
 [[objects]]
 sphere = { center = [0, 0, 0.5], radius = 0.5 }
 material = "wall"
+
+[[assemblies.post.objects]]
+cylinder = { from = [0, 0, 0], to = [0, 0, 1], radius = 0.05 }
+material = "wall"
+
+[[instances]]
+assembly = "post"
+transform = { translate = [1, 0, 0] }
 
 [[lights]]
 point = { position = [2, -2, 4], intensity = "lamp" }

@@ -84,6 +84,7 @@ impl Builder {
             material: None,
             emission: None,
             interior: None,
+            assembly: None,
             attributes: Default::default(),
         });
         self.filled()

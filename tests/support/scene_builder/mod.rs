@@ -4,11 +4,11 @@ pub mod closed_forms;
 pub mod heat;
 pub mod surfaces;
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DAffine3, DMat3, DVec2, DVec3};
 use spectile::scene::{
-    Attributes, Bsdf, Camera, Cone, Emission, Environment, EnvironmentMap, Evaluation, Evaluator, Film, Filter,
-    Integrator, Light, Material, Mesh, Object, Placement, Projection, Reflectance, Sampler, Scene, Shape, Sides,
-    Spectrum, Texels, Texture, TextureKind, Wavelengths, Weight,
+    Assembly, Attributes, Bsdf, Camera, Cone, Emission, Environment, EnvironmentMap, Evaluation, Evaluator, Film,
+    Filter, Integrator, Light, Material, Mesh, Object, Placement, Projection, Reflectance, Sampler, Scene, Shape,
+    Sides, Spectrum, Texels, Texture, TextureKind, Wavelengths, Weight,
 };
 use spectile::spectral::{Channels, Curve, Outside, upsample};
 
@@ -38,6 +38,7 @@ impl Builder {
             materials: Vec::new(),
             textures: Vec::new(),
             objects: Vec::new(),
+            assemblies: Vec::new(),
             media: Vec::new(),
             camera_medium: None,
             lights: Vec::new(),
@@ -244,6 +245,15 @@ impl Builder {
         self
     }
 
+    /// The last `count` objects, placed so often instead of once.
+    pub fn placed(mut self, count: usize, instances: Vec<DAffine3>) -> Self {
+        let id = self.0.assemblies.len();
+        let first = self.0.objects.len() - count;
+        self.0.objects[first..].iter_mut().for_each(|object| object.assembly = Some(id));
+        self.0.assemblies.push(Assembly { name: format!("assembly {id}"), instances });
+        self
+    }
+
     pub fn build(self) -> Scene {
         self.0
     }
@@ -260,7 +270,7 @@ impl Builder {
         self.0.materials.push(Material { name, bsdf, two_sided, temperature: None, opacity: None });
         let name = format!("objects.{}", self.0.objects.len());
         let (attributes, material) = (Attributes::default(), Some(material));
-        self.0.objects.push(Object { name, shape, attributes, material, emission, interior: None });
+        self.0.objects.push(Object { name, shape, attributes, material, emission, interior: None, assembly: None });
         self
     }
 }

@@ -20,6 +20,8 @@ pub struct Hit {
     pub distance: f32,
     /// Index into `Accel::primitives`; `None` for a miss.
     pub primitive: Option<u32>,
+    /// What it is a part of, among `Accel::primitives` as well; `None` in the world itself.
+    pub instance: Option<u32>,
     /// The traversal gave up.
     pub overflow: bool,
 }
@@ -34,9 +36,10 @@ pub fn trace(prepared: &Prepared, rays: &[Ray]) -> Vec<Hit> {
         .collect();
     let hits: Vec<[u32; 4]> = kernel.ask(&asked, rays.len()).expect("results");
     hits.iter()
-        .map(|[distance, primitive, overflow, _]| Hit {
+        .map(|[distance, primitive, overflow, instance]| Hit {
             distance: f32::from_bits(*distance),
             primitive: (*primitive != NONE).then_some(*primitive),
+            instance: (*primitive != NONE && *instance != NONE).then_some(*instance),
             overflow: *overflow != 0,
         })
         .collect()

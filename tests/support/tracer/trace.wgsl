@@ -1,4 +1,4 @@
-// Any ray through the renderer's own traversal: (origin, limit), (direction, -) in; (distance, primitive, overflow, -) out.
+// Any ray through the renderer's own traversal: (origin, limit), (direction, -) in; (distance, primitive, overflow, instance) out.
 
 @group(1) @binding(0) var<storage, read> asked: array<vec4<f32>>;
 @group(1) @binding(1) var<storage, read_write> given: array<vec4<u32>>;
@@ -12,5 +12,9 @@ fn trace(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) 
     let start = asked[2u * n];
     var overflow = false;
     let hit = traverse(Ray(start.xyz, asked[2u * n + 1u].xyz), start.w, false, &overflow);
-    given[n] = vec4<u32>(bitcast<u32>(hit.distance), hit.primitive, select(0u, 1u, overflow), 0u);
+    var instance = NONE;
+#if INSTANCES
+    instance = hit.instance;
+#endif
+    given[n] = vec4<u32>(bitcast<u32>(hit.distance), hit.primitive, select(0u, 1u, overflow), instance);
 }
