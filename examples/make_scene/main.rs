@@ -9,6 +9,7 @@ mod aircraft;
 mod cloud;
 mod conference;
 mod gases;
+mod grove;
 mod haze;
 mod image;
 mod isosurface;
@@ -25,7 +26,7 @@ use std::io;
 use std::path::Path;
 use std::process::ExitCode;
 
-pub const NAMES: [&str; 6] = ["conference", "aircraft", "statues", "haze", "cloud", "lounge"];
+pub const NAMES: [&str; 7] = ["conference", "aircraft", "statues", "haze", "cloud", "lounge", "grove"];
 
 /// Makes what the scene in the folder `scene` needs, in its folder `generated`; or, named `matter`, what several have in common and the
 /// repository holds.
@@ -42,6 +43,7 @@ pub fn make(name: &str, scene: &Path) -> io::Result<()> {
         "haze" => haze::make(folder),
         "cloud" => cloud::make(folder),
         "lounge" => lounge::make(folder),
+        "grove" => grove::make(folder),
         _ => Err(io::Error::other(format!("there is no scene `{name}` to make"))),
     }
 }

@@ -33,13 +33,21 @@ fn intersect_triangle(ray: ShearedRay, a_in: vec3<f32>, b_in: vec3<f32>, c_in: v
     let left = vec3<f32>(c2.x * b2.y, a2.x * c2.y, b2.x * a2.y);
     let right = vec3<f32>(c2.y * b2.x, a2.y * c2.x, b2.y * a2.x);
     if (!(all(left >= right) || all(left <= right))) {
+#if INSTANCES
+        return vec3<f32>(-INFINITE, 0.0, 0.0);
+#else
         return vec3<f32>(-1.0, 0.0, 0.0);
+#endif
     }
     // A tie is exactly 0, also where a compiler fuses the difference: residues of rounding would make up a hit edge-on.
     let edge = select(left - right, vec3<f32>(0.0), left == right);
     let determinant = edge.x + edge.y + edge.z;
     if (determinant == 0.0) {
+#if INSTANCES
+        return vec3<f32>(-INFINITE, 0.0, 0.0);
+#else
         return vec3<f32>(-1.0, 0.0, 0.0);
+#endif
     }
     let z = ray.shear.z * vec3<f32>(a.z, b.z, c.z);
     let inverse = 1.0 / determinant;
@@ -47,17 +55,25 @@ fn intersect_triangle(ray: ShearedRay, a_in: vec3<f32>, b_in: vec3<f32>, c_in: v
 }
 
 // `hit`, or what the ray meets before it.
-fn nearer(ray: ShearedRay, hit: Hit, primitive: u32, a: vec3<f32>, b: vec3<f32>, c: vec3<f32>) -> Hit {
-    let found = intersect_triangle(ray, a, b, c);
-    if (found.x > 0.0 && found.x < hit.distance) {
 #if INSTANCES
-        return Hit(found.x, primitive, found.y, found.z, NONE);
-#else
-        return Hit(found.x, primitive, found.y, found.z);
-#endif
+// The ray starts `begin` along that of the world.
+fn nearer_within(ray: ShearedRay, begin: f32, hit: Hit, primitive: u32, instance: u32, a: vec3<f32>, b: vec3<f32>, c: vec3<f32>) -> Hit {
+    let found = intersect_triangle(ray, a, b, c);
+    let distance = begin + found.x;
+    if (distance > 0.0 && distance < hit.distance) {
+        return Hit(distance, primitive, found.y, found.z, instance);
     }
     return hit;
 }
+#else
+fn nearer(ray: ShearedRay, hit: Hit, primitive: u32, a: vec3<f32>, b: vec3<f32>, c: vec3<f32>) -> Hit {
+    let found = intersect_triangle(ray, a, b, c);
+    if (found.x > 0.0 && found.x < hit.distance) {
+        return Hit(found.x, primitive, found.y, found.z);
+    }
+    return hit;
+}
+#endif
 
 // Counter-clockwise vertices face the front. Edges are scaled first: tiny triangles would leave only subnormals. The
 // edges of a sliver may round to parallel ones: any direction is as good then, but not NaN.

@@ -3,7 +3,7 @@
 //! Device units: the scene recentred and scaled by a power of two to about [-1, 1], in f64, before anything becomes f32,
 //! so that a scene far from the origin, or measured in micrometres, loses nothing.
 
-use glam::{DAffine3, DMat3, DVec3, Vec3A};
+use glam::{DAffine3, DMat3, DVec3, Mat3, Vec3A};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
@@ -20,7 +20,7 @@ use crate::scene::{Attributes, Object, Scene, Shape};
 const KIND_SPHERE: u32 = 1;
 const KIND_DISK: u32 = 2;
 const KIND_CYLINDER: u32 = 3;
-/// An instance: the columns of its matrix in the places of corners.
+/// An instance: the rows of the inverse of its matrix in the places of corners.
 const KIND_INSTANCE: u32 = 4;
 
 /// The largest number of materials: ids have 24 bits beside the primitive's kind, and one stands for none.
@@ -74,8 +74,8 @@ pub struct Luminous {
 /// Everything a ray can meet, ready for the device.
 pub struct Accel {
     pub space: DeviceSpace,
-    /// CWBVH nodes, 80 bytes each: the world's, whose root is the first, then those of each assembly; at least one. Behind them, five
-    /// in the place of one, where the space of each instance begins in the world and the root of its assembly.
+    /// CWBVH nodes, 80 bytes each: the world's, whose root is the first, then those of each assembly; at least one. Behind them, in
+    /// vectors of four words, five in the place of a node, what instances have beside their primitives ([`PLACEMENT_VECTORS`]).
     pub nodes: Vec<[u32; 20]>,
     /// How many of them are nodes.
     pub node_count: usize,
@@ -168,11 +168,15 @@ impl Packed {
     }
 }
 
-/// An instance among the primitives of the world, and where its space begins there.
+/// Of each instance: where its space begins in the world and the root of its assembly; columns of its matrix.
+const PLACEMENT_VECTORS: u32 = 4;
+
+/// An instance among the primitives of the world, and what it has beside that.
 struct Stub {
     primitive: Primitive,
     bounds: Aabb,
     at: [f32; 3],
+    linear: Mat3,
     assembly: usize,
 }
 
@@ -211,13 +215,12 @@ impl Accel {
         let depth = world.depth + inner.map_or(0, |depth| depth + 1);
         let Packed { mut nodes, mut primitives } = packed;
         let node_count = nodes.len();
-        let placements: Vec<[u32; 4]> = stubs
-            .iter()
-            .map(|stub| {
-                let [x, y, z] = stub.at.map(f32::to_bits);
-                [x, y, z, roots[stub.assembly] as u32]
-            })
-            .collect();
+        let of_stub = |stub: &Stub| {
+            let vector = |[x, y, z]: [f32; 3], word: usize| [x.to_bits(), y.to_bits(), z.to_bits(), word as u32];
+            let [a, b, c] = stub.linear.to_cols_array_2d();
+            [vector(stub.at, roots[stub.assembly]), vector(a, 0), vector(b, 0), vector(c, 0)]
+        };
+        let placements: Vec<[u32; 4]> = stubs.iter().flat_map(of_stub).collect();
         nodes.extend(placements.chunks(5).map(|five| {
             let mut node = [0; 20];
             node[..4 * five.len()].copy_from_slice(five.as_flattened());
@@ -238,7 +241,7 @@ impl Accel {
         let mut luminous = Vec::new();
         for (index, primitive) in primitives.iter_mut().enumerate().filter(|(_, p)| p.tag >> 24 == KIND_INSTANCE) {
             let assembly = stubs[primitive.attributes as usize].assembly;
-            primitive.attributes += 5 * node_count as u32;
+            primitive.attributes = 5 * node_count as u32 + PLACEMENT_VECTORS * primitive.attributes;
             if !emitters_of[assembly].is_empty() {
                 primitive.emitter = (emitters.len() + luminous.len()) as u32;
                 luminous.push(Luminous { primitive: index as u32, assembly });
@@ -264,10 +267,20 @@ impl Accel {
         }
     }
 
+    /// From the units of its assembly to the device's of the world, of the instance that stands among the primitives.
+    pub fn placement(&self, instance: u32) -> DAffine3 {
+        let place = self.primitives[instance as usize].attributes as usize;
+        let vectors = self.nodes.as_flattened()[4 * place..].as_chunks::<4>().0;
+        let [at, a, b, c] = std::array::from_fn(|i| {
+            let [x, y, z, _] = vectors[i].map(|word| f64::from(f32::from_bits(word)));
+            DVec3::new(x, y, z)
+        });
+        DAffine3 { matrix3: DMat3::from_cols(a, b, c), translation: at }
+    }
+
     /// What emits in an instance, with areas in the device units of the world.
     pub fn placed_emitters(&self, instance: &Luminous) -> impl Iterator<Item = Emitting> {
-        let stub = self.primitives[instance.primitive as usize];
-        let linear = DMat3::from_cols(vector(stub.a), vector(stub.b), vector(stub.c));
+        let linear = self.placement(instance.primitive).matrix3;
         let scale2 = linear.x_axis.length_squared();
         let keeps_shape = {
             let gram = linear.transpose() * linear * scale2.recip();
@@ -297,22 +310,17 @@ fn stub(to_device: DAffine3, bounds: Aabb, assembly: usize, object: usize) -> St
     let at = to_device.translation.as_vec3();
     let (low, high) = (DVec3::from(bounds.min.as_dvec3()), DVec3::from(bounds.max.as_dvec3()));
     let [low, high] = crate::scene::box_around(&to_device, [low, high]).map(|p| p.as_vec3a());
-    // Corners are moved in f32.
+    // Rays are moved into it in f32.
     let reach =
         low.abs().max(high.abs()).max_element() + (m.x_axis.abs() + m.y_axis.abs() + m.z_axis.abs()).max_element();
     let margin = Vec3A::splat(PLACING_ERROR * reach);
-    let primitive = Primitive {
-        a: m.x_axis.to_array(),
-        b: m.y_axis.to_array(),
-        c: m.z_axis.to_array(),
-        tag: KIND_INSTANCE << 24 | NO_MATERIAL,
-        emitter: object as u32,
-        ..Primitive::default()
-    };
-    Stub { primitive, bounds: Aabb::new(low - margin, high + margin), at: at.to_array(), assembly }
+    let [a, b, c] = to_device.matrix3.inverse().transpose().to_cols_array_2d().map(|row| row.map(|x| x as f32));
+    let primitive =
+        Primitive { a, b, c, tag: KIND_INSTANCE << 24 | NO_MATERIAL, emitter: object as u32, ..Primitive::default() };
+    Stub { primitive, bounds: Aabb::new(low - margin, high + margin), at: at.to_array(), linear: m, assembly }
 }
 
-/// Of what a corner goes through when it is moved in f32, relative to the largest number on the way: eight roundings.
+/// Of what a ray goes through when it is moved in f32, relative to the largest number on the way: eight roundings.
 const PLACING_ERROR: f32 = 4.8e-7;
 
 /// The corners of a box around `shapes`; `None` without any.

@@ -65,7 +65,7 @@ constants! {
         KIND_DISK = 2;
         KIND_CYLINDER = 3;
     }
-    /// One more kind: its corners are the columns of a matrix.
+    /// One more kind: its corners are the rows of a matrix.
     INSTANCES {
         KIND_INSTANCE = 4;
     }

@@ -25,6 +25,7 @@ pub fn make(folder: &Path) {
         b"DATA:\n  - type: tabulated n\n    data: |\n      0.35 1.539\n      0.6 1.516\n      0.85 1.510\n",
     );
     write("sensor.csv", b"nm,blue,red\n430,0,\n460,1,\n500,0,\n580,,0\n620,,1\n680,,0\n");
+    write("trees.csv", b"x,y,z,yaw_degrees,scale\n2,1,0,30,1\n-2,1,0,200,0.8\n");
     write("mie.csv", b"degrees,300,900\n0,9,5\n10,2,2\n180,0.9,0.9\n");
     write("co2.csv", b"nm,300,600,1000\n300,0,0.1,0.2\n900,0.3,0.4,0.5\n");
     write("h2o.csv", b"nm,300,600,1000\n300,1,2,3\n900,0,0,0.5\n");

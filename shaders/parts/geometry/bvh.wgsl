@@ -59,16 +59,16 @@ fn traverse(ray: Ray, limit: f32, any_hit: bool, overflow: ptr<function, bool>) 
     if (!(limit > 0.0)) {
         return hit;
     }
-    let sheared_ray = sheared(ray);
 #if INSTANCES
     // In the units of the instance that the ray is in, if it is in one; the rest of the world waits below `floor`.
+    let of_world = sheared(ray);
+    var sheared_ray = of_world;
     var across = slabs(ray.origin, ray.direction);
     var begin = 0.0;
-    var margin = vec3<f32>(0.0);
     var instance = NONE;
-    var to: Placed;
     var floor = 0u;
 #else
+    let sheared_ray = sheared(ray);
     let across = slabs(ray.origin, ray.direction);
 #endif
 
@@ -109,12 +109,13 @@ fn traverse(ray: Ray, limit: f32, any_hit: bool, overflow: ptr<function, bool>) 
             let exponents = (vec3<u32>(n0.w) >> vec3<u32>(0u, 8u, 16u)) & vec3<u32>(0xffu);
             let scale = bitcast<vec3<f32>>(exponents << vec3<u32>(23u)) * across.inverse;
             let base = (bitcast<vec3<f32>>(n0.xyz) - across.origin) * across.inverse;
-#if INSTANCES
-            let slack = (abs(base) + 255.0 * abs(scale)) * 4.8e-7 + margin * abs(across.inverse);
-            let base_lo = begin + (base - slack);
-            let base_hi = begin + (base + slack);
-#else
             let slack = (abs(base) + 255.0 * abs(scale)) * 4.8e-7;
+#if INSTANCES
+            // What is added is rounded too.
+            let rounding = begin * 2.4e-7;
+            let base_lo = begin + (base - slack) - rounding;
+            let base_hi = begin + (base + slack) + rounding;
+#else
             let base_lo = base - slack;
             let base_hi = base + slack;
 #endif
@@ -143,7 +144,7 @@ fn traverse(ray: Ray, limit: f32, any_hit: bool, overflow: ptr<function, bool>) 
             primitives_left.y &= primitives_left.y - 1u;
             let primitive = primitives_left.x + bit;
 #if INSTANCES
-            var p = load_primitive(primitive);
+            let p = load_primitive(primitive);
             if ((p.tag >> 24u) == KIND_INSTANCE) {
                 // What is left of the world waits, and what is left of this leaf.
                 if (stack_size + 2u > STACK_SIZE) {
@@ -159,25 +160,29 @@ fn traverse(ray: Ray, limit: f32, any_hit: bool, overflow: ptr<function, bool>) 
                     stack_size += 1u;
                 }
                 instance = primitive;
-                to = placed(primitive);
                 floor = stack_size;
-                let inside = entered(ray, to);
+                let inside = entered(ray, p, primitive);
                 across = slabs(inside.ray.origin, inside.ray.direction);
+                sheared_ray = sheared(inside.ray);
                 begin = inside.begin;
-                margin = inside.margin;
-                nodes_left = vec2<u32>(to.root, 0x80000000u);
+                nodes_left = vec2<u32>(inside.root, 0x80000000u);
                 primitives_left.y = 0u;
                 break;
-            }
-            if (instance != NONE) {
-                p = moved(p, to);
             }
 #else
             let p = load_primitive(primitive);
 #endif
 #if SHAPES
             if ((p.tag >> 24u) != 0u) {
+#if INSTANCES
+                var shape = p;
+                if (instance != NONE) {
+                    shape = moved(p, placed(instance));
+                }
+                let t = intersect_shape(ray, shape, hit.distance);
+#else
                 let t = intersect_shape(ray, p, hit.distance);
+#endif
                 if (t > 0.0) {
                     hit.distance = t;
                     hit.primitive = primitive;
@@ -189,11 +194,7 @@ fn traverse(ray: Ray, limit: f32, any_hit: bool, overflow: ptr<function, bool>) 
             }
 #endif
 #if INSTANCES
-            let before = hit.distance;
-            hit = nearer(sheared_ray, hit, primitive, p.a, p.b, p.c);
-            if (hit.distance < before) {
-                hit.instance = instance;
-            }
+            hit = nearer_within(sheared_ray, begin, hit, primitive, instance, p.a, p.b, p.c);
 #else
             hit = nearer(sheared_ray, hit, primitive, p.a, p.b, p.c);
 #endif
@@ -211,8 +212,8 @@ fn traverse(ray: Ray, limit: f32, any_hit: bool, overflow: ptr<function, bool>) 
             if (instance != NONE && stack_size == floor) {
                 instance = NONE;
                 across = slabs(ray.origin, ray.direction);
+                sheared_ray = of_world;
                 begin = 0.0;
-                margin = vec3<f32>(0.0);
             }
 #endif
             if (stack_size == 0u) {

@@ -1,22 +1,29 @@
-// What is stored once and placed many times. An instance is a primitive: the columns of its matrix are its corners, and its last word
-// tells where the rest stands behind the nodes: where the space of its assembly begins, and the root of the assembly's tree.
+// What is stored once and placed many times. An instance is a primitive: the rows of the inverse of its matrix are its corners,
+// and its last word tells where the rest stands behind the nodes, four vectors: where the space of its assembly begins and the root of
+// the assembly's tree, then the columns of its matrix.
 //
-// Boxes are met in the assembly's units; its triangles and shapes are moved into the world before a ray is held against them, so that
-// distances are those of the world and no edge between two triangles opens.
+// Within an instance one ray in the assembly's units is held against boxes and triangles alike, so that no edge between two triangles
+// opens. Distances are those of the world.
 
 #constants INSTANCES
 
 struct Placed {
     linear: mat3x3<f32>,
     at: vec3<f32>,
-    root: u32,
 }
 
 fn placed(instance: u32) -> Placed {
-    let p = load_primitive(instance);
     let place = load_primitive_part(instance, 2u).w;
-    let at = load_node(place / 5u, place % 5u);
-    return Placed(mat3x3<f32>(p.a, p.b, p.c), bitcast<vec3<f32>>(at.xyz), at.w);
+    let linear = mat3x3<f32>(
+        bitcast<vec3<f32>>(placement_vector(place + 1u).xyz),
+        bitcast<vec3<f32>>(placement_vector(place + 2u).xyz),
+        bitcast<vec3<f32>>(placement_vector(place + 3u).xyz),
+    );
+    return Placed(linear, bitcast<vec3<f32>>(placement_vector(place).xyz));
+}
+
+fn placement_vector(at: u32) -> vec4<u32> {
+    return load_node(at / 5u, at % 5u);
 }
 
 // A primitive of an assembly, in the world. Shapes keep their form.
@@ -70,45 +77,22 @@ fn largest(m: mat3x3<f32>) -> f32 {
     return max(max(most.x, most.y), max(most.z, 1.0e-37));
 }
 
-// Each product of a cross product by itself, without its sign: what rounding is measured by.
-fn cross_of_absolutes(a: vec3<f32>, b: vec3<f32>) -> vec3<f32> {
-    return abs(a.yzx * b.zxy) + abs(a.zxy * b.yzx);
-}
-
-// A ray in the units of an assembly, from where it passes nearest to the middle of it: `begin` along the ray of the world. What of it
-// is rounded stays within `margin` of the true ray as far as the assembly reaches.
+// A ray in the units of an assembly, from where it passes nearest to the middle of it: `begin` along the ray of the world. From farther
+// away its digits would not do for what is small.
 struct Entered {
     ray: Ray,
     begin: f32,
-    margin: vec3<f32>,
+    root: u32,
 }
 
-fn entered(ray: Ray, to: Placed) -> Entered {
+fn entered(ray: Ray, stub: Primitive, instance: u32) -> Entered {
+    let middle = placement_vector(load_primitive_part(instance, 2u).w);
     let fastest = max(max(abs(ray.direction.x), abs(ray.direction.y)), max(abs(ray.direction.z), 1.0e-37));
     let along = ray.direction / fastest;
-    let begin = max(dot(to.at - ray.origin, along) / dot(along, along), 0.0) / fastest;
-    let near = ray.origin + begin * ray.direction;
-    let unit = 1.0 / largest(to.linear);
-    let a = unit * to.linear[0];
-    let b = unit * to.linear[1];
-    let c = unit * to.linear[2];
-    let bc = cross(b, c);
-    let ca = cross(c, a);
-    let ab = cross(a, b);
-    let scale = unit / dot(a, bc);
-    let from_middle = near - to.at;
-    let origin = scale * vec3<f32>(dot(bc, from_middle), dot(ca, from_middle), dot(ab, from_middle));
-    let direction = scale * vec3<f32>(dot(bc, ray.direction), dot(ca, ray.direction), dot(ab, ray.direction));
-
-    // In the world: a moved corner, and the place on the ray, are rounded eight times by their size; then the inverse by its own.
-    let around_bc = cross_of_absolutes(b, c);
-    let condition = 1.0 + dot(abs(a), around_bc) / max(abs(dot(a, bc)), 1.0e-37);
-    let reach = (abs(to.linear[0]) + abs(to.linear[1]) + abs(to.linear[2]));
-    let size = max(max(reach.x, reach.y), reach.z);
-    let o = abs(near) + abs(ray.origin);
-    let far = max(max(o.x, o.y), o.z) + max(max(abs(to.at.x), abs(to.at.y)), abs(to.at.z)) + size;
-    let error = 4.8e-7 * far + 1.0e-6 * condition * size;
-    let ones = vec3<f32>(1.0);
-    let rows = vec3<f32>(dot(around_bc, ones), dot(cross_of_absolutes(c, a), ones), dot(cross_of_absolutes(a, b), ones));
-    return Entered(Ray(origin, direction), begin, error * abs(scale) * rows);
+    let towards = bitcast<vec3<f32>>(middle.xyz) - ray.origin;
+    let begin = max(dot(towards, along) / dot(along, along), 0.0) / fastest;
+    let near = begin * ray.direction - towards;
+    let origin = vec3<f32>(dot(stub.a, near), dot(stub.b, near), dot(stub.c, near));
+    let direction = vec3<f32>(dot(stub.a, ray.direction), dot(stub.b, ray.direction), dot(stub.c, ray.direction));
+    return Entered(Ray(origin, direction), begin, middle.w);
 }

@@ -116,7 +116,7 @@ pub static ASSEMBLY: Section = Section {
     heading: "`[assemblies.NAME]`",
     summary: "objects that are placed many times",
     about: "Its objects are stored once, in a space of their own, however often it is placed: a forest takes the memory of \
-            its trees, and 64 bytes a place.",
+            its trees, and some 120 bytes a place.",
     keys: &[Key::required("objects", ListOfTables, "As `[[objects]]`, in the assembly's own space.").tables(&[&OBJECT])],
     later: &[],
     at: "assemblies.tree",
@@ -154,7 +154,7 @@ pub static INSTANCE: Section = Section {
              `transform`. The assembly is scaled, turned by `yaw_degrees` about `up`, counter-clockwise as seen from \
              its tip, and moved to x, y, z in metres.",
         ),
-        Key::default("up", Direction, "[0, 1, 0]", "About which `yaw_degrees` turns. With `placements` only."),
+        Key::optional("up", Direction, "[0, 1, 0]", "About which `yaw_degrees` turns. With `placements` only."),
     ],
     later: &[],
     at: "instances.0",
@@ -166,10 +166,10 @@ material = "floor"
 
 [[instances]]
 assembly = "post"
+transform = { rotate = [0, 0, 1, 45], translate = [1, 0, 0] }
 
 [[instances]]
 assembly = "post"
-transform = { rotate = [0, 0, 1, 45], translate = [1, 0, 0] }
 "#,
         r#"
 [[assemblies.tree.objects]]
@@ -184,7 +184,7 @@ up = [0, 0, 1]
     ],
     notes: "Spheres, disks and cylinders in an assembly ask for instances that keep their shape: one scale in all \
             directions. Whether a thing is placed or copied changes what is rendered by rounding only: by some 1e-7 of the \
-            scene's size.",
+            scene's size, and of an instance's times how much it is stretched.",
 };
 
 const CENTER: Key = Key::required("center", Vector, "Its middle.").unit("m");
