@@ -165,6 +165,7 @@ fn render(cube: &Path, job: &Job, number: u32, interrupt: &std::sync::Arc<Interr
         seed: job.seed,
         tile: job.tile,
         uncertainty: job.uncertainty,
+        layers: job.layers.clone(),
         stop: StopRule { samples: Some(job.samples), ..StopRule::default() },
         preview: None,
         profile: false,

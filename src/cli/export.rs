@@ -7,7 +7,8 @@ use serde_json::{Value, json};
 
 use super::Output;
 use super::bands::Bands;
-use crate::cube::{Cube, Quantity, Rect, View, White};
+use crate::cube::{Cube, Layer, Quantity, Rect, View, White};
+use crate::export::layers::{self, LayerView};
 use crate::export::{self, Shown};
 use crate::format::envi::Interleave;
 use crate::format::png::PICTURE;
@@ -81,6 +82,14 @@ pub struct Args {
     /// reflectance factors. NaN where the white is black.
     #[arg(long, value_name = "WHITE", conflicts_with_all = ["integrated", "xyz", "temperature", "standard_error"])]
     pub reflectance: Option<String>,
+
+    /// Layers of the cube instead of radiances: depth, normal, object, material, coordinates, sun, separated by commas
+    ///
+    /// Of a cube that was rendered with --layers, into ENVI, OpenEXR or CSV: a band for each number, named depth, normal.x and so on.
+    /// Where nothing is seen it is NaN (-9999 in ENVI, empty in CSV). A cube is a Zarr store already, and holds them as arrays.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = super::render::parse_layer)]
+    #[arg(conflicts_with_all = ["bands", "temperature", "reflectance", "xyz", "standard_error", "integrated", "blocks"])]
+    pub layers: Vec<Layer>,
 
     /// X, Y and Z instead of the bands, for the standard observer of this year
     ///
@@ -189,6 +198,9 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         PICTURE.check_target(&args.output)?;
         return write_png(args, &cube, output);
     }
+    if !args.layers.is_empty() {
+        return write_layers(args, &cube, format, output);
+    }
     let mut view = view(args, &cube, output)?;
     let white_cube;
     if let Some(written) = &args.reflectance {
@@ -271,6 +283,7 @@ fn check_options(args: &Args, format: Format) -> Result<()> {
     let given = [
         ("--interleave", args.interleave.is_some(), vec![Format::Envi]),
         ("--reflectance", args.reflectance.is_some(), vec![Format::Envi, Format::Zarr, Format::Csv]),
+        ("--layers", !args.layers.is_empty(), vec![Format::Envi, Format::Exr, Format::Csv]),
         ("--exr-split", args.exr_split.is_some(), vec![Format::Exr]),
         ("--exr-strict-units", args.exr_strict_units, vec![Format::Exr]),
         ("--zarr-no-shards", args.zarr_no_shards, vec![Format::Zarr]),
@@ -397,6 +410,37 @@ fn report(
         output.text(&format!("{missing} of {tiles} tiles have no samples yet\n"))?;
     }
     Ok(())
+}
+
+/// Writes layers instead of radiances.
+fn write_layers(args: &Args, cube: &Cube, format: Format, output: &Said) -> Result<()> {
+    if args.interleave.is_some_and(|interleave| interleave != Interleave::Bil) {
+        return Err(Error::Usage("--layers are written by lines: leave --interleave out, or say bil".into()));
+    }
+    let view = LayerView::new(cube, &args.layers, args.crop)?;
+    let (of_layers, format) = match format {
+        Format::Envi => (layers::Format::Envi, export::Format::Envi { interleave: Interleave::Bil }),
+        Format::Exr => (layers::Format::Exr, export::Format::Exr { strict_units: false, split: None }),
+        _ => (layers::Format::Csv, export::Format::Csv),
+    };
+    format.check_target(&args.output)?;
+    let missing = cube.progress()?.tiles_missing();
+    let written =
+        super::progress::watched(output.output, |progress| layers::write(&view, &args.output, of_layers, progress))?;
+    let ([width, height], names) = (view.size(), view.names());
+    output.event(
+        "done",
+        json!({
+            "file": files::shown(&args.output),
+            "format": format.name(),
+            "files": written.iter().map(|path| files::shown(path)).collect::<Vec<_>>(),
+            "size": [width, height],
+            "layers": names,
+            "tiles_missing": missing[0],
+        }),
+    )?;
+    let files: Vec<String> = written.iter().map(|path| path.display().to_string()).collect();
+    output.text(&format!("{}: {width} x {height} pixels, {}\n", files.join(", "), names.join(", ")))
 }
 
 fn write_png(args: &Args, cube: &Cube, output: &Said) -> Result<()> {

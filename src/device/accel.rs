@@ -13,13 +13,8 @@ use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
 use obvhs::ploc::PlocBuilder;
 use obvhs::{Boundable, BvhBuildParams};
 
-use crate::device::words::{HAS_COORDINATES, HAS_NORMALS, NONE, Primitive};
+use crate::device::words::{HAS_COORDINATES, HAS_NORMALS, KIND_CYLINDER, KIND_DISK, KIND_SPHERE, NONE, Primitive};
 use crate::scene::{Attributes, Scene, Shape};
-
-/// Kinds of primitives in the high byte of [`Primitive::tag`]; 0 is a triangle.
-const KIND_SPHERE: u32 = 1;
-const KIND_DISK: u32 = 2;
-const KIND_CYLINDER: u32 = 3;
 
 /// The largest number of materials: ids have 24 bits beside the primitive's kind, and one stands for none.
 pub const MAX_MATERIALS: usize = (1 << 24) - 1;

@@ -68,6 +68,10 @@ impl Exhibit {
         Shape::Sphere { center: self.at, radius: 0.01 * self.size }
     }
 
+    pub fn ask_for_layers(&mut self) {
+        self.scene.first_hits = true;
+    }
+
     pub fn add_black_ball(&mut self) {
         let black = self.material(Bsdf::Black, None);
         self.object(self.ball(), Some(black), Attributes::default());

@@ -5,7 +5,8 @@ use std::ops::Deref;
 
 use crate::device::example::Exhibit;
 use crate::device::parts::{
-    attributes, camera, geometry, heat, lights, media, opacity, paths, scattering, sky, spectra, surfaces, textures,
+    attributes, camera, geometry, heat, layers, lights, media, opacity, paths, scattering, sky, spectra, surfaces,
+    textures,
 };
 use crate::device::prepared::Prepared;
 use crate::device::text::{Defines, Module};
@@ -89,6 +90,7 @@ pub const PARTS: &[&Part] = &[
     &geometry::WINDOWS,
     &spectra::BOUNCE_BY_BOUNCE,
     &spectra::LAYOUT,
+    &layers::FIRST_HITS,
 ];
 
 impl Part {

@@ -107,6 +107,8 @@ pub struct Prepared {
     /// The device id of the spectrum with which a path's throughput begins, where it is not 1: weights of responses and of
     /// wavelengths.
     pub path_weight: Option<u32>,
+    /// Whether the host asks what single rays meet.
+    pub first_hits: bool,
     /// What records say of products of spectra, where those are kept instead of channels.
     pub separable: Option<Separable>,
     /// What keeps the scene from being rendered so, in words.
@@ -205,6 +207,7 @@ impl Prepared {
             separable,
             obstacles: separable::obstacles(scene, &heat),
             thinning: None,
+            first_hits: scene.first_hits,
             warp,
             accel,
             tables,

@@ -82,21 +82,12 @@ pub fn check_target(path: &Path) -> Result<()> {
 }
 
 /// What stands where nothing is rendered: no radiance and no temperature is negative.
-const MISSING: f32 = -9999.0;
+pub const MISSING: f32 = -9999.0;
 
 /// Writes the data file and, last, its header beside it. `path` may name either.
 pub fn write(view: &View, path: &Path, interleave: Interleave, progress: &mut Progress) -> Result<Vec<PathBuf>> {
-    let data = data_of(path);
-    let header = header_of(&data);
     check_target(path)?;
-    check_space(&data, view.bytes())?;
-    let mut file = Replacement::create(&data, DATA)?;
-    let mut pieces = Pieces { view, reader: view.reader(), file: &mut file, values: Vec::new(), progress };
-    match interleave {
-        Interleave::Bil => pieces.by_line()?,
-        Interleave::Bip => pieces.by_pixel()?,
-        Interleave::Bsq => pieces.by_band()?,
-    }
+    check_space(&data_of(path), view.bytes())?;
     let [width, height] = view.size().map(|side| side as usize);
     let channels = view.channels();
     let each = |value: &dyn Fn(usize) -> f64| (0..channels.len()).map(value).collect();
@@ -104,6 +95,7 @@ pub fn write(view: &View, path: &Path, interleave: Interleave, progress: &mut Pr
         description: long_name(view),
         size: [width, height, channels.len()],
         interleave,
+        is_double: false,
         units: match view.quantity() {
             Quantity::Radiance | Quantity::Xyz(_) => "W m^-2 sr^-1 nm^-1",
             Quantity::Integrated => "W m^-2 sr^-1",
@@ -112,11 +104,32 @@ pub fn write(view: &View, path: &Path, interleave: Interleave, progress: &mut Pr
         },
         ignore: MISSING,
         origin: view.origin(),
-        default_bands: default_bands(view),
+        default_bands: Some(default_bands(view)),
         wavelength_nm: each(&|k| channels.centre(k)),
         fwhm_nm: each(&|k| channels.fwhm(k)),
         names: channels.names.clone(),
     };
+    write_files(path, &image, &mut |file| {
+        let mut pieces = Pieces { view, reader: view.reader(), file, values: Vec::new(), progress };
+        match interleave {
+            Interleave::Bil => pieces.by_line(),
+            Interleave::Bip => pieces.by_pixel(),
+            Interleave::Bsq => pieces.by_band(),
+        }
+    })
+}
+
+/// Writes the numbers of an image as `fill` does, and its header.
+pub fn write_files(
+    path: &Path,
+    image: &Image,
+    fill: &mut dyn FnMut(&mut Replacement) -> Result<()>,
+) -> Result<Vec<PathBuf>> {
+    let data = data_of(path);
+    let header = header_of(&data);
+    check_target(path)?;
+    let mut file = Replacement::create(&data, DATA)?;
+    fill(&mut file)?;
     // Both are whole before either takes its place. The data goes first: it is known by the header of the old one.
     let mut about = Replacement::create(&header, HEADER)?;
     let written = about.file().write_all(image.header().as_bytes());

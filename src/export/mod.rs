@@ -4,6 +4,7 @@
 mod blocks;
 mod envi;
 mod exr;
+pub mod layers;
 mod picture;
 mod table;
 mod zarr;

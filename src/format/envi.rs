@@ -592,13 +592,16 @@ pub struct Image<'a> {
     /// Columns, lines and bands.
     pub size: [usize; 3],
     pub interleave: Interleave,
+    /// Whether numbers have 64 bits, not 32.
+    pub is_double: bool,
     pub units: &'a str,
     /// The value of what is not rendered.
     pub ignore: f32,
     /// Column and line of the first pixel in the whole picture, from 0.
     pub origin: [u32; 2],
     /// Bands, from 0, shown as red, green and blue.
-    pub default_bands: [usize; 3],
+    pub default_bands: Option<[usize; 3]>,
+    /// Empty where bands are none of wavelength.
     pub wavelength_nm: Vec<f64>,
     pub fwhm_nm: Vec<f64>,
     pub names: Vec<String>,
@@ -621,7 +624,7 @@ impl Image<'_> {
         entry("bands", &bands.to_string());
         entry("header offset", "0");
         entry("file type", "ENVI Standard");
-        entry("data type", "4");
+        entry("data type", if self.is_double { "5" } else { "4" });
         entry("interleave", self.interleave.name());
         entry("byte order", "0");
         if self.origin != [0, 0] {
@@ -630,10 +633,16 @@ impl Image<'_> {
         }
         entry("data ignore value", &self.ignore.to_string());
         entry("data units", self.units);
-        entry("wavelength units", "Nanometers");
-        entry("default bands", &list(&mut self.default_bands.iter().map(|band| (band + 1).to_string())));
-        entry("wavelength", &numbers(&self.wavelength_nm));
-        entry("fwhm", &numbers(&self.fwhm_nm));
+        if !self.wavelength_nm.is_empty() {
+            entry("wavelength units", "Nanometers");
+        }
+        if let Some(shown) = self.default_bands {
+            entry("default bands", &list(&mut shown.iter().map(|band| (band + 1).to_string())));
+        }
+        if !self.wavelength_nm.is_empty() {
+            entry("wavelength", &numbers(&self.wavelength_nm));
+            entry("fwhm", &numbers(&self.fwhm_nm));
+        }
         entry("bbl", &list(&mut (0..bands).map(|_| "1".to_owned())));
         entry("band names", &list(&mut self.names.iter().map(|name| plain(name))));
         text

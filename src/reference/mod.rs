@@ -178,6 +178,7 @@ mod tests {
             camera_medium: None,
             lights: vec![],
             environment: Some(Environment::Uniform(1)),
+            first_hits: false,
             warnings: vec![],
             digest: String::new(),
         }

@@ -1,10 +1,30 @@
-//! `[camera]` and `[film]`.
+//! `[camera]` and `[film]`, and what rays they make.
 
 use glam::{DVec2, DVec3};
 
 use super::decode::{Fields, Item};
 use super::keys::{CAMERA, FILM, ORTHOGRAPHIC, PERSPECTIVE, THIN_LENS};
 use super::{Camera, Film, Filter, Projection};
+
+impl Camera {
+    /// Origin, m, and direction (a unit vector) of the ray through a place on the full film, in pixels from its top left, and a place on
+    /// the lens, in its radii: (0, 0) is the middle. In f64, as the reference has it; shaders have their own.
+    pub fn ray(&self, film: &Film, place: DVec2, lens: DVec2) -> [DVec3; 2] {
+        // -1 … 1 across the film, y upwards.
+        let size = DVec2::new(f64::from(film.width), f64::from(film.height));
+        let at = DVec2::new(2.0, -2.0) * place / size + DVec2::new(-1.0, 1.0);
+        let across = |at: DVec2| at.x * self.right + at.y * self.up;
+        match self.projection {
+            Projection::Perspective { tan_half } => [self.position, (self.forward + across(at * tan_half)).normalize()],
+            Projection::ThinLens { tan_half, aperture_radius, focus_distance } => {
+                let lens = aperture_radius * across(lens);
+                let focus = focus_distance * (self.forward + across(at * tan_half));
+                [self.position + lens, (focus - lens).normalize()]
+            }
+            Projection::Orthographic { half_size } => [self.position + across(at * half_size), self.forward],
+        }
+    }
+}
 
 /// Pixels along one side: places on wider films, in f32, would be off by more than 1/32 of a pixel.
 const MAX_SIDE: u32 = 131_072;

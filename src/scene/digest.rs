@@ -30,6 +30,8 @@ pub fn digest(scene: &Scene) -> String {
         camera_medium,
         lights,
         environment,
+        // They change no value of the radiance.
+        first_hits: _,
         warnings: _,
         digest: _,
     } = scene;

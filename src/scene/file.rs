@@ -147,6 +147,7 @@ fn decode<'a>(cx: &'a Context<'a>, root: &'a [Entry]) -> Option<Scene> {
             Some(environment) => Some(environment?),
             None => None,
         },
+        first_hits: false,
         warnings: Vec::new(),
         digest: String::new(),
     })

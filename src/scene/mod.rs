@@ -82,6 +82,8 @@ pub struct Scene {
     pub camera_medium: Option<MediumId>,
     pub lights: Vec<Light>,
     pub environment: Option<Environment>,
+    /// Whether the first surface behind each pixel is asked for, beside its radiance (`render --layers`).
+    pub first_hits: bool,
     /// Said once to the user: held tables, dropped triangles, …
     pub warnings: Vec<String>,
     /// Hex SHA-256 over everything above that decides the values of a cube (not paths or warnings).
@@ -92,6 +94,12 @@ impl Scene {
     /// Whether weights of products of its spectra are kept instead of radiance.
     pub fn is_factored(&self) -> bool {
         self.integrator.evaluator == Evaluator::Factored
+    }
+
+    /// The same, with the first surface behind each pixel asked for.
+    pub fn with_first_hits(mut self) -> Scene {
+        self.first_hits = true;
+        self
     }
 
     /// The same, with weights of products of its spectra kept instead of radiance.

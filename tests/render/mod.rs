@@ -5,6 +5,7 @@ mod accuracy;
 mod evaluation;
 mod factored;
 mod json;
+mod layers;
 mod memory;
 mod out_of_core;
 mod outcome;

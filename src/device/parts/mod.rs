@@ -6,6 +6,7 @@ pub mod camera;
 pub mod crossings;
 pub mod geometry;
 pub mod heat;
+pub mod layers;
 pub mod lights;
 mod lobes;
 pub mod media;

@@ -120,6 +120,7 @@ fn full() -> Scene {
             size: [1, 1],
             texels,
         })),
+        first_hits: false,
         warnings: Vec::new(),
         digest: String::new(),
     }

@@ -42,6 +42,7 @@ impl Builder {
             camera_medium: None,
             lights: Vec::new(),
             environment: None,
+            first_hits: false,
             warnings: Vec::new(),
             digest: String::new(),
         })
