@@ -115,6 +115,13 @@ pub struct Args {
     #[arg(long)]
     pub resume: bool,
 
+    /// Replace OUT.zarr if it exists
+    ///
+    /// As `render --overwrite`: only a Spectile cube that nobody works on, of which no task waits or runs. It is gone when the new one is
+    /// made, also where submitting fails after that.
+    #[arg(long, conflicts_with = "resume")]
+    pub overwrite: bool,
+
     /// Print the script and the commands, and change nothing
     #[arg(long)]
     pub dry_run: bool,
@@ -182,12 +189,16 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     let mut header = plan::header(&scene, tile, args.seed, args.uncertainty, &args.layers)?;
     plan::record_evaluator(&mut header, plan::evaluator(&scene, None, args.gpus_per_task == 0)?);
     header.validate().map_err(Error::Usage)?;
-    let existing = if args.resume { Existing::Resume } else { Existing::Refuse };
+    let existing = match args.overwrite {
+        true => Existing::Replace,
+        false if args.resume => Existing::Resume,
+        false => Existing::Refuse,
+    };
     let tiles = header.grid().count();
     check_target(&cube, &header, existing, &(0..tiles))?;
     slurm::SCRIPT.check_target(&slurm::script_path(&cube))?;
     slurm::SUMMARY.check_target(&slurm::summary_path(&cube))?;
-    if args.resume {
+    if (args.resume || args.overwrite) && cube.exists() {
         refuse_while_at_work(&cube)?;
     }
 

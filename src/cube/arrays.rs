@@ -22,7 +22,7 @@ pub(super) fn arrays(header: &Header, layout: Layout) -> Vec<(&'static str, Valu
             format!("false colour: radiance of the channels {r}, {g}, {b} as red, green, blue")
         }
     };
-    let pixel = |side: &str| json!({ "long_name": format!("pixel centre on the full film, from the {side}"), "units": "pixel" });
+    let pixel = |side: &str| json!({ "long_name": format!("pixel on the full film, from the {side}, the first 0"), "units": "pixel" });
     let mut arrays = vec![
         (
             "radiance",

@@ -73,6 +73,11 @@ pub const FACTORED: &str = "factored";
 /// Of a cube with layers: which, and what their numbers stand for ([`LayerNames`]).
 pub const LAYERS: &str = "layers";
 
+/// Of a cube that lies on a map: the coordinate reference system, and where on the map the place x, y is, in pixels from the cube's top left
+/// corner: a x + b y + c, d x + e y + f.
+pub const CRS: &str = "crs";
+pub const AFFINE: &str = "affine";
+
 /// Of a cube that was made of another one's channels: how.
 pub(super) const DERIVED: &str = "derived";
 
@@ -129,6 +134,12 @@ impl Header {
     /// The layers that the cube has.
     pub fn layers(&self) -> Vec<Layer> {
         self.layer_names().layers.iter().filter_map(|name| Layer::named(name)).collect()
+    }
+
+    /// The coordinate reference system of a cube that lies on a map, and its affine transform from pixels to there.
+    pub fn georeference(&self) -> Option<(&str, [f64; 6])> {
+        let affine = serde_json::from_value(self.attributes.get(AFFINE)?.clone()).ok()?;
+        Some((self.attributes.get(CRS)?.as_str()?, affine))
     }
 
     /// Whether the cube holds weights of products of spectra instead of radiance.
@@ -348,6 +359,13 @@ impl Header {
             ("origin".into(), json!(self.origin)),
             ("channel_names".into(), json!(self.channels.names)),
         ]);
+        if let Some((crs, affine)) = self.georeference() {
+            // As the conventions of GeoZarr have it.
+            let key = if crs.starts_with("EPSG:") { "proj:code" } else { "proj:wkt2" };
+            attributes.insert(key.into(), json!(crs));
+            attributes.insert("spatial:transform".into(), json!(affine));
+            attributes.insert("spatial:dimensions".into(), json!(["y", "x"]));
+        }
         if let Some(rgb) = self.channels.false_colour {
             attributes.insert("false_colour".into(), json!(rgb));
         }
@@ -477,6 +495,9 @@ impl Header {
         let responses = attributes.remove("responses").unwrap_or_else(|| json!([]));
         let responses = serde_json::from_value(responses)
             .map_err(|what| damaged(&format!("holds no valid `responses`: {what}")))?;
+        for name in ["proj:code", "proj:wkt2", "spatial:transform", "spatial:dimensions"] {
+            attributes.remove(name);
+        }
         for name in RESERVED {
             attributes.remove(name);
         }

@@ -9,9 +9,9 @@ use glam::{DAffine3, DMat3, DVec2, DVec3};
 use crate::device::accel;
 use crate::device::part::{PARTS, Part};
 use crate::scene::{
-    Absorber, Attributes, Bsdf, Component, Cone, Emission, Environment, EnvironmentMap, Field, Grid, Interior, Light,
-    Material, Medium, Mesh, Object, Phase, PhaseTable, Placement, Profile, Reflectance, Scattering, Scene, Shape,
-    Sides, Spectrum, Temperature, Texels, Texture, TextureKind, Weight,
+    Absorber, Attributes, Bsdf, Component, Cone, Distortion, Emission, Environment, EnvironmentMap, Field, Grid,
+    Interior, Light, Material, Medium, Mesh, Object, Phase, PhaseTable, Placement, Profile, Projection, Reflectance,
+    Scattering, Scene, Shape, Sides, Spectrum, Temperature, Texels, Texture, TextureKind, Weight,
 };
 use crate::spectral::{Curve, Outside};
 
@@ -66,6 +66,13 @@ impl Exhibit {
 
     fn ball(&self) -> Shape {
         Shape::Sphere { center: self.at, radius: 0.01 * self.size }
+    }
+
+    /// By nothing: the picture is the same. Cameras without a perspective have none.
+    pub fn distort(&mut self) {
+        if matches!(self.scene.camera.projection, Projection::Perspective { .. } | Projection::ThinLens { .. }) {
+            self.scene.camera.distortion.get_or_insert(Distortion { radial: [0.0; 3], tangential: [0.0; 2] });
+        }
     }
 
     pub fn ask_for_layers(&mut self) {

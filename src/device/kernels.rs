@@ -42,6 +42,9 @@ const TRACING: &[Text] = &[
     Parts(Place::Generate),
 ];
 
+/// And what only kernels that save records have.
+const FOLLOWING: &[Text] = &[Parts(Place::Following)];
+
 /// One bounce of every path: of plain scenes, whose one kernel was measured as a whole, and of general ones, in stages.
 const BOUNCE: Module = module!("passes/generate_bounce.wgsl");
 
@@ -94,8 +97,8 @@ impl OnDevice<'_> {
         let mut evaluate = self.defines(Work::Evaluate);
         shape.define(&mut evaluate);
         let bounce = match self.is_general() {
-            true => [TRACING, STAGES].map(|texts| self.modules(texts)).concat(),
-            false => [&self.modules(TRACING)[..], &[BOUNCE]].concat(),
+            true => [TRACING, FOLLOWING, STAGES].map(|texts| self.modules(texts)).concat(),
+            false => [&self.modules(TRACING)[..], &self.modules(FOLLOWING), &[BOUNCE]].concat(),
         };
         let mut try_paths = self.defines(Work::Evaluate);
         if let Some(thinning) = &self.thinning {

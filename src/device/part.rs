@@ -48,7 +48,10 @@ pub const PARTS: &[&Part] = &[
     &geometry::SHAPES,
     &lights::NEXT_EVENT,
     &camera::THIN_LENS,
+    &camera::DISTORTION,
     &camera::ORTHOGRAPHIC,
+    &camera::LATLONG,
+    &camera::PUSHBROOM,
     &camera::GAUSSIAN,
     &paths::ROULETTE,
     &paths::SOBOL,
@@ -163,6 +166,8 @@ pub enum Place {
     Traversal,
     /// All else that generating paths needs, and what one stage of that does.
     Generate,
+    /// What needs the records that such kernels save.
+    Following,
     Stage,
     Evaluate,
 }

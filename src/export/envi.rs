@@ -108,9 +108,11 @@ pub fn write(view: &View, path: &Path, interleave: Interleave, progress: &mut Pr
         wavelength_nm: each(&|k| channels.centre(k)),
         fwhm_nm: each(&|k| channels.fwhm(k)),
         names: channels.names.clone(),
+        map: view.georeference(),
     };
     write_files(path, &image, &mut |file| {
-        let mut pieces = Pieces { view, reader: view.reader(), file, values: Vec::new(), progress };
+        let mut pieces =
+            Pieces { view, reader: view.reader(), file, values: Vec::new(), progress, missing: MISSING, begin: 0 };
         match interleave {
             Interleave::Bil => pieces.by_line(),
             Interleave::Bip => pieces.by_pixel(),
@@ -140,12 +142,17 @@ pub fn write_files(
     Ok(vec![data, header])
 }
 
-struct Pieces<'a, 'p> {
-    view: &'a View<'a>,
-    reader: Reader<'a>,
-    file: &'a mut Replacement,
-    values: Vec<f32>,
-    progress: &'a mut Progress<'p>,
+/// Numbers on their way into a file.
+pub(super) struct Pieces<'a, 'p> {
+    pub view: &'a View<'a>,
+    pub reader: Reader<'a>,
+    pub file: &'a mut Replacement,
+    pub values: Vec<f32>,
+    pub progress: &'a mut Progress<'p>,
+    /// Instead of NaN.
+    pub missing: f32,
+    /// Where in the file the first one goes, of [`Pieces::by_band`].
+    pub begin: u64,
 }
 
 /// `count` in pieces of at most `most`, which is taken as at least 1.
@@ -186,7 +193,7 @@ impl Pieces<'_, '_> {
     }
 
     /// [band][line][sample]: a row of tiles at a time, so that the cube is read once.
-    fn by_band(&mut self) -> Result<()> {
+    pub fn by_band(&mut self) -> Result<()> {
         let [width, height] = self.view.size().map(|side| side as usize);
         let (rect, tile) = (self.view.rect(), self.view.cube().grid().tile[1]);
         let mut y0 = rect.y0;
@@ -197,7 +204,7 @@ impl Pieces<'_, '_> {
                 self.read(rows, part.clone(), Strides { row: width, pixel: 1, band: plane })?;
                 let values = std::mem::take(&mut self.values);
                 for (band, values) in part.zip(values.chunks_exact(plane)) {
-                    let at = 4 * (band * height + (y0 - rect.y0) as usize) as u64 * width as u64;
+                    let at = self.begin + 4 * (band * height + (y0 - rect.y0) as usize) as u64 * width as u64;
                     let file = self.file.file();
                     let written =
                         file.seek(SeekFrom::Start(at)).and_then(|_| file.write_all(bytemuck::cast_slice(values)));
@@ -227,7 +234,7 @@ impl Pieces<'_, '_> {
     fn read(&mut self, rect: Rect, bands: Range<usize>, strides: Strides) -> Result<()> {
         self.values.resize(rect.pixels() as usize * bands.len(), 0.0);
         self.reader.read(rect, bands, strides, &mut self.values)?;
-        self.values.iter_mut().filter(|value| value.is_nan()).for_each(|value| *value = MISSING);
+        self.values.iter_mut().filter(|value| value.is_nan()).for_each(|value| *value = self.missing);
         Ok(())
     }
 

@@ -73,6 +73,13 @@ impl<'a> LayerView<'a> {
         self.layers.iter().flat_map(of).collect()
     }
 
+    /// As [`crate::cube::View::georeference`].
+    fn georeference(&self) -> Option<(&'a str, [f64; 6])> {
+        let (crs, [a, b, c, d, e, f]) = self.cube.header().georeference()?;
+        let [x, y] = [self.rect.x0, self.rect.y0].map(f64::from);
+        Some((crs, [a, b, a * x + b * y + c, d, e, d * x + e * y + f]))
+    }
+
     /// Column and row on the full film.
     fn origin(&self) -> [u32; 2] {
         let [x, y] = self.cube.header().origin;
@@ -154,6 +161,7 @@ fn write_envi(view: &LayerView, path: &Path, progress: &mut Progress) -> Result<
         wavelength_nm: Vec::new(),
         fwhm_nm: Vec::new(),
         names,
+        map: view.georeference(),
     };
     envi::write_files(path, &image, &mut |file| {
         view.lines(progress, |_, line| {

@@ -16,6 +16,7 @@ pub fn ray(camera: &Camera, film: &Film, [x, y]: [u32; 2], rng: &mut Rng) -> Ray
         + DVec2::new(filter_offset(film.filter, rng), filter_offset(film.filter, rng));
     let lens = match camera.projection {
         Projection::ThinLens { .. } => DVec2::from(rng.unit_disk()),
+        Projection::Pushbroom { .. } => DVec2::new(2.0 * rng.uniform() - 1.0, 0.0),
         _ => DVec2::ZERO,
     };
     let [origin, direction] = camera.ray(film, place, lens);
@@ -44,7 +45,14 @@ mod tests {
     const WIDE: Film = Film { width: 400, height: 200, filter: Filter::Box, crop: [0, 0, 400, 200] };
 
     fn camera(projection: Projection) -> Camera {
-        Camera { position: DVec3::new(1.0, 2.0, 3.0), forward: DVec3::NEG_Z, right: DVec3::X, up: DVec3::Y, projection }
+        Camera {
+            position: DVec3::new(1.0, 2.0, 3.0),
+            forward: DVec3::NEG_Z,
+            right: DVec3::X,
+            up: DVec3::Y,
+            projection,
+            distortion: None,
+        }
     }
 
     /// Where a ray crosses the plane one metre in front of the camera, relative to the axis.

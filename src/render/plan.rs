@@ -11,7 +11,7 @@ use crate::device::separable;
 use crate::device::windows::Windows;
 use crate::render::layers;
 use crate::render::wave::{Budget, DeviceLimits, WavePlan};
-use crate::scene::{Evaluator, Scene};
+use crate::scene::{Evaluator, Georeference, Scene};
 use crate::{Error, Result};
 
 /// Side of a tile where nothing says otherwise, in pixels.
@@ -46,6 +46,12 @@ pub fn header(scene: &Scene, tile: [u32; 2], seed: u64, uncertainty: bool, layer
             "integrator": integrator,
         }),
     );
+    if let Some(Georeference { crs, affine: [a, b, c, d, e, f] }) = &scene.georeference {
+        // Of the cube, not of the full film.
+        let [x, y] = [scene.film.crop[0], scene.film.crop[1]].map(f64::from);
+        attributes.insert(cube::CRS.into(), json!(crs));
+        attributes.insert(cube::AFFINE.into(), json!([a, b, a * x + b * y + c, d, e, d * x + e * y + f]));
+    }
     let header = Header {
         size: scene.film.cube_size(),
         origin: [scene.film.crop[0], scene.film.crop[1]],

@@ -106,7 +106,7 @@ fn values(cube: &Cube, layer: Layer) -> Vec<Vec<f64>> {
 fn seen(x: f64, y: f64) -> Option<(f64, f64, f64, DVec3)> {
     let ball = 0.75f64.powi(2) - (x - 0.53).powi(2) - (y - 0.27).powi(2);
     if (x - 1.0).hypot(y + 1.0) < 0.5 {
-        return Some((4.0, 2.0, 3.0, DVec3::Z));
+        return Some((4.0, 3.0, 3.0, DVec3::Z));
     }
     if ball > 0.0 {
         let up = ball.sqrt();

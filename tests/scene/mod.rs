@@ -1,6 +1,7 @@
 //! The scene loader from outside: what good scenes resolve to, number by number, what is said about wrong ones, and
 //! that nothing makes it panic.
 
+mod cameras;
 mod heat;
 mod lights;
 mod materials;

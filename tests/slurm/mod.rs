@@ -216,6 +216,15 @@ fn an_array_render_is_byte_equal_to_the_one_machine_render() {
     assert!(again.contains("all 64 tiles have 64 samples per pixel; there is nothing to submit"), "{again}");
     place.submit(&["--resume", "--spp", "128", "--tasks", "5"]);
     place.ends_with_the_same_bytes("128");
+    // Or it is begun anew, which must be said.
+    let output = place.run(&[&["submit", "--spp", "64"], SUBMIT].concat());
+    assert!(
+        output.status.code() == Some(2) && text(&output.stderr).contains("exists already"),
+        "{}",
+        text(&output.stderr)
+    );
+    place.submit(&["--overwrite", "--spp", "64", "--tasks", "3"]);
+    place.ends_with_the_same_bytes("64");
 }
 
 /// With `--uncertainty` the cube has an array more, of which every task writes its part.

@@ -43,6 +43,7 @@ fn what_is_written_is_read() {
         wavelength_nm: vec![400.1, 1.0 / 3.0],
         fwhm_nm: vec![1.0, 2.0],
         names: vec!["a, b".into(), "c".into()],
+        map: None,
     };
     let header = read(&image.header()).unwrap();
     assert_eq!((header.samples, header.lines, header.bands), (2, 3, 2));

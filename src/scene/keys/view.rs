@@ -1,7 +1,7 @@
 //! The file as a whole; what is seen, in which channels, and how it is computed.
 
 use super::Kind::{
-    Boolean, Choice, Direction, File, List, ListOfTables, Name, NamedTables, Number, Table, Vector, Whole,
+    Boolean, Choice, Direction, File, List, ListOfTables, Name, NamedTables, Number, Table, Text, Vector, Whole,
 };
 use super::{ENVIRONMENT, Key, LIGHT, MATERIAL, MEDIUM, OBJECT, SPECTRUM, Section};
 
@@ -13,6 +13,8 @@ pub static SCENE: Section = Section {
     keys: &[
         Key::required("camera", Table, "From where the scene is seen.").tables(&[&CAMERA]),
         Key::required("film", Table, "The picture's size in pixels.").tables(&[&FILM]),
+        Key::optional("georeference", Table, "nowhere on earth", "Where on a map the picture lies.")
+            .tables(&[&GEOREFERENCE]),
         Key::required("channels", Table, "The intervals of wavelength that are rendered.").tables(&[&CHANNELS]),
         Key::optional("integrator", Table, "all its defaults", "How paths are made.").tables(&[&INTEGRATOR]),
         Key::optional("spectra", NamedTables, "none", "Spectra that others name.").tables(&[&SPECTRUM]),
@@ -25,7 +27,7 @@ pub static SCENE: Section = Section {
     ],
     later: &[],
     at: "",
-    examples: &[EVERY_SECTION],
+    examples: &[EVERY_SECTION, ON_A_MAP],
     notes: "Tables of the same kind stand in any order. What no object uses (a material, a spectrum, a medium) is \
             checked, and then left out.",
 };
@@ -69,21 +71,36 @@ radiance = 0.01
 absorption = 1e-4
 "#;
 
+const ON_A_MAP: &str = r#"
+[camera.orthographic]
+position = [0, 0, 10]
+look_at = [0, 0, 0]
+up = [0, 1, 0]
+width = 8
+
+[georeference]
+crs = "EPSG:32631"
+origin = [650000, 4800000, 0]
+up = [0, 0, 1]
+"#;
+
 pub static CAMERA: Section = Section {
     path: "camera",
     heading: "`[camera]`",
     summary: "from where the scene is seen",
-    about: "One of three kinds of camera.",
+    about: "One of five kinds of camera.",
     keys: &[
         Key::one_of("perspective", Table, "All rays start in one point.").tables(&[&PERSPECTIVE]),
         Key::one_of("thin_lens", Table, "As perspective, through an ideal lens: what is out of focus is blurred.")
             .tables(&[&THIN_LENS]),
         Key::one_of("orthographic", Table, "Parallel rays through a window.").tables(&[&ORTHOGRAPHIC]),
+        Key::one_of("latlong", Table, "All directions from one point: makes environment maps.").tables(&[&LATLONG]),
+        Key::one_of("pushbroom", Table, "A line scanner: every row from where it is then.").tables(&[&PUSHBROOM]),
     ],
     later: &[],
     at: "camera",
-    examples: &[A_PERSPECTIVE, A_THIN_LENS, AN_ORTHOGRAPHIC],
-    notes: "All three look from `position` to `look_at`. Row 0 of the picture is its top, column 0 its left: columns \
+    examples: &[A_PERSPECTIVE, A_THIN_LENS, AN_ORTHOGRAPHIC, A_LATLONG, A_PUSHBROOM],
+    notes: "The first three look from `position` to `look_at`. Row 0 of the picture is its top, column 0 its left: columns \
             run along the cross product of the view and `up`, rows from `up` downward.",
 };
 
@@ -128,6 +145,118 @@ medium = "air"
 absorption = 0.0
 "#;
 
+const A_LATLONG: &str = r#"
+[camera.latlong]
+position = [0, 0, 1]
+up = [0, 0, 1]
+rotate_degrees = 90
+medium = "air"
+
+[film]
+width = 360
+height = 180
+
+[media.air]
+absorption = 0.0
+"#;
+const A_PUSHBROOM: &str = r#"
+[camera.pushbroom]
+lines = "track.csv"
+up = [0, 0, 1]
+north = [0, 1, 0]
+ifov = 0.5
+
+[film]
+width = 60
+height = 3
+"#;
+const A_WIDE_PUSHBROOM: &str = r#"
+[camera.pushbroom]
+lines = "track.csv"
+up = [0, 0, 1]
+fov = 40
+fov_axis = "x"
+
+[film]
+width = 60
+height = 3
+"#;
+const A_PUSHBROOM_BY_LENS: &str = r#"
+[camera.pushbroom]
+lines = "track.csv"
+up = [0, 0, 1]
+focal_length = 50
+pixel_pitch = 7.5
+
+[film]
+width = 60
+height = 3
+"#;
+const A_PUSHBROOM_BY_GROUND: &str = r#"
+[camera.pushbroom]
+lines = "track.csv"
+up = [0, 0, 1]
+ground_sampling_distance = 0.5
+altitude = 1000
+
+[film]
+width = 60
+height = 3
+"#;
+const BY_FOCAL_LENGTH: &str = r#"
+[camera.perspective]
+position = [0, 0, 800]
+look_at = [0, 0, 0]
+up = [0, 1, 0]
+focal_length = 50                      # mm
+pixel_pitch = 5.5                      # um
+"#;
+const BY_IFOV: &str = r#"
+[camera.perspective]
+position = [0, 0, 800]
+look_at = [0, 0, 0]
+up = [0, 1, 0]
+ifov = 0.11                            # mrad
+"#;
+const BY_GROUND: &str = r#"
+[camera.perspective]
+position = [0, 0, 800]
+look_at = [0, 0, 0]
+up = [0, 1, 0]
+ground_sampling_distance = 0.088       # m
+altitude = 800
+"#;
+const BY_LENS: &str = r#"
+[camera.thin_lens]
+position = [0, -4, 1.5]
+look_at = [0, 0, 0.5]
+up = [0, 0, 1]
+focal_length = 35
+pixel_pitch = 100
+aperture_radius = 0.01
+focus_distance = 4
+"#;
+
+const A_DISTORTION: &str = r#"
+[camera.perspective]
+position = [0, -4, 1.5]
+look_at = [0, 0, 0.5]
+up = [0, 0, 1]
+fov = 60
+distortion = { k1 = -0.28, k2 = 0.07, k3 = 0.0, p1 = 2e-4, p2 = -1e-5 }
+"#;
+const A_DISTORTED_LENS: &str = r#"
+[camera.thin_lens]
+position = [0, -4, 1.5]
+look_at = [0, 0, 0.5]
+up = [0, 0, 1]
+fov = 60
+aperture_radius = 0.01
+focus_distance = 4
+distortion = { k1 = -0.1 }
+"#;
+const LENS_DISTORTION: Key = Key::optional("distortion", Table, "none", "Of the lens: what a calibration says of it.");
+
 const POSITION: Key = Key::required(
     "position",
     Vector,
@@ -155,8 +284,36 @@ const CAMERA_MEDIUM: Key = Key::optional(
     "What fills space outside every `interior`. It may have no grids. Light of the environment, of suns and of \
      directional lights arrives through it undimmed.",
 );
-const FOV: Key =
-    Key::required("fov", Number, "The full angle of view along `fov_axis`.").unit("degrees").range("(0, 180)");
+const FOV: Key = Key::required("fov", Number, "The full angle of view along `fov_axis`.")
+    .unless("another of the four ways to say how much is seen")
+    .unit("degrees")
+    .range("(0, 180)");
+const OTHERWISE_SEEN: &str = "another of the four ways to say how much is seen";
+const FOCAL_LENGTH: Key =
+    Key::required("focal_length", Number, "Of the lens, with `pixel_pitch`; both as a data sheet has them.")
+        .unless(OTHERWISE_SEEN)
+        .unit("mm")
+        .range("(0, ∞)");
+const PIXEL_PITCH: Key = Key::required("pixel_pitch", Number, "Distance of the centres of two pixels on the detector.")
+    .unless(OTHERWISE_SEEN)
+    .unit("µm")
+    .range("(0, ∞)");
+const IFOV: Key = Key::required("ifov", Number, "The angle that a pixel in the middle of the picture sees.")
+    .unless(OTHERWISE_SEEN)
+    .unit("mrad")
+    .range("(0, 1000π)");
+const GROUND_SAMPLING_DISTANCE: Key = Key::required(
+    "ground_sampling_distance",
+    Number,
+    "What a pixel sees from side to side on a plane at right angles to the view, `altitude` away.",
+)
+.unless(OTHERWISE_SEEN)
+.unit("m")
+.range("(0, ∞)");
+const ALTITUDE: Key = Key::required("altitude", Number, "How far away the plane of `ground_sampling_distance` is.")
+    .unless(OTHERWISE_SEEN)
+    .unit("m")
+    .range("(0, ∞)");
 const FOV_AXIS: Key = Key::default(
     "fov_axis",
     Choice(&["x", "y", "smaller", "larger"]),
@@ -170,11 +327,25 @@ pub static PERSPECTIVE: Section = Section {
     heading: "`[camera.perspective]`",
     summary: "a pinhole camera",
     about: "",
-    keys: &[POSITION, LOOK_AT, UP, FLIP_X, CAMERA_MEDIUM, FOV, FOV_AXIS],
+    keys: &[
+        POSITION,
+        LOOK_AT,
+        UP,
+        FLIP_X,
+        CAMERA_MEDIUM,
+        FOV,
+        FOV_AXIS,
+        FOCAL_LENGTH,
+        PIXEL_PITCH,
+        IFOV,
+        GROUND_SAMPLING_DISTANCE,
+        ALTITUDE,
+        LENS_DISTORTION.tables(&[&DISTORTION]),
+    ],
     later: &[],
     at: "camera.perspective",
-    examples: &[A_PERSPECTIVE],
-    notes: "",
+    examples: &[A_PERSPECTIVE, BY_FOCAL_LENGTH, BY_IFOV, BY_GROUND, A_DISTORTION],
+    notes: "How much is seen is said in one of four ways; with all but `fov` it grows with the film, whose pixels are square:             `width` times `pixel_pitch` is the detector's width.",
 };
 
 pub static THIN_LENS: Section = Section {
@@ -190,6 +361,12 @@ pub static THIN_LENS: Section = Section {
         CAMERA_MEDIUM,
         FOV,
         FOV_AXIS,
+        FOCAL_LENGTH,
+        PIXEL_PITCH,
+        IFOV,
+        GROUND_SAMPLING_DISTANCE,
+        ALTITUDE,
+        LENS_DISTORTION.tables(&[&DISTORTION]),
         Key::required("aperture_radius", Number, "Radius of the lens; 0 is a pinhole.").unit("m").range("[0, ∞)"),
         Key::required(
             "focus_distance",
@@ -201,8 +378,28 @@ pub static THIN_LENS: Section = Section {
     ],
     later: &[],
     at: "camera.thin_lens",
-    examples: &[A_THIN_LENS],
+    examples: &[A_THIN_LENS, BY_LENS, A_DISTORTED_LENS],
     notes: "",
+};
+
+pub static DISTORTION: Section = Section {
+    path: "distortion",
+    heading: "`distortion = { … }`",
+    summary: "of a lens: Brown and Conrady",
+    about: "What a pinhole would show at (x, y), in units of the focal length, x to the right and y down, is seen at x (1 + k₁ r² + k₂ r⁴ + \
+            k₃ r⁶) + 2 p₁ x y + p₂ (r² + 2 x²) and y (1 + k₁ r² + k₂ r⁴ + k₃ r⁶) + p₁ (r² + 2 y²) + 2 p₂ x y, r² = x² + y²: names and signs \
+            are those of OpenCV and most calibrations. How much is seen (`fov` and the like) is said of the film without it.",
+    keys: &[
+        Key::default("k1", Number, "0", "Radial, of r²: barrels are below 0, cushions above."),
+        Key::default("k2", Number, "0", "Radial, of r⁴."),
+        Key::default("k3", Number, "0", "Radial, of r⁶."),
+        Key::default("p1", Number, "0", "Tangential."),
+        Key::default("p2", Number, "0", "Tangential."),
+    ],
+    later: &[],
+    at: "camera.perspective.distortion",
+    examples: &[A_DISTORTION],
+    notes: "Each place of the film must see one direction: a distortion that folds the picture over is refused.",
 };
 
 pub static ORTHOGRAPHIC: Section = Section {
@@ -228,6 +425,60 @@ pub static ORTHOGRAPHIC: Section = Section {
     at: "camera.orthographic",
     examples: &[AN_ORTHOGRAPHIC],
     notes: "",
+};
+
+pub static LATLONG: Section = Section {
+    path: "camera.latlong",
+    heading: "`[camera.latlong]`",
+    summary: "a camera that sees all directions",
+    about: "",
+    keys: &[
+        Key::required("position", Vector, "The point that all rays start from.").unit("m"),
+        Key::default("up", Direction, "[0, 1, 0]", "Where the upper edge of the picture is."),
+        Key::default(
+            "rotate_degrees",
+            Number,
+            "0",
+            "Turns the picture about `up`, counter-clockwise as seen from above: as the key of that name turns an environment map.",
+        )
+        .unit("degrees"),
+        CAMERA_MEDIUM,
+    ],
+    later: &[],
+    at: "camera.latlong",
+    examples: &[A_LATLONG],
+    notes: "Longitude runs along x, latitude along y, all pixels the same angle: a film twice as wide as high has square ones. What is             rendered is an environment map as it stands: `environment = { map = \"CUBE.zarr\" }` with the same `up` and             `rotate_degrees` sends from every direction what was seen there.",
+};
+
+pub static PUSHBROOM: Section = Section {
+    path: "camera.pushbroom",
+    heading: "`[camera.pushbroom]`",
+    summary: "a line scanner",
+    about: "",
+    keys: &[
+        Key::required(
+            "lines",
+            File,
+            "Where it is in the middle of each line's exposure: CSV with the columns `x`, `y`, `z` and any of `yaw_degrees`, `pitch_degrees`, \
+             `roll_degrees`, a row for each row of the film. With all three 0 it looks straight down with its nose north; yaw \
+             turns it clockwise as seen from above, pitch lifts the nose, roll lowers the right wing, one after the other.",
+        ),
+        Key::default("up", Direction, "[0, 1, 0]", "Where up is in the scene."),
+        Key::optional("north", Direction, "`[0, 0, -1]`; `[0, 1, 0]` where `up` is z", "Where north is; made level."),
+        FOV,
+        FOV_AXIS,
+        FOCAL_LENGTH,
+        PIXEL_PITCH,
+        IFOV,
+        GROUND_SAMPLING_DISTANCE,
+        ALTITUDE,
+    ],
+    later: &[],
+    at: "camera.pushbroom",
+    examples: &[A_PUSHBROOM, A_WIDE_PUSHBROOM, A_PUSHBROOM_BY_LENS, A_PUSHBROOM_BY_GROUND],
+    notes: "Row 0 is the first line, columns run to the right of the flight. A line is exposed until the next begins, and the scanner moves \
+            and turns evenly between their middles: what a pixel sees is smeared along the track by that and by its own size. How \
+            much is seen is said of the row, across the track; pixels are square. Not with media.",
 };
 
 pub static FILM: Section = Section {
@@ -272,6 +523,58 @@ crop = [200, 100, 328, 228]            # 128 x 128 pixels of it
 ",
     ],
     notes: "",
+};
+
+pub static GEOREFERENCE: Section = Section {
+    path: "georeference",
+    heading: "`[georeference]`",
+    summary: "where on a map the picture lies",
+    about: "For orthographic cameras that look down, and for perspective ones that look straight down: the cube and its exports say where \
+            on a map each pixel is, so that QGIS places the picture.",
+    keys: &[
+        Key::required("crs", Text, "The coordinate reference system of the map: `\"EPSG:32631\"` or the like, or WKT."),
+        Key::optional(
+            "origin",
+            Vector,
+            "`[0, 0, 0]`: the scene has the map's coordinates",
+            "Easting, northing and height of the scene's origin.",
+        )
+        .unit("m"),
+        Key::default("up", Direction, "[0, 1, 0]", "Where up is in the scene."),
+        Key::optional(
+            "north",
+            Direction,
+            "`[0, 0, -1]`; `[0, 1, 0]` where `up` is z",
+            "Where the map's northing grows; made level.",
+        ),
+        Key::default(
+            "ground",
+            Number,
+            "0",
+            "Height of the level ground on which pixels are placed. What stands higher is seen displaced, as in any picture that is no \
+             orthophoto; under an orthographic camera that looks straight down nothing is.",
+        )
+        .unit("m"),
+    ],
+    later: &[],
+    at: "georeference",
+    examples: &[
+        r#"
+[camera.orthographic]
+position = [0, 0, 100]
+look_at = [0, 0, 0]
+up = [0, 1, 0]
+width = 64
+
+[georeference]
+crs = "EPSG:32631"
+origin = [650000, 4800000, 120]
+up = [0, 0, 1]
+north = [0, 1, 0]
+ground = 120
+"#,
+    ],
+    notes: "One unit of the scene is one of the map: metres, in most. Large coordinates lose nothing, in the scene or as `origin`.",
 };
 
 pub static CHANNELS: Section = Section {
