@@ -296,9 +296,9 @@ fn tan_half(fields: &Fields, size: DVec2) -> Option<DVec2> {
             1e-3 * pitch? / focal?
         }
         [_, _, Some(ifov), _] => {
-            const MOST: f64 = 1000.0 * PI;
-            let angle =
-                ifov.number_where(|v| v > 0.0 && v < MOST, "between 0 and 1000π milliradians, both excluded")?;
+            // Less than half a turn, whose tangent is none.
+            let range = "greater than 0 and at most 3000 milliradians";
+            let angle = ifov.number_where(|v| v > 0.0 && v <= 3000.0, range)?;
             2.0 * (0.5e-3 * angle).tan()
         }
         [_, _, _, Some(_)] => {

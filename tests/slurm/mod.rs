@@ -227,19 +227,19 @@ fn an_array_render_is_byte_equal_to_the_one_machine_render() {
     place.ends_with_the_same_bytes("64");
 }
 
-/// With `--uncertainty` the cube has an array more, of which every task writes its part.
+/// With `--uncertainty` the cube has an array more, with `--layers` some, of which every task writes its part.
 #[test]
 fn an_array_job_makes_standard_errors_too() {
     let Some(place) = Place::new(2, 2) else { return };
-    place.submit(&["--spp", "128", "--tasks", "4", "--uncertainty"]);
-    place.ends_with_the_bytes_of(&["--spp", "128", "--uncertainty"]);
-    let [radiance, error] = ["radiance", "standard_error"].map(|array| {
-        straight(&["--spp", "128", "--uncertainty"])
+    place.submit(&["--spp", "128", "--tasks", "4", "--uncertainty", "--layers", "depth,object"]);
+    place.ends_with_the_bytes_of(&["--spp", "128", "--uncertainty", "--layers", "depth,object"]);
+    let [radiance, error, depth] = ["radiance", "standard_error", "depth"].map(|array| {
+        straight(&["--spp", "128", "--uncertainty", "--layers", "depth,object"])
             .keys()
             .filter(|name| name.starts_with(&format!("{array}/c/")))
             .count()
     });
-    assert_eq!((radiance, error), (64, 64));
+    assert_eq!((radiance, error, depth), (64, 64, 64));
     // Going on without it would be another cube.
     let output = place.run(&[&["submit", "--resume", "--spp", "256"], SUBMIT].concat());
     assert!(

@@ -163,7 +163,7 @@ const A_PUSHBROOM: &str = r#"
 [camera.pushbroom]
 lines = "track.csv"
 up = [0, 0, 1]
-north = [0, 1, 0]
+north = [1, 0, 0]
 ifov = 0.5
 
 [film]
@@ -242,8 +242,27 @@ const A_DISTORTION: &str = r#"
 position = [0, -4, 1.5]
 look_at = [0, 0, 0.5]
 up = [0, 0, 1]
-fov = 60
+fov = 40
 distortion = { k1 = -0.28, k2 = 0.07, k3 = 0.0, p1 = 2e-4, p2 = -1e-5 }
+"#;
+const A_LENS_BY_IFOV: &str = r#"
+[camera.thin_lens]
+position = [0, -4, 1.5]
+look_at = [0, 0, 0.5]
+up = [0, 0, 1]
+ifov = 8
+aperture_radius = 0.01
+focus_distance = 4
+"#;
+const A_LENS_BY_GROUND: &str = r#"
+[camera.thin_lens]
+position = [0, -4, 1.5]
+look_at = [0, 0, 0.5]
+up = [0, 0, 1]
+ground_sampling_distance = 0.03
+altitude = 4
+aperture_radius = 0.01
+focus_distance = 4
 "#;
 const A_DISTORTED_LENS: &str = r#"
 [camera.thin_lens]
@@ -301,7 +320,7 @@ const PIXEL_PITCH: Key = Key::required("pixel_pitch", Number, "Distance of the c
 const IFOV: Key = Key::required("ifov", Number, "The angle that a pixel in the middle of the picture sees.")
     .unless(OTHERWISE_SEEN)
     .unit("mrad")
-    .range("(0, 1000π)");
+    .range("(0, 3000]");
 const GROUND_SAMPLING_DISTANCE: Key = Key::required(
     "ground_sampling_distance",
     Number,
@@ -378,7 +397,7 @@ pub static THIN_LENS: Section = Section {
     ],
     later: &[],
     at: "camera.thin_lens",
-    examples: &[A_THIN_LENS, BY_LENS, A_DISTORTED_LENS],
+    examples: &[A_THIN_LENS, BY_LENS, A_LENS_BY_IFOV, A_LENS_BY_GROUND, A_DISTORTED_LENS],
     notes: "",
 };
 
@@ -561,16 +580,16 @@ pub static GEOREFERENCE: Section = Section {
     examples: &[
         r#"
 [camera.orthographic]
-position = [0, 0, 100]
+position = [0, 100, 0]
 look_at = [0, 0, 0]
-up = [0, 1, 0]
+up = [0, 0, -1]
 width = 64
 
 [georeference]
 crs = "EPSG:32631"
 origin = [650000, 4800000, 120]
-up = [0, 0, 1]
-north = [0, 1, 0]
+up = [0, 1, 0]
+north = [0, 0, -1]
 ground = 120
 "#,
     ],
