@@ -61,7 +61,8 @@ pub fn write(view: &View, path: &Path, progress: &mut Progress) -> Result<Vec<Pa
     if let Some((crs, _)) = view.georeference().filter(|(crs, _)| !crs.starts_with("EPSG:")) {
         let name: String = crs.chars().take(40).collect();
         let what = format!(
-            "a GeoTIFF needs the number of its reference system, and the scene has {name}…: write georeference.crs = \"EPSG:…\", or export to ENVI or Zarr"
+            "a GeoTIFF needs the number of its reference system, and the scene has {name}…: write \
+             georeference.crs = \"EPSG:…\", or export to ENVI or Zarr"
         );
         return Err(Error::Usage(format!("{}: {what}", path.display())));
     }

@@ -39,7 +39,10 @@ pub fn decode(item: &Item, camera: Option<&Camera>, film: Option<&Film>) -> Opti
         Projection::Perspective { .. } | Projection::ThinLens { .. } => {
             let off = (-camera.forward.dot(up)).clamp(-1.0, 1.0).acos().to_degrees();
             item.error_help(
-                format!("goes with a perspective camera that looks straight down, along -`up`, but this one looks {off:.4} degrees off: its pixels lie in no regular grid on a map"),
+                format!(
+                    "goes with a perspective camera that looks straight down, along -`up`, but this one looks {off:.4} degrees \
+                     off: its pixels lie in no regular grid on a map"
+                ),
                 "let it look straight down, or take camera.orthographic; `--layers coordinates` says where each pixel is",
             );
             return None;
