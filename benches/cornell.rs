@@ -110,6 +110,7 @@ fn render(scene: &Scene, samples: u32, seed: u64, output: &Path) -> Result<(Cube
         seed,
         tile: None,
         uncertainty: false,
+        layers: Vec::new(),
         stop: StopRule { samples: Some(samples), ..StopRule::default() },
         preview: None,
         profile: false,

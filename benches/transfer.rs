@@ -34,7 +34,7 @@ fn main() -> Result<()> {
         &[set("film.width", &size), set("film.height", &size), set("channels.equal.count", &channels.to_string())],
     )?;
     let prepared = Arc::new(Prepared::new(&scene, 0)?);
-    let header = plan::header(&scene, [TILE; 2], 0, false);
+    let header = plan::header(&scene, [TILE; 2], 0, false, &[]).expect("a header");
     let mut worker = Worker::new(Arc::new(Gpu::open()?), Arc::clone(&prepared), [TILE; 2], Budget::default())?;
     let unit: UnitRect = [0, 0, TILE, TILE];
     // Compiles everything.

@@ -8,7 +8,7 @@ import os
 import shutil
 import sys
 import tempfile
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from . import _spectile, _work
@@ -70,6 +70,7 @@ def render(
     seed: int = 0,
     uncertainty: bool = False,
     factored: bool = False,
+    layers: Iterable[str] = (),
     resume: bool = False,
     overwrite: bool = False,
     tiles: tuple[int, int] | range | None = None,
@@ -91,6 +92,7 @@ def render(
         of every channel is so small; the first that is reached, at the end of an epoch. Without any, 64 samples (512 with `uncertainty`).
     uncertainty: also store the standard error of every value.
     factored: keep weights of products of spectra instead of radiance, of which `relight` makes cubes under other lamps and paints.
+    layers: names of what of the first surface behind each pixel is stored too, such as ["depth", "normal", "material"].
     resume: go on with a cube that an earlier render of the same scene has begun. overwrite: replace a cube that is there.
     tiles: (a, b), the tiles a to b - 1 alone. size: (width, height) in place of the film's. tile: side of the tiles in pixels.
     devices: "all", a number, or positions as `devices` lists them. memory: bytes of each device that may be used, or text such as "2GiB".
@@ -157,6 +159,7 @@ def _arguments(path: str, settings: Mapping[str, Any]) -> list[str]:
         "time": _work.seconds(settings["time"]),
         "size": _work.pair(settings["size"]),
         "tiles": tiles,
+        "layers": ",".join([settings["layers"]] if isinstance(settings["layers"], str) else settings["layers"]) or None,
         "preview": None if preview is None else os.fspath(preview),
         **{name: bool(settings[name]) for name in ("uncertainty", "factored", "resume", "overwrite")},
         **{name: settings[name] for name in ("spp", "error", "tile", "memory", "exposure")},

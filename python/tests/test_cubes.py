@@ -32,6 +32,14 @@ def test_engine_and_guess_open_what_zarr_holds(cube):
     assert "overview" not in part
 
 
+def test_layers_lie_beside_the_radiance(tmp_path):
+    found = sp.render(ball(), tmp_path / "cube.zarr", spp=1, layers=["material", "depth"])
+    assert found.depth.dims == ("y", "x") and found.material.dtype == numpy.int32 and "normal" not in found
+    assert numpy.array_equal(found.depth.isnull().values, found.material.values < 0)
+    with pytest.raises(sp.UsageError, match="layers are depth, normal"):
+        sp.render(ball(), tmp_path / "none.zarr", spp=1, layers=["depht"])
+
+
 @pytest.mark.skipif(not os.path.exists("/proc/self/io"), reason="asks Linux what was read")
 def test_a_cube_of_a_gibibyte_is_opened_without_reading_it(tmp_path):
     scene = ball(film={"width": 1024, "height": 1024}, channels={"equal": {"from": 400, "to": 700, "count": 256}})

@@ -4,6 +4,10 @@
 @group(1) @binding(1) var<storage, read> units: array<vec4<u32>>;
 @group(1) @binding(2) var<storage, read_write> states: array<vec4<u32>>;
 @group(1) @binding(3) var<storage, read_write> heads: array<vec$HEAD_WORDS<u32>>;
+#if CAMERA_PUSHBROOM
+// Of each line of a scanner: where it is, and forward, right and nose.
+@group(0) @binding(1) var<storage, read> lines: array<vec4<f32>>;
+#endif
 #if SCALED
 @group(1) @binding(7) var<storage, read_write> throughputs: array<f32>;
 #endif
@@ -26,6 +30,26 @@ fn inverse_erf(x: f32) -> f32 {
 fn gaussian_offset(u: f32) -> f32 {
     // erf(2 / (0.5 sqrt 2)) = 0.99993666.
     return 0.70710678 * inverse_erf((2.0 * u - 1.0 + 5.9604645e-8) * 0.99993666);
+}
+#endif
+
+#if DISTORTION
+// Where a pinhole would have what the lens shows at `seen`, y down: Newton's method on Brown's equations, as `scene::Distortion` has them.
+fn before_lens(seen: vec2<f32>) -> vec2<f32> {
+    let k = vec3<f32>(bitcast<f32>(LENS_K1), bitcast<f32>(LENS_K2), bitcast<f32>(LENS_K3));
+    let p = vec2<f32>(bitcast<f32>(LENS_P1), bitcast<f32>(LENS_P2));
+    var at = seen;
+    for (var i = 0; i < 12; i++) {
+        let r2 = dot(at, at);
+        let radial = 1.0 + r2 * (k.x + r2 * (k.y + r2 * k.z));
+        let slope = 2.0 * (k.x + r2 * (2.0 * k.y + r2 * 3.0 * k.z));
+        let off = at * radial + 2.0 * at.x * at.y * p + p.yx * (r2 + 2.0 * at * at) - seen;
+        let across = at.x * at.y * slope + 2.0 * (p.x * at.x + p.y * at.y);
+        let along = radial + at * at * slope + vec2<f32>(2.0 * p.x * at.y + 6.0 * p.y * at.x, 6.0 * p.x * at.y + 2.0 * p.y * at.x);
+        let determinant = along.x * along.y - across * across;
+        at -= vec2<f32>(along.y * off.x - across * off.y, along.x * off.y - across * off.x) / determinant;
+    }
+    return at;
 }
 #endif
 
@@ -66,7 +90,34 @@ fn generate_camera(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 #endif
     let from_centre = vec2<f32>(2 * vec2<i32>(pixel) - vec2<i32>(frame.film_size));
     let screen = (from_centre + 2.0 * in_pixel) / frame.film_size * vec2<f32>(1.0, -1.0) * frame.half_size;
+#if CAMERA_PUSHBROOM
+    // Where the scanner is at this moment of the line's exposure: between two lines, or beyond the first or last.
+    let moment = in_pixel.y - 0.5;
+    let row = i32(pixel.y);
+    let first = clamp(row + i32(floor(moment)), 0, i32(LINES) - 2);
+    let share = moment + f32(row - first);
+    let at = 4u * u32(first);
+    let origin = mix(lines[at].xyz, lines[at + 4u].xyz, share);
+    let forward = mix(lines[at + 1u].xyz, lines[at + 5u].xyz, share);
+    let right = mix(lines[at + 2u].xyz, lines[at + 6u].xyz, share);
+    let nose = mix(lines[at + 3u].xyz, lines[at + 7u].xyz, share);
+    let along = 2.0 * random_pair(key, DIMENSION_LENS, index, wave.epoch_mask).x - 1.0;
+    let direction = normalize(forward + screen.x * right + along * frame.half_size.y * nose);
+#else
+#if CAMERA_LATLONG
+    // Longitude and latitude in turns; whole ones more make them positive.
+    let longitude = unit_circle(screen.x + 1.0);
+    let latitude = unit_circle(screen.y + 1.0);
+    let origin = frame.camera_position;
+    let level = longitude.x * frame.camera_forward + longitude.y * frame.camera_right;
+    let direction = normalize(latitude.x * level + latitude.y * frame.camera_up);
+#else
+#if DISTORTION
+    let pinhole = before_lens(screen * vec2<f32>(1.0, -1.0)) * vec2<f32>(1.0, -1.0);
+    let across = pinhole.x * frame.camera_right + pinhole.y * frame.camera_up;
+#else
     let across = screen.x * frame.camera_right + screen.y * frame.camera_up;
+#endif
 
 #if CAMERA_ORTHOGRAPHIC
     let origin = frame.camera_position + across;
@@ -80,6 +131,8 @@ fn generate_camera(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 #else
     let origin = frame.camera_position;
     let direction = normalize(frame.camera_forward + across);
+#endif
+#endif
 #endif
 #endif
 

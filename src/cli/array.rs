@@ -65,7 +65,8 @@ fn scene_of(job: &Job) -> Result<Scene> {
             node_name()
         )));
     }
-    Ok(if job.factored { scene.factored() } else { scene })
+    let scene = if job.factored { scene.factored() } else { scene };
+    Ok(if job.layers.is_empty() { scene } else { scene.with_first_hits() })
 }
 
 /// An error that names the node where it came up.
@@ -165,6 +166,7 @@ fn render(cube: &Path, job: &Job, number: u32, interrupt: &std::sync::Arc<Interr
         seed: job.seed,
         tile: job.tile,
         uncertainty: job.uncertainty,
+        layers: job.layers.clone(),
         stop: StopRule { samples: Some(job.samples), ..StopRule::default() },
         preview: None,
         profile: false,

@@ -7,12 +7,14 @@ use serde_json::{Value, json};
 
 use super::Output;
 use super::bands::Bands;
-use crate::cube::{Cube, Quantity, Rect, View, White};
+use crate::cube::{Cube, Layer, Quantity, Rect, View, White};
+use crate::export::layers::{self, LayerView};
 use crate::export::{self, Shown};
-use crate::format::envi::Interleave;
+use crate::format::envi::{self, Interleave};
 use crate::format::png::PICTURE;
 use crate::spectral::Channels;
 use crate::spectral::colour::{Observer, Projection};
+use crate::spectral::temperature::{THERMAL_NM, is_thermal};
 use crate::spectral::tone::Tone;
 use crate::{Error, Result, files, scene};
 
@@ -21,6 +23,7 @@ use crate::{Error, Result, files, scene};
 /// envi: raw numbers and a header with wavelengths, widths, units and names (ENVI, QGIS, GDAL, Spectral Python).
 /// exr: spectral OpenEXR, a channel a band, and R, G, B for viewers that know nothing of spectra.
 /// zarr: a compressed Zarr v3 store with coordinates (xarray); smaller than the cube, and good to read band by band.
+/// tif: GeoTIFF, 32-bit numbers band by band (QGIS, GDAL); with its place on a map where the scene has a georeference.
 /// csv: a line a pixel, a column a band.
 /// png: the preview of the cube as an 8-bit sRGB picture. It shows the colours an eye would see where the channels cover
 /// the visible (CIE 1931), else three channels as red, green and blue (channels.false_colour in the scene). Other colours:
@@ -69,6 +72,7 @@ pub struct Args {
 
     /// Brightness temperatures in K: of the black body with the radiance of each channel
     ///
+    /// Channels below 2.5 um are refused unless --bands names them: what is seen there is light, not how warm something is.
     /// For a PNG: of the chosen bands together, in a perceptually uniform colour map.
     #[arg(long, conflicts_with_all = ["integrated", "xyz", "standard_error"])]
     pub temperature: bool,
@@ -82,6 +86,14 @@ pub struct Args {
     #[arg(long, value_name = "WHITE", conflicts_with_all = ["integrated", "xyz", "temperature", "standard_error"])]
     pub reflectance: Option<String>,
 
+    /// Layers of the cube instead of radiances: depth, normal, object, material, coordinates, sun, separated by commas
+    ///
+    /// Of a cube that was rendered with --layers, into ENVI, OpenEXR or CSV: a band for each number, named depth, normal.x and so on.
+    /// Where nothing is seen it is NaN (-9999 in ENVI, empty in CSV). A cube is a Zarr store already, and holds them as arrays.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = super::render::parse_layer)]
+    #[arg(conflicts_with_all = ["bands", "temperature", "reflectance", "xyz", "standard_error", "integrated", "blocks", "statistics"])]
+    pub layers: Vec<Layer>,
+
     /// X, Y and Z instead of the bands, for the standard observer of this year
     ///
     /// Divided by the integral of ybar: a constant 1 W m-2 sr-1 nm-1 has Y = 1.
@@ -94,6 +106,13 @@ pub struct Args {
     /// A Zarr store gets both without asking.
     #[arg(long, conflicts_with = "xyz")]
     pub standard_error: bool,
+
+    /// A line a band instead of a line a pixel, in CSV: how many pixels are rendered, and of their values least, greatest, mean and standard
+    /// deviation
+    ///
+    /// Of the bands, pixels and quantity that are asked for.
+    #[arg(long, conflicts_with = "blocks")]
+    pub statistics: bool,
 
     /// Radiance of the channels in W m-2 sr-1: their means times their widths (or the integrals of their responses)
     ///
@@ -165,6 +184,8 @@ pub enum Format {
     Exr,
     /// Compressed Zarr v3 (.zarr)
     Zarr,
+    /// GeoTIFF (.tif)
+    Tif,
     /// Table of spectra (.csv)
     Csv,
 }
@@ -185,9 +206,15 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     }
     let output = &Said { output, aside: to_standard_output };
     let cube = Cube::open(&args.cube)?;
+    if args.temperature && args.bands.is_none() {
+        refuse_without_heat(&args.cube, &cube)?;
+    }
     if format == Format::Png {
         PICTURE.check_target(&args.output)?;
         return write_png(args, &cube, output);
+    }
+    if !args.layers.is_empty() {
+        return write_layers(args, &cube, format, output);
     }
     let mut view = view(args, &cube, output)?;
     let white_cube;
@@ -216,6 +243,8 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
             export::Format::Exr { strict_units: args.exr_strict_units, split }
         }
         Format::Zarr => export::Format::Zarr { shards: !args.zarr_no_shards },
+        Format::Csv if args.statistics => export::Format::Statistics,
+        Format::Tif => export::Format::Tiff,
         Format::Csv | Format::Png => export::Format::Csv,
     };
     match args.blocks {
@@ -243,6 +272,15 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
             image.display()
         ))?;
     }
+    if let (export::Format::Envi { .. }, Some((crs, affine))) = (format, view.georeference()) {
+        let is_placed =
+            envi::map_info(crs, affine).is_some_and(|info| !info.contains("Arbitrary")) || !crs.starts_with("EPSG:");
+        if !is_placed {
+            output.output.warn(&format!(
+                "an ENVI header has no word for {crs} and where the picture lies in it: a GeoTIFF (.tif) says both"
+            ))?;
+        }
+    }
     report(args, &view, format, &files, missing, output)
 }
 
@@ -266,11 +304,37 @@ impl Said<'_> {
     }
 }
 
+/// Refuses to tell temperatures of channels in which no heat is seen.
+fn refuse_without_heat(path: &Path, cube: &Cube) -> Result<()> {
+    let channels = cube.channels();
+    let cold: Vec<usize> = (0..channels.len()).filter(|&k| !is_thermal(channels, k)).collect();
+    let Some(&first) = cold.first() else { return Ok(()) };
+    let from = THERMAL_NM / 1000.0;
+    let instead = match (0..channels.len())
+        .filter(|&k| is_thermal(channels, k))
+        .map(|k| channels.bounds[k][1])
+        .reduce(f64::max)
+    {
+        Some(to) => format!("choose the others, with --bands {from}um..{}um", (to / 1000.0).ceil()),
+        None => "its channels are all of that kind".to_owned(),
+    };
+    Err(Error::Usage(format!(
+        "{}: no heat is seen in {} of its {} channels, such as {}, which lie below {from} um: a temperature of them says nothing; \
+         {instead}, or name those that are meant with --bands",
+        path.display(),
+        cold.len(),
+        channels.len(),
+        channels.names[first]
+    )))
+}
+
 /// Options that mean nothing for the format are mistakes.
 fn check_options(args: &Args, format: Format) -> Result<()> {
     let given = [
         ("--interleave", args.interleave.is_some(), vec![Format::Envi]),
-        ("--reflectance", args.reflectance.is_some(), vec![Format::Envi, Format::Zarr, Format::Csv]),
+        ("--reflectance", args.reflectance.is_some(), vec![Format::Envi, Format::Zarr, Format::Tif, Format::Csv]),
+        ("--statistics", args.statistics, vec![Format::Csv]),
+        ("--layers", !args.layers.is_empty(), vec![Format::Envi, Format::Exr, Format::Csv]),
         ("--exr-split", args.exr_split.is_some(), vec![Format::Exr]),
         ("--exr-strict-units", args.exr_strict_units, vec![Format::Exr]),
         ("--zarr-no-shards", args.zarr_no_shards, vec![Format::Zarr]),
@@ -278,11 +342,19 @@ fn check_options(args: &Args, format: Format) -> Result<()> {
         ("--observer", args.observer.is_some(), vec![Format::Png]),
         ("--colour-map", args.colour_map, vec![Format::Png]),
         ("--range", args.range.is_some(), vec![Format::Png]),
-        ("--xyz", args.xyz.is_some(), vec![Format::Envi, Format::Zarr, Format::Csv]),
-        ("--temperature", args.temperature, vec![Format::Png, Format::Envi, Format::Zarr, Format::Csv]),
-        ("--standard-error", args.standard_error, vec![Format::Envi, Format::Exr, Format::Zarr, Format::Csv]),
-        ("--integrated", args.integrated, vec![Format::Png, Format::Envi, Format::Exr, Format::Zarr, Format::Csv]),
-        ("--blocks", args.blocks.is_some(), vec![Format::Envi, Format::Exr, Format::Zarr, Format::Csv]),
+        ("--xyz", args.xyz.is_some(), vec![Format::Envi, Format::Zarr, Format::Tif, Format::Csv]),
+        ("--temperature", args.temperature, vec![Format::Png, Format::Envi, Format::Zarr, Format::Tif, Format::Csv]),
+        (
+            "--standard-error",
+            args.standard_error,
+            vec![Format::Envi, Format::Exr, Format::Zarr, Format::Tif, Format::Csv],
+        ),
+        (
+            "--integrated",
+            args.integrated,
+            vec![Format::Png, Format::Envi, Format::Exr, Format::Zarr, Format::Tif, Format::Csv],
+        ),
+        ("--blocks", args.blocks.is_some(), vec![Format::Envi, Format::Exr, Format::Zarr, Format::Tif, Format::Csv]),
     ];
     let name = |format: Format| format.to_possible_value().map(|v| v.get_name().to_owned()).unwrap_or_default();
     match given.iter().find(|(_, is_given, formats)| *is_given && !formats.contains(&format)) {
@@ -397,6 +469,37 @@ fn report(
         output.text(&format!("{missing} of {tiles} tiles have no samples yet\n"))?;
     }
     Ok(())
+}
+
+/// Writes layers instead of radiances.
+fn write_layers(args: &Args, cube: &Cube, format: Format, output: &Said) -> Result<()> {
+    if args.interleave.is_some_and(|interleave| interleave != Interleave::Bil) {
+        return Err(Error::Usage("--layers are written by lines: leave --interleave out, or say bil".into()));
+    }
+    let view = LayerView::new(cube, &args.layers, args.crop)?;
+    let (of_layers, format) = match format {
+        Format::Envi => (layers::Format::Envi, export::Format::Envi { interleave: Interleave::Bil }),
+        Format::Exr => (layers::Format::Exr, export::Format::Exr { strict_units: false, split: None }),
+        _ => (layers::Format::Csv, export::Format::Csv),
+    };
+    format.check_target(&args.output)?;
+    let missing = cube.progress()?.tiles_missing();
+    let written =
+        super::progress::watched(output.output, |progress| layers::write(&view, &args.output, of_layers, progress))?;
+    let ([width, height], names) = (view.size(), view.names());
+    output.event(
+        "done",
+        json!({
+            "file": files::shown(&args.output),
+            "format": format.name(),
+            "files": written.iter().map(|path| files::shown(path)).collect::<Vec<_>>(),
+            "size": [width, height],
+            "layers": names,
+            "tiles_missing": missing[0],
+        }),
+    )?;
+    let files: Vec<String> = written.iter().map(|path| path.display().to_string()).collect();
+    output.text(&format!("{}: {width} x {height} pixels, {}\n", files.join(", "), names.join(", ")))
 }
 
 fn write_png(args: &Args, cube: &Cube, output: &Said) -> Result<()> {
@@ -525,12 +628,13 @@ fn guess(path: &Path) -> Result<Format> {
         "img" | "hdr" | "bil" | "bip" | "bsq" => Ok(Format::Envi),
         "exr" => Ok(Format::Exr),
         "zarr" => Ok(Format::Zarr),
+        "tif" | "tiff" => Ok(Format::Tif),
         "csv" => Ok(Format::Csv),
         "" if path.as_os_str() == "-" => {
             Err(Error::Usage("-o - names no format; say --format csv or --format png".into()))
         }
         _ => Err(Error::Usage(format!(
-            "{}: the extension names no format; use .png, .img, .exr, .zarr or .csv, or say --format",
+            "{}: the extension names no format; use .png, .img, .exr, .zarr, .tif or .csv, or say --format",
             path.display()
         ))),
     }

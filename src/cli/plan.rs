@@ -108,7 +108,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     let stop = StopRule { samples: Some(args.spp), ..StopRule::default() };
     let samples = stop.samples_limit(scene.integrator.epoch, false)?.unwrap_or(args.spp);
     let tile = plan::tile_size(&scene, args.scene.tile);
-    let header = plan::header(&scene, tile, 0, false);
+    let header = plan::header(&scene, tile, 0, false, &[])?;
     let budget = Budget { memory: args.memory, paths: None };
     let measured = measure_all(gpus, &prepared, &scene, tile, budget, output)?;
     let waves = match measured.first() {

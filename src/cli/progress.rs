@@ -113,7 +113,7 @@ impl<'a> Reporter<'a> {
         self.epoch = job.scene.integrator.epoch;
         let [width, height] = job.scene.film.cube_size();
         let tile = plan::tile_size(&job.scene, job.tile);
-        let disk = job.header(tile).store_bytes();
+        let disk = job.header(tile)?.store_bytes();
         let channels = job.scene.channels.len();
         let samples_limit = job.stop.samples_limit(self.epoch, job.uncertainty)?;
         self.line(&format!(

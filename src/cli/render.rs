@@ -8,7 +8,7 @@ use super::Output;
 use super::progress::Reporter;
 use super::scene::SceneArgs;
 use super::sinks::Sinks;
-use crate::cube::Existing;
+use crate::cube::{Existing, Layer};
 use crate::files::output::real_path;
 use crate::format::png::KEPT;
 use crate::gpu::adapter::Selection;
@@ -82,6 +82,16 @@ pub struct Args {
     /// cubes of it, all else reads it as it is. docs/METHOD.md says how, `spectile plan` whether a scene separates.
     #[arg(long)]
     pub factored: bool,
+
+    /// Store what the first surface behind each pixel is: depth, normal, object, material, coordinates, sun, separated by commas
+    ///
+    /// In an array each, seen through the pixel's centre (and the middle of a lens): the distance along that ray, m; the unit
+    /// normal of the geometry, on the side that is seen; the numbers of object and material, whose names stand among the array's
+    /// attributes; where it is in the scene, m; and the cosine at which the only sun or directional light shines on it, 0 in shade.
+    /// Where nothing is met they are NaN, numbers -1. What has no material, or an opacity below a half, is looked through; matter
+    /// that absorbs or scatters is not seen. They cost a few rays a pixel, once.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = parse_layer)]
+    pub layers: Vec<Layer>,
 
     /// Seed of all random numbers
     ///
@@ -199,6 +209,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     let interrupt = output.interrupt()?;
     let scene = args.scene.load()?;
     let scene = if args.factored { scene.factored() } else { scene };
+    let scene = if args.layers.is_empty() { scene } else { scene.with_first_hits() };
     let mut reporter = Reporter::new(args.quiet, output);
     for warning in &scene.warnings {
         reporter.warn(warning)?;
@@ -216,6 +227,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         tile: args.scene.tile,
         stop: StopRule { samples: args.spp, time: args.time, error: args.error },
         uncertainty: args.uncertainty,
+        layers: args.layers.clone(),
         preview: args.preview.clone().map(|file| Preview { file, exposure: args.exposure }),
         profile: args.profile,
         devices: args.devices.clone(),
@@ -253,6 +265,12 @@ pub(super) fn parse_time(text: &str) -> std::result::Result<Duration, String> {
         rest = after.trim_start();
     }
     if seconds > 0.0 { Duration::try_from_secs_f64(seconds).map_err(|_| explain()) } else { Err(explain()) }
+}
+
+/// A layer by its name.
+pub(super) fn parse_layer(text: &str) -> std::result::Result<Layer, String> {
+    let names = Layer::ALL.map(Layer::name).join(", ");
+    Layer::named(text.trim()).ok_or_else(|| format!("layers are {names}, separated by commas"))
 }
 
 /// An error estimate to reach.

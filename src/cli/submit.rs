@@ -9,7 +9,7 @@ use serde_json::json;
 use super::Output;
 use super::output::say;
 use super::scene::SceneArgs;
-use crate::cube::{Cube, Existing, Header, check_target, make, now_s};
+use crate::cube::{Cube, Existing, Header, Layer, check_target, make, now_s};
 use crate::device::prepared::Prepared;
 use crate::files::{self, format_bytes};
 use crate::render::job::StopRule;
@@ -59,6 +59,10 @@ pub struct Args {
     /// Keep weights of products of spectra instead of radiance, as `spectile render --factored` does
     #[arg(long)]
     pub factored: bool,
+
+    /// Store what the first surface behind each pixel is, as `spectile render --layers` does
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = super::render::parse_layer)]
+    pub layers: Vec<Layer>,
 
     #[command(flatten)]
     pub scene: SceneArgs,
@@ -110,6 +114,13 @@ pub struct Args {
     /// Only tasks with tiles that lack samples are submitted.
     #[arg(long)]
     pub resume: bool,
+
+    /// Replace OUT.zarr if it exists
+    ///
+    /// As `render --overwrite`: only a Spectile cube that nobody works on, of which no task waits or runs. It is gone when the new one is
+    /// made, also where submitting fails after that.
+    #[arg(long, conflicts_with = "resume")]
+    pub overwrite: bool,
 
     /// Print the script and the commands, and change nothing
     #[arg(long)]
@@ -164,6 +175,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     }
     let scene = args.scene.load()?;
     let scene = if args.factored { scene.factored() } else { scene };
+    let scene = if args.layers.is_empty() { scene } else { scene.with_first_hits() };
     for warning in &scene.warnings {
         say(&format!("warning: {warning}"));
         output.event("warning", json!({ "message": warning }))?;
@@ -174,15 +186,19 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     let stop = StopRule { samples: Some(args.spp), ..StopRule::default() };
     let samples = stop.samples_limit(scene.integrator.epoch, args.uncertainty)?.unwrap_or(args.spp);
     let tile = plan::tile_size(&scene, args.scene.tile);
-    let mut header = plan::header(&scene, tile, args.seed, args.uncertainty);
+    let mut header = plan::header(&scene, tile, args.seed, args.uncertainty, &args.layers)?;
     plan::record_evaluator(&mut header, plan::evaluator(&scene, None, args.gpus_per_task == 0)?);
     header.validate().map_err(Error::Usage)?;
-    let existing = if args.resume { Existing::Resume } else { Existing::Refuse };
+    let existing = match args.overwrite {
+        true => Existing::Replace,
+        false if args.resume => Existing::Resume,
+        false => Existing::Refuse,
+    };
     let tiles = header.grid().count();
     check_target(&cube, &header, existing, &(0..tiles))?;
     slurm::SCRIPT.check_target(&slurm::script_path(&cube))?;
     slurm::SUMMARY.check_target(&slurm::summary_path(&cube))?;
-    if args.resume {
+    if (args.resume || args.overwrite) && cube.exists() {
         refuse_while_at_work(&cube)?;
     }
 
@@ -197,6 +213,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         seed: args.seed,
         uncertainty: args.uncertainty,
         factored: args.factored,
+        layers: args.layers.clone(),
         memory: args.memory,
         allow_software: args.allow_software || args.gpus_per_task == 0,
         samples,

@@ -22,7 +22,7 @@ pub(super) fn arrays(header: &Header, layout: Layout) -> Vec<(&'static str, Valu
             format!("false colour: radiance of the channels {r}, {g}, {b} as red, green, blue")
         }
     };
-    let pixel = |side: &str| json!({ "long_name": format!("pixel centre on the full film, from the {side}"), "units": "pixel" });
+    let pixel = |side: &str| json!({ "long_name": format!("pixel on the full film, from the {side}, the first 0"), "units": "pixel" });
     let mut arrays = vec![
         (
             "radiance",
@@ -112,6 +112,17 @@ pub(super) fn arrays(header: &Header, layout: Layout) -> Vec<(&'static str, Valu
             ..Array::new("float32", &[channels, height, width], &["wavelength", "y", "x"])
         };
         arrays.push(("standard_error", errors.chunked(&[channels, tile_height, tile_width])));
+    }
+    let names = header.layer_names();
+    for layer in header.layers() {
+        let (count, pixels) = (layer.axes().len() as u64, [height, width, 3]);
+        let dimensions = if count == 1 { 2 } else { 3 };
+        let array = Array {
+            fill: layer.numbers().fill(),
+            attributes: layer.attributes(names.of(layer)),
+            ..Array::new(layer.numbers().name(), &pixels[..dimensions], &["y", "x", "xyz"][..dimensions])
+        };
+        arrays.push((layer.name(), array.chunked(&[tile_height, tile_width, 3][..dimensions])));
     }
     arrays
 }

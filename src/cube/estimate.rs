@@ -71,6 +71,7 @@ impl Totals {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cube::store::TileArray;
 
     fn record(samples: u32) -> Record {
         Record {
@@ -78,7 +79,7 @@ mod tests {
             samples,
             epoch: 0,
             suffix: 0,
-            checksums: [0; 5],
+            checksums: [0; TileArray::MOST],
             spread: vec![2.0, 0.0, 0.0],
             square: vec![9.0, 5.0, 0.0],
         }

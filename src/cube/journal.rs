@@ -1,7 +1,7 @@
 //! The journal of a tile: what its files must be, one fixed-size record for every commit.
 //!
 //! A record, little-endian: magic, tile, K, samples per pixel, index of the last epoch merged, suffix of the files aside,
-//! five 128-bit checksums (one per [`TileArray`], zero for one that the cube has not), per channel Σ M2 and Σ mean² for the error estimate, and the
+//! five 128-bit checksums (one per [`TileArray`], zero for one that the cube has not; in cubes with layers six more), per channel Σ M2 and Σ mean² for the error estimate, and the
 //! checksum of all that. Checksums are XXH3 (Y. Collet, xxHash), which finds damage and is no protection against intent.
 
 use std::fs::{self, File, OpenOptions};
@@ -14,12 +14,38 @@ use super::store::{Cube, TileArray};
 use crate::{Error, Result, files};
 
 const MAGIC: [u8; 8] = *b"SPTJRNL1";
-const HEAD_BYTES: usize = 32 + 16 * TileArray::MOST;
+/// Up to the checksums.
+const HEAD_BYTES: usize = 32;
 /// A journal that is this long is written anew with its last record only, so that it stays small beside its tile.
 const MAX_RECORDS: u64 = 16;
+
 /// The most that a journal takes.
-pub(super) const MAX_BYTES_PER_CHANNEL: u64 = MAX_RECORDS * 16;
-pub(super) const MAX_BYTES: u64 = MAX_RECORDS * (HEAD_BYTES as u64 + 16);
+pub(super) fn most_bytes(channels: usize, has_layers: bool) -> u64 {
+    MAX_RECORDS * Shape { channels, has_layers }.bytes() as u64
+}
+
+/// What decides how long a record is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Shape {
+    channels: usize,
+    has_layers: bool,
+}
+
+impl Shape {
+    /// Checksums of a record.
+    fn files(self) -> usize {
+        if self.has_layers { TileArray::MOST } else { TileArray::WITHOUT_LAYERS }
+    }
+
+    fn head_bytes(self) -> usize {
+        HEAD_BYTES + 16 * self.files()
+    }
+
+    /// Bytes of a record.
+    fn bytes(self) -> usize {
+        self.head_bytes() + 16 * self.channels + 16
+    }
+}
 
 /// What a commit says about a tile.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,29 +66,24 @@ pub(super) struct Record {
 }
 
 impl Record {
-    /// Bytes of a record of K channels.
-    pub fn bytes(channels: usize) -> usize {
-        HEAD_BYTES + 16 * channels + 16
-    }
-
-    fn encode(&self) -> Vec<u8> {
+    fn encode(&self, shape: Shape) -> Vec<u8> {
         let mut bytes = MAGIC.to_vec();
         for word in [self.tile, self.square.len() as u32, self.samples, self.epoch] {
             bytes.extend(word.to_le_bytes());
         }
         bytes.extend(self.suffix.to_le_bytes());
-        self.checksums.iter().for_each(|sum| bytes.extend(sum.to_le_bytes()));
-        bytes.resize(HEAD_BYTES, 0);
+        self.checksums[..shape.files()].iter().for_each(|sum| bytes.extend(sum.to_le_bytes()));
         bytes.extend(self.spread.iter().chain(&self.square).flat_map(|v| v.to_le_bytes()));
         let checksum = checksums::of(&bytes);
         bytes.extend(checksum.to_le_bytes());
         bytes
     }
 
-    /// `None` where the bytes are no record of this tile and so many channels, or damaged.
-    fn decode(bytes: &[u8], tile: u32, channels: usize) -> Option<Record> {
+    /// `None` where the bytes are no record of this tile and shape, or damaged.
+    fn decode(bytes: &[u8], tile: u32, shape: Shape) -> Option<Record> {
+        let channels = shape.channels;
         let (content, checksum) = bytes.split_last_chunk::<16>()?;
-        let (head, sums) = content.split_at_checked(HEAD_BYTES)?;
+        let (head, sums) = content.split_at_checked(shape.head_bytes())?;
         let word = |at: usize| u32::from_le_bytes(head[at..at + 4].try_into().expect("four bytes"));
         let valid = head[..8] == MAGIC
             && word(8) == tile
@@ -80,7 +101,7 @@ impl Record {
             samples: word(16),
             epoch: word(20),
             suffix: u64::from_le_bytes(head[24..32].try_into().expect("eight bytes")),
-            checksums: std::array::from_fn(sum_at),
+            checksums: std::array::from_fn(|i| if i < shape.files() { sum_at(i) } else { 0 }),
             spread,
             square,
         })
@@ -91,13 +112,14 @@ impl Record {
 pub(super) struct Journal {
     path: PathBuf,
     tile: u32,
-    channels: usize,
+    shape: Shape,
 }
 
 impl Journal {
     pub fn of(cube: &Cube, tile: u32) -> Journal {
         let path = cube.journal_folder().join(tile.to_string());
-        Journal { path, tile, channels: cube.channels().len() }
+        let shape = Shape { channels: cube.channels().len(), has_layers: !cube.layers().is_empty() };
+        Journal { path, tile, shape }
     }
 
     fn failed(&self, error: io::Error) -> Error {
@@ -105,7 +127,7 @@ impl Journal {
     }
 
     fn decode(&self, bytes: &[u8]) -> Option<Record> {
-        Record::decode(bytes, self.tile, self.channels)
+        Record::decode(bytes, self.tile, self.shape)
     }
 
     /// Every whole slot of the file, `None` where it is damaged, and whether the file ends with a whole valid record.
@@ -115,7 +137,7 @@ impl Journal {
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok((Vec::new(), true)),
             Err(error) => return Err(self.failed(error)),
         };
-        let slots = bytes.chunks_exact(Record::bytes(self.channels));
+        let slots = bytes.chunks_exact(self.shape.bytes());
         let whole = slots.remainder().is_empty();
         let records: Vec<_> = slots.map(|slot| self.decode(slot)).collect();
         let sound = whole && records.last().is_none_or(Option::is_some);
@@ -124,7 +146,7 @@ impl Journal {
 
     /// The last valid record: the one with the most samples, since samples never decrease.
     pub fn last(&self) -> Result<Option<Record>> {
-        let size = Record::bytes(self.channels) as u64;
+        let size = self.shape.bytes() as u64;
         let mut file = match File::open(&self.path) {
             Ok(file) => file,
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
@@ -150,19 +172,19 @@ impl Journal {
     /// somebody else writes this tile.
     pub fn append(&self, record: &Record, previous: Option<u64>) -> Result<()> {
         self.expect_tail(previous)?;
-        let size = Record::bytes(self.channels) as u64;
+        let size = self.shape.bytes() as u64;
         let existed = self.path.exists();
         let length = if existed { fs::metadata(&self.path).map_err(|e| self.failed(e))?.len() } else { 0 };
         if length >= MAX_RECORDS * size {
-            let last = self.last()?.map(|last| last.encode()).unwrap_or_default();
-            return self.replace(&[last, record.encode()].concat());
+            let last = self.last()?.map(|last| last.encode(self.shape)).unwrap_or_default();
+            return self.replace(&[last, record.encode(self.shape)].concat());
         }
         let write = || -> io::Result<()> {
             let mut file = OpenOptions::new().create(true).truncate(false).write(true).open(&self.path)?;
             step("journal opened")?;
             // A part of a record that a full disk left behind is written over.
             file.seek(SeekFrom::Start(length / size * size))?;
-            let bytes = record.encode();
+            let bytes = record.encode(self.shape);
             let (first, second) = bytes.split_at(bytes.len() / 2);
             let written = file.write_all(first).and_then(|()| step("journal half appended"));
             let written = written.and_then(|()| file.write_all(second)).and_then(|()| step("journal appended"));
@@ -189,7 +211,7 @@ impl Journal {
 
     /// Makes `record` the only one, or the journal empty.
     pub fn reset(&self, record: Option<&Record>) -> Result<()> {
-        self.replace(&record.map(Record::encode).unwrap_or_default())
+        self.replace(&record.map(|record| record.encode(self.shape)).unwrap_or_default())
     }
 
     /// Cuts what follows the last valid record.
@@ -197,7 +219,7 @@ impl Journal {
         let kept = records.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
         let cut = || -> io::Result<()> {
             let file = OpenOptions::new().write(true).open(&self.path)?;
-            file.set_len((kept * Record::bytes(self.channels)) as u64)?;
+            file.set_len((kept * self.shape.bytes()) as u64)?;
             step("journal cut")?;
             file.sync_all()
         };
@@ -237,13 +259,15 @@ impl Journal {
 mod tests {
     use super::*;
 
+    const SHAPE: Shape = Shape { channels: 3, has_layers: false };
+
     fn record(samples: u32) -> Record {
         Record {
             tile: 7,
             samples,
             epoch: 8,
             suffix: u64::from(samples) << 32 | 5,
-            checksums: [1, 2 << 100, 3, u128::MAX, 0],
+            checksums: [1, 2 << 100, 3, u128::MAX, 0, 0, 0, 0, 0, 0, 0],
             spread: vec![0.5, -0.0, 1e300],
             square: vec![9.0, 5.0, 0.0],
         }
@@ -251,23 +275,23 @@ mod tests {
 
     #[test]
     fn bytes_round_trip_and_damage_is_seen() {
-        let bytes = record(192).encode();
-        assert_eq!(bytes.len(), Record::bytes(3));
-        assert_eq!(Record::decode(&bytes, 7, 3), Some(record(192)));
-        assert_eq!(Record::decode(&bytes, 7, 2), None);
-        assert_eq!(Record::decode(&bytes, 6, 3), None);
+        let bytes = record(192).encode(SHAPE);
+        assert_eq!(bytes.len(), SHAPE.bytes());
+        assert_eq!(Record::decode(&bytes, 7, SHAPE), Some(record(192)));
+        assert_eq!(Record::decode(&bytes, 7, Shape { channels: 2, ..SHAPE }), None);
+        assert_eq!(Record::decode(&bytes, 6, SHAPE), None);
         for i in 0..bytes.len() {
             let mut damaged = bytes.clone();
             damaged[i] ^= 4;
-            assert_eq!(Record::decode(&damaged, 7, 3), None, "byte {i}");
-            assert_eq!(Record::decode(&bytes[..i], 7, 3), None, "cut at {i}");
+            assert_eq!(Record::decode(&damaged, 7, SHAPE), None, "byte {i}");
+            assert_eq!(Record::decode(&bytes[..i], 7, SHAPE), None, "cut at {i}");
         }
     }
 
     #[test]
     fn journals_grow_stay_small_and_know_their_tail() {
         let folder = tempfile::tempdir().expect("folder");
-        let journal = Journal { path: folder.path().join("7"), tile: 7, channels: 3 };
+        let journal = Journal { path: folder.path().join("7"), tile: 7, shape: SHAPE };
         assert_eq!(journal.last().expect("read"), None);
         let mut previous = None;
         for samples in 1..100 {
@@ -277,12 +301,12 @@ mod tests {
             journal.append(&record, previous).expect("appended");
             assert_eq!(journal.last().expect("read").as_ref(), Some(&record));
             let length = fs::metadata(&journal.path).expect("there").len();
-            assert!(length <= MAX_RECORDS * Record::bytes(3) as u64, "{length}");
+            assert!(length <= MAX_RECORDS * SHAPE.bytes() as u64, "{length}");
             previous = Some(record.suffix);
         }
         // A torn record is not seen, cut, and written over.
         let sound = fs::read(&journal.path).expect("read");
-        fs::write(&journal.path, [&sound[..], &record(100).encode()[..50]].concat()).expect("written");
+        fs::write(&journal.path, [&sound[..], &record(100).encode(SHAPE)[..50]].concat()).expect("written");
         assert_eq!(journal.last().expect("read"), Some(record(99)));
         let (records, sound_tail) = journal.records().expect("read");
         assert!(!sound_tail);

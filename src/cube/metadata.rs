@@ -8,6 +8,7 @@ use serde_json::{Map, Value, json};
 
 use super::arrays::{arrays, plain};
 use super::grid::Grid;
+use super::layer::{Layer, LayerNames};
 use super::weights::{GROUPS, GROUPS_WITH_UNCERTAINTY, Shape};
 use crate::spectral::product::Basis;
 use crate::spectral::{Channels, Curve, Response};
@@ -69,6 +70,14 @@ pub(super) const UNCERTAINTY: &str = "uncertainty";
 /// Of a cube that holds weights of products of spectra: which spectra.
 pub const FACTORED: &str = "factored";
 
+/// Of a cube with layers: which, and what their numbers stand for ([`LayerNames`]).
+pub const LAYERS: &str = "layers";
+
+/// Of a cube that lies on a map: the coordinate reference system, and where on the map the place x, y is, in pixels from the cube's top left
+/// corner: a x + b y + c, d x + e y + f.
+pub const CRS: &str = "crs";
+pub const AFFINE: &str = "affine";
+
 /// Of a cube that was made of another one's channels: how.
 pub(super) const DERIVED: &str = "derived";
 
@@ -106,6 +115,31 @@ impl Header {
     pub fn with_uncertainty(mut self) -> Header {
         self.attributes.insert(UNCERTAINTY.into(), Value::Bool(true));
         self
+    }
+
+    /// The same with these layers; without any, as it is.
+    pub fn with_layers(mut self, names: &LayerNames) -> Header {
+        if !names.layers.is_empty() {
+            self.attributes.insert(LAYERS.into(), json!(names));
+        }
+        self
+    }
+
+    /// What the layers' numbers stand for.
+    pub fn layer_names(&self) -> LayerNames {
+        let names = self.attributes.get(LAYERS).and_then(|value| serde_json::from_value(value.clone()).ok());
+        names.unwrap_or_default()
+    }
+
+    /// The layers that the cube has.
+    pub fn layers(&self) -> Vec<Layer> {
+        self.layer_names().layers.iter().filter_map(|name| Layer::named(name)).collect()
+    }
+
+    /// The coordinate reference system of a cube that lies on a map, and its affine transform from pixels to there.
+    pub fn georeference(&self) -> Option<(&str, [f64; 6])> {
+        let affine = serde_json::from_value(self.attributes.get(AFFINE)?.clone()).ok()?;
+        Some((self.attributes.get(CRS)?.as_str()?, affine))
     }
 
     /// Whether the cube holds weights of products of spectra instead of radiance.
@@ -163,7 +197,8 @@ impl Header {
         let channels = self.channels.len() as u64;
         let pixels = u64::from(self.tile[0]) * u64::from(self.tile[1]);
         let blocks = self.grid().tile_blocks().map(u64::from);
-        let journal = super::journal::MAX_BYTES_PER_CHANNEL * channels + super::journal::MAX_BYTES;
+        let names = self.layer_names();
+        let journal = super::journal::most_bytes(self.channels.len(), !names.layers.is_empty());
         let errors = if self.has_uncertainty() { pixels * channels * 4 } else { 0 };
         let (radiance, errors) = match self.is_factored() {
             false => (pixels * channels * 4, errors),
@@ -172,7 +207,13 @@ impl Header {
         };
         let files = [radiance, errors, pixels * 12, blocks[0] * blocks[1] * channels * 4, 4, journal];
         // Each tile has a folder of `preview`, each row of tiles one of every array.
-        let tile = files.into_iter().map(in_blocks).sum::<u64>() + BLOCK_BYTES;
+        let layers = self.layers();
+        let in_layers = layers.iter().map(|layer| in_blocks(pixels * layer.pixel_bytes() as u64) + BLOCK_BYTES);
+        let tile = files.into_iter().map(in_blocks).sum::<u64>() + BLOCK_BYTES + in_layers.sum::<u64>();
+        // Each in the attributes of the group, of its array, and in the record; three arrays' metadata, and folders.
+        let of_layers =
+            names.objects.iter().chain(&names.materials).map(|name| 4 * name.len() as u64 + 64).sum::<u64>()
+                + layers.len() as u64 * 3 * BLOCK_BYTES;
         let [_, rows] = self.grid().tiles().map(u64::from);
         // Names stand on a line each; centres, bounds and integrals are four doubles.
         let names: u64 = self.channels.names.iter().map(|name| name.len() as u64 + 16).sum();
@@ -192,7 +233,8 @@ impl Header {
             + record
             + choices
             + in_blocks(coordinates)
-            + 5 * rows * BLOCK_BYTES;
+            + in_blocks(of_layers)
+            + (5 + layers.len() as u64) * rows * BLOCK_BYTES;
         tile.saturating_mul(tiles).saturating_add(metadata)
     }
 
@@ -317,6 +359,13 @@ impl Header {
             ("origin".into(), json!(self.origin)),
             ("channel_names".into(), json!(self.channels.names)),
         ]);
+        if let Some((crs, affine)) = self.georeference() {
+            // As the conventions of GeoZarr have it.
+            let key = if crs.starts_with("EPSG:") { "proj:code" } else { "proj:wkt2" };
+            attributes.insert(key.into(), json!(crs));
+            attributes.insert("spatial:transform".into(), json!(affine));
+            attributes.insert("spatial:dimensions".into(), json!(["y", "x"]));
+        }
         if let Some(rgb) = self.channels.false_colour {
             attributes.insert("false_colour".into(), json!(rgb));
         }
@@ -446,6 +495,9 @@ impl Header {
         let responses = attributes.remove("responses").unwrap_or_else(|| json!([]));
         let responses = serde_json::from_value(responses)
             .map_err(|what| damaged(&format!("holds no valid `responses`: {what}")))?;
+        for name in ["proj:code", "proj:wkt2", "spatial:transform", "spatial:dimensions"] {
+            attributes.remove(name);
+        }
         for name in RESERVED {
             attributes.remove(name);
         }
@@ -530,7 +582,7 @@ fn unknown_format(path: &Path, format: u64) -> Error {
 }
 
 /// Attributes whose values are made of others, so that netCDF could hold them as text only.
-const STRUCTURED: [&str; 4] = ["settings", "responses", DERIVED, FACTORED];
+const STRUCTURED: [&str; 5] = ["settings", "responses", DERIVED, FACTORED, LAYERS];
 
 /// The same without values that netCDF cannot hold.
 pub fn plain_attributes(mut attributes: Map<String, Value>) -> Map<String, Value> {

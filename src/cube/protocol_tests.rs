@@ -11,7 +11,6 @@ use std::process::{Command, ExitStatus};
 
 use super::faults::injected::{DIE, FULL, LOG};
 use super::journal::Journal;
-use super::store::TileArray;
 use super::*;
 use crate::cube_files::{Files, files};
 use crate::spectral::Channels;
@@ -39,6 +38,19 @@ fn header() -> Header {
         attributes: serde_json::Map::new(),
     }
     .with_uncertainty()
+    .with_layers(&LayerNames::new(&LAYERS, vec!["objects.0".into()], Vec::new()))
+}
+
+const LAYERS: [Layer; 2] = [Layer::Normal, Layer::Object];
+
+/// What is seen in a tile.
+fn layers(grid: Grid, tile: u32) -> TileLayers {
+    let mut layers = TileLayers::empty(&LAYERS, grid);
+    for pixel in 0..100 {
+        layers.set(Layer::Normal, pixel, &[f64::from(tile), pixel as f64, 0.5]);
+        layers.set(Layer::Object, pixel, &[pixel as f64]);
+    }
+    layers
 }
 
 /// What a device would have made of a unit.
@@ -53,6 +65,9 @@ fn work(path: &Path, epochs: u32, warn: &mut dyn FnMut(String)) -> Result<()> {
     for epoch in 0..epochs {
         for tile in cube.tiles() {
             if epochs_in(cube.found()[tile as usize], 4) <= epoch {
+                if epoch == 0 {
+                    cube.lay(tile, layers(cube.cube().grid(), tile));
+                }
                 cube.merge_unit(tile, samples_before(epoch, 4), epoch_samples(epoch, 4), &unit(tile, epoch))?;
             }
         }
@@ -267,7 +282,7 @@ fn power_may_be_cut_between_any_two_steps() {
         } else if last("file in place").is_some() && last("folder synced").is_none() {
             for tile in 0..TILES {
                 let suffix = Journal::of(&cube, tile).last().expect("read").expect("a record").suffix;
-                for part in TileArray::ALL {
+                for &part in cube.parts() {
                     let (target, aside) = (cube.part_path(part, tile), cube.aside_path(part, tile, suffix));
                     let old = bench.base().join(target.strip_prefix(&path).expect("inside"));
                     if !aside.exists() && chance.below(2) == 0 {
@@ -293,7 +308,7 @@ fn damaged_files_are_found_and_made_anew() {
     let mut chance = Chance(7);
     let cube = Cube::open(&bench.base()).expect("a cube");
     let of_tile = |tile: u32| {
-        let parts = TileArray::ALL.map(|part| cube.part_path(part, tile));
+        let parts: Vec<PathBuf> = cube.parts().iter().map(|&part| cube.part_path(part, tile)).collect();
         parts.into_iter().chain([cube.journal_folder().join(tile.to_string())])
     };
     for file in (0..TILES).flat_map(of_tile) {
@@ -322,7 +337,8 @@ fn damaged_files_are_found_and_made_anew() {
             assert!(arrays(&path) == bench.expected, "{what}");
             assert_eq!(damaged.verify().expect(&what).damage, Vec::<String>::new(), "{what}");
             // What is derived from sound radiance is made anew without a word; samples that are lost are mourned.
-            let is_sampled = name.starts_with("radiance") || name.starts_with("standard_error");
+            let sampled = ["radiance", "standard_error", "normal", "object"];
+            let is_sampled = sampled.iter().any(|array| name.starts_with(array));
             let derived = !is_sampled && !name.starts_with(".spectile");
             assert!(!derived || warnings.is_empty(), "{what}: {warnings:?}");
             assert!(!is_sampled || warnings.len() == 1, "{what}: {warnings:?}");

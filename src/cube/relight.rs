@@ -75,6 +75,9 @@ pub fn relight(
             .map(|tile| {
                 let made = expand(cube, &expander, tile)?;
                 if let Some(made) = &made {
+                    if let Some(layers) = cube.tile_layers(tile)? {
+                        writer.lay(tile, layers);
+                    }
                     let errors = header.has_uncertainty().then_some(&made.errors[..]);
                     writer
                         .store_columns(tile, made.samples, &made.values, errors)

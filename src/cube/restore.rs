@@ -21,8 +21,7 @@ pub(super) fn coordinates(header: &Header) -> Vec<(&'static str, Vec<u8>)> {
     let channels = &header.channels;
     let doubles = |values: &mut dyn Iterator<Item = f64>| values.flat_map(f64::to_le_bytes).collect::<Vec<u8>>();
     let each = |value: &dyn Fn(usize) -> f64| doubles(&mut (0..channels.len()).map(value));
-    let pixels =
-        |axis: usize| doubles(&mut (0..header.size[axis]).map(|i| f64::from(header.origin[axis]) + f64::from(i) + 0.5));
+    let pixels = |axis: usize| pixels(header, axis, 0.0);
     vec![
         ("wavelength/c/0", each(&|k| channels.centre(k))),
         ("wavelength_bounds/c/0/0", doubles(&mut channels.bounds.iter().flatten().copied())),
@@ -30,6 +29,18 @@ pub(super) fn coordinates(header: &Header) -> Vec<(&'static str, Vec<u8>)> {
         ("x/c/0", pixels(0)),
         ("y/c/0", pixels(1)),
     ]
+}
+
+/// Columns or rows on the full film, from 0, `off` from each.
+fn pixels(header: &Header, axis: usize, off: f64) -> Vec<u8> {
+    (0..header.size[axis]).flat_map(|i| (f64::from(header.origin[axis] + i) + off).to_le_bytes()).collect()
+}
+
+/// Whether a coordinate's file holds `bytes`, or what older cubes have there: the places of pixels' centres instead of their numbers.
+fn is_coordinate(cube: &Cube, name: &str, bytes: &[u8]) -> bool {
+    let older = ["x/c/0", "y/c/0"].iter().position(|pixel| *pixel == name).map(|axis| pixels(cube.header(), axis, 0.5));
+    let path = cube.path().join(name);
+    is_written(&path, bytes) || older.is_some_and(|older| is_written(&path, &older))
 }
 
 /// How metadata on disk stand to those that Spectile wrote.
@@ -105,7 +116,7 @@ pub(super) fn verify(cube: &Cube) -> Result<(u64, Vec<String>)> {
     for (name, bytes) in coordinates(cube.header()) {
         if is_own(path, name, &arrays) {
             count += 1;
-            damage.extend((!is_written(&path.join(name), &bytes)).then(|| not_written(name)));
+            damage.extend((!is_coordinate(cube, name, &bytes)).then(|| not_written(name)));
         }
     }
     if !matches!(cube.origin(), Origin::Record { .. }) {
@@ -142,7 +153,7 @@ pub(super) fn restore(cube: &Cube) -> Result<()> {
     let (own_group, own_arrays) = cube.header().metadata()?;
     // Before their metadata, which decide whether they are Spectile's.
     for (name, bytes) in coordinates(cube.header()) {
-        if is_own(path, name, &own_arrays) && !is_written(&path.join(name), &bytes) {
+        if is_own(path, name, &own_arrays) && !is_coordinate(cube, name, &bytes) {
             write(name, &bytes)?;
         }
     }

@@ -195,6 +195,9 @@ pub fn integrate(
                     squares[b][1] += value * value;
                 }
             }
+            if let Some(layers) = cube.tile_layers(tile)? {
+                writer.lay(tile, layers);
+            }
             writer.store(tile, samples, &unit).map_err(|error| aside.error(error))?;
         }
         if tile % TOGETHER == TOGETHER - 1 {

@@ -11,6 +11,7 @@ use serde_json::Value;
 use super::estimate;
 use super::grid::Grid;
 use super::journal::Journal;
+use super::layer::Layer;
 use super::lock::{Probe, TileLock};
 use super::map::Chunk;
 use super::metadata::{DERIVED, Header, Layout, Recorded};
@@ -40,6 +41,8 @@ pub(super) enum TileArray {
     /// Instead of the radiance, and of the standard error, in factored cubes.
     Weights,
     Products,
+    /// Only in cubes that have it.
+    Layer(Layer),
 }
 
 impl TileArray {
@@ -49,12 +52,14 @@ impl TileArray {
     const FACTORED: [TileArray; 5] =
         [TileArray::Weights, TileArray::Samples, TileArray::Preview, TileArray::Overview, TileArray::Products];
 
-    /// Files of a tile at most.
-    pub const MOST: usize = TileArray::ALL.len();
+    /// Files of a tile at most, and at most without layers.
+    pub const MOST: usize = TileArray::WITHOUT_LAYERS + Layer::ALL.len();
+    pub const WITHOUT_LAYERS: usize = TileArray::ALL.len();
 
-    /// Those that cubes of all kinds have.
+    /// Those of cubes of all kinds.
     pub fn all() -> impl Iterator<Item = TileArray> {
-        TileArray::ALL.into_iter().chain([TileArray::Weights, TileArray::Products])
+        let layers = Layer::ALL.map(TileArray::Layer);
+        TileArray::ALL.into_iter().chain([TileArray::Weights, TileArray::Products]).chain(layers)
     }
 
     /// Its place among a tile's files.
@@ -65,6 +70,7 @@ impl TileArray {
             TileArray::Preview => 2,
             TileArray::Overview => 3,
             TileArray::StandardError | TileArray::Products => 4,
+            TileArray::Layer(layer) => TileArray::WITHOUT_LAYERS + layer as usize,
         }
     }
 
@@ -82,6 +88,7 @@ impl TileArray {
             TileArray::StandardError => "standard_error",
             TileArray::Weights => "weights",
             TileArray::Products => "products",
+            TileArray::Layer(layer) => layer.name(),
         }
     }
 }
@@ -93,6 +100,8 @@ pub struct Cube {
     layout: Layout,
     origin: Origin,
     projection: Projection,
+    parts: Vec<TileArray>,
+    layers: Vec<Layer>,
     expander: OnceLock<Expander>,
 }
 
@@ -175,7 +184,14 @@ impl Cube {
 
     pub(super) fn new(path: &Path, header: Header, layout: Layout, origin: Origin) -> Cube {
         let projection = Projection::new(&header.channels);
-        Cube { path: path.to_owned(), header, layout, origin, projection, expander: OnceLock::new() }
+        let layers = header.layers();
+        let parts = match (header.is_factored(), header.has_uncertainty()) {
+            (true, _) => &TileArray::FACTORED[..],
+            (false, true) => &TileArray::ALL,
+            (false, false) => &TileArray::ALL[..4],
+        };
+        let parts = parts.iter().copied().chain(layers.iter().copied().map(TileArray::Layer)).collect();
+        Cube { path: path.to_owned(), header, layout, origin, projection, parts, layers, expander: OnceLock::new() }
     }
 
     /// A cube that this version has just made.
@@ -380,12 +396,13 @@ impl Cube {
     }
 
     /// The parts that each tile of this cube has.
-    pub(super) fn parts(&self) -> &'static [TileArray] {
-        match (self.header.is_factored(), self.header.has_uncertainty()) {
-            (true, _) => &TileArray::FACTORED,
-            (false, true) => &TileArray::ALL,
-            (false, false) => &TileArray::ALL[..4],
-        }
+    pub(super) fn parts(&self) -> &[TileArray] {
+        &self.parts
+    }
+
+    /// The layers that it has.
+    pub fn layers(&self) -> &[Layer] {
+        &self.layers
     }
 
     /// The one from which all that is derived can be made, with others of [`Cube::parts`] that cannot.
@@ -483,6 +500,8 @@ impl Cube {
             TileArray::Samples => format!("{name}/c/{row}/{column}"),
             TileArray::Preview => format!("{name}/c/{row}/{column}/0"),
             TileArray::Weights | TileArray::Products => format!("{name}/c/{row}/{column}/0/0"),
+            TileArray::Layer(layer) if layer.axes().len() == 1 => format!("{name}/c/{row}/{column}"),
+            TileArray::Layer(_) => format!("{name}/c/{row}/{column}/0"),
         })
     }
 

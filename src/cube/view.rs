@@ -206,6 +206,13 @@ impl<'a> View<'a> {
         [x + self.rect.x0, y + self.rect.y0]
     }
 
+    /// Where it lies on a map, if it does: the coordinate reference system, and the affine transform of its own pixels.
+    pub fn georeference(&self) -> Option<(&'a str, [f64; 6])> {
+        let (crs, [a, b, c, d, e, f]) = self.cube.header().georeference()?;
+        let [x, y] = [self.rect.x0, self.rect.y0].map(f64::from);
+        Some((crs, [a, b, a * x + b * y + c, d, e, d * x + e * y + f]))
+    }
+
     pub fn quantity(&self) -> Quantity {
         self.quantity
     }

@@ -14,6 +14,7 @@ use super::epochs::epochs_in;
 use super::estimate::Totals;
 use super::faults::step;
 use super::journal::{Journal, Record};
+use super::layer::{Layer, TileLayers};
 use super::lock::TileLock;
 use super::map::Chunk;
 use super::merge::{UnitPass, check_portion, write_standard_errors};
@@ -42,6 +43,8 @@ pub struct Writer {
     found: Vec<u32>,
     state: Mutex<State>,
     changed: Condvar,
+    /// Layers of tiles whose first unit is about to be merged.
+    layers: Mutex<BTreeMap<u32, TileLayers>>,
     /// Held during a commit.
     committing: Mutex<()>,
     /// Held, by tile number modulo their count, while a tile is merged: a merge reads what it replaces.
@@ -151,6 +154,7 @@ impl Writer {
             found,
             state: Mutex::new(state),
             changed: Condvar::new(),
+            layers: Mutex::default(),
             committing: Mutex::new(()),
             merging: Default::default(),
             _lock: lock,
@@ -225,6 +229,11 @@ impl Writer {
         self.merge(tile, 0, samples, Unit::Columns { values, errors }, |_, samples, _| Ok(samples))
     }
 
+    /// Gives a tile its layers, in a cube that has some: before its first unit is merged.
+    pub fn lay(&self, tile: u32, layers: TileLayers) {
+        self.layers.lock().unwrap_or_else(PoisonError::into_inner).insert(tile, layers);
+    }
+
     fn merge(
         &self,
         tile: u32,
@@ -249,7 +258,12 @@ impl Writer {
         }
         let samples = samples_after(n_before, n_unit, cube.header().epoch)?;
         let aside = Aside::new(cube, tile);
-        let (record, held) = match unit {
+        let laid = match base {
+            None => self.layers.lock().unwrap_or_else(PoisonError::into_inner).remove(&tile),
+            Some(_) => None,
+        };
+        let layers = aside.write_layers(base.as_ref(), laid.as_ref())?;
+        let (mut record, held) = match unit {
             Unit::Radiance(_) | Unit::Columns { .. } => {
                 let record = aside.write(base.as_ref(), samples, n_unit, &unit)?;
                 let mapped = |part: TileArray| {
@@ -262,6 +276,7 @@ impl Writer {
             }
             Unit::Weights(unit) => (aside.write_weights(base.as_ref(), samples, n_unit, unit)?, Held::Weights),
         };
+        record.checksums[TileArray::WITHOUT_LAYERS..].copy_from_slice(&layers);
         self.insert(aside, base, record, held);
         Ok(())
     }
@@ -459,24 +474,26 @@ impl Base {
         }
     }
 
-    /// The weights of a tile of a factored cube.
-    fn weights(&self, cube: &Cube) -> Result<Weights> {
+    /// Where a file of the tile is, and what it holds.
+    fn bytes(&self, cube: &Cube, part: TileArray) -> Result<(PathBuf, Vec<u8>)> {
         let record = self.record();
-        let place = |part: TileArray| match self {
+        let path = match self {
             Base::Committed(_) => cube.part_path(part, record.tile),
             Base::Pending(pending) => cube.aside_path(part, record.tile, pending.record.suffix),
         };
-        let read = |part: TileArray| {
-            let path = place(part);
-            // A commit may just have put it into its place.
-            let bytes = fs::read(&path).or_else(|_| fs::read(cube.part_path(part, record.tile)));
-            let bytes = bytes.map_err(|error| Error::storage(&path, format!("cannot be read: {error}")))?;
-            if checksums::of(&bytes) != record.checksums[part.place()] {
-                let what = "is damaged: it is not what the journal says; --resume puts it in order";
-                return Err(Error::storage(&path, what));
-            }
-            Ok((path, bytes))
-        };
+        // A commit may just have put it into its place.
+        let bytes = fs::read(&path).or_else(|_| fs::read(cube.part_path(part, record.tile)));
+        let bytes = bytes.map_err(|error| Error::storage(&path, format!("cannot be read: {error}")))?;
+        if checksums::of(&bytes) != record.checksums[part.place()] {
+            let what = "is damaged: it is not what the journal says; --resume puts it in order";
+            return Err(Error::storage(&path, what));
+        }
+        Ok((path, bytes))
+    }
+
+    /// The weights of a tile of a factored cube.
+    fn weights(&self, cube: &Cube) -> Result<Weights> {
+        let read = |part: TileArray| self.bytes(cube, part);
         let ((path, weights), (products_path, products)) = (read(TileArray::Weights)?, read(TileArray::Products)?);
         let weights = Weights::decode(cube.header(), [(&path, &weights), (&products_path, &products)])?;
         weights.ok_or_else(|| Error::storage(&path, "is damaged: it does not belong to the products beside it"))
@@ -540,7 +557,7 @@ impl<'a> Aside<'a> {
             samples,
             epoch: epochs_in(samples, cube.header().epoch).saturating_sub(1),
             suffix: self.suffix,
-            checksums: [radiance, samples_sum, preview, overview, errors],
+            checksums: checksums_of([radiance, samples_sum, preview, overview, errors]),
             spread,
             square,
         })
@@ -582,10 +599,26 @@ impl<'a> Aside<'a> {
             samples,
             epoch: epochs_in(samples, epoch).saturating_sub(1),
             suffix: self.suffix,
-            checksums: [weights_sum, samples_sum, preview, overview, products_sum],
+            checksums: checksums_of([weights_sum, samples_sum, preview, overview, products_sum]),
             spread,
             square,
         })
+    }
+
+    /// Writes the layers, those of the tile before or those that it begins with, and gives their checksums in the order of
+    /// [`Layer::ALL`].
+    fn write_layers(&self, base: Option<&Base>, laid: Option<&TileLayers>) -> Result<[u128; Layer::ALL.len()]> {
+        let mut checksums = [0; Layer::ALL.len()];
+        for &layer in self.cube.layers() {
+            let part = TileArray::Layer(layer);
+            let kept = base.map(|base| base.bytes(self.cube, part)).transpose()?.map(|(_, bytes)| bytes);
+            let bytes = kept.as_deref().or_else(|| laid?.of(layer));
+            let bytes = bytes.ok_or_else(|| {
+                Error::Internal(format!("tile {} begins without its layer `{}`", self.tile, layer.name()))
+            })?;
+            checksums[layer as usize] = self.file(part, |file| file.write_all(bytes))?;
+        }
+        Ok(checksums)
     }
 
     fn file(&self, part: TileArray, write: impl FnOnce(&mut Summing<File>) -> std::io::Result<()>) -> Result<u128> {
@@ -609,6 +642,11 @@ impl Drop for Aside<'_> {
             remove_aside(self.cube, self.tile, self.suffix);
         }
     }
+}
+
+/// Of a tile whose layers, if it has any, are still to come.
+fn checksums_of(files: [u128; TileArray::WITHOUT_LAYERS]) -> [u128; TileArray::MOST] {
+    std::array::from_fn(|i| files.get(i).copied().unwrap_or(0))
 }
 
 fn remove_aside(cube: &Cube, tile: u32, suffix: u64) {

@@ -13,15 +13,10 @@ use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
 use obvhs::ploc::PlocBuilder;
 use obvhs::{Boundable, BvhBuildParams};
 
-use crate::device::words::{HAS_COORDINATES, HAS_NORMALS, NONE, Primitive};
+use crate::device::words::{
+    HAS_COORDINATES, HAS_NORMALS, KIND_CYLINDER, KIND_DISK, KIND_INSTANCE, KIND_SPHERE, NONE, Primitive,
+};
 use crate::scene::{Attributes, Object, Scene, Shape};
-
-/// Kinds of primitives in the high byte of [`Primitive::tag`]; 0 is a triangle.
-const KIND_SPHERE: u32 = 1;
-const KIND_DISK: u32 = 2;
-const KIND_CYLINDER: u32 = 3;
-/// An instance: the rows of the inverse of its matrix in the places of corners.
-const KIND_INSTANCE: u32 = 4;
 
 /// The largest number of materials: ids have 24 bits beside the primitive's kind, and one stands for none.
 pub const MAX_MATERIALS: usize = (1 << 24) - 1;
@@ -276,6 +271,25 @@ impl Accel {
             DVec3::new(x, y, z)
         });
         DAffine3 { matrix3: DMat3::from_cols(a, b, c), translation: at }
+    }
+
+    /// The kind of a primitive and what it has in the places of corners, in the device's units of the world, as a part of an instance
+    /// if it is one.
+    pub fn in_world(&self, primitive: u32, instance: Option<u32>) -> (u32, [DVec3; 3]) {
+        let p = &self.primitives[primitive as usize];
+        let (kind, [a, b, c]) = (p.tag >> 24, [p.a, p.b, p.c].map(vector));
+        let Some(instance) = instance else { return (kind, [a, b, c]) };
+        let to_world = self.placement(instance);
+        let point = |p: DVec3| to_world.transform_point3(p);
+        // What is round keeps its form.
+        let scale = to_world.matrix3.x_axis.length();
+        let corners = match kind {
+            KIND_SPHERE => [point(a), scale * b, c],
+            KIND_DISK => [point(a), to_world.transform_vector3(b).normalize(), scale * c],
+            KIND_CYLINDER => [point(a), point(b), scale * c],
+            _ => [a, b, c].map(point),
+        };
+        (kind, corners)
     }
 
     /// What emits in an instance, with areas in the device units of the world.

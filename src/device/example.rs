@@ -8,9 +8,9 @@ use glam::{DAffine3, DMat3, DVec2, DVec3};
 
 use crate::device::part::{PARTS, Part};
 use crate::scene::{
-    Absorber, Assembly, Attributes, Bsdf, Component, Cone, Emission, Environment, EnvironmentMap, Field, Grid,
-    Interior, Light, Material, Medium, Mesh, Object, Phase, PhaseTable, Placement, Profile, Reflectance, Scattering,
-    Scene, Shape, Sides, Spectrum, Temperature, Texels, Texture, TextureKind, Weight,
+    Absorber, Assembly, Attributes, Bsdf, Component, Cone, Distortion, Emission, Environment, EnvironmentMap, Field,
+    Grid, Interior, Light, Material, Medium, Mesh, Object, Phase, PhaseTable, Placement, Profile, Projection,
+    Reflectance, Scattering, Scene, Shape, Sides, Spectrum, Temperature, Texels, Texture, TextureKind, Weight,
 };
 use crate::spectral::{Curve, Outside};
 
@@ -80,6 +80,17 @@ impl Exhibit {
         let radiance = self.spectrum(Curve::Constant(DARK));
         let emission = Emission { radiance, sides: Sides::Front, texture: None };
         self.scene.objects.last_mut().expect("just pushed").emission = Some(emission);
+    }
+
+    /// By nothing: the picture is the same. Cameras without a perspective have none.
+    pub fn distort(&mut self) {
+        if matches!(self.scene.camera.projection, Projection::Perspective { .. } | Projection::ThinLens { .. }) {
+            self.scene.camera.distortion.get_or_insert(Distortion { radial: [0.0; 3], tangential: [0.0; 2] });
+        }
+    }
+
+    pub fn ask_for_layers(&mut self) {
+        self.scene.first_hits = true;
     }
 
     pub fn add_black_ball(&mut self) {

@@ -42,8 +42,14 @@ const TRACING: &[Text] = &[
     Parts(Place::Generate),
 ];
 
+/// And what only kernels that save records have.
+const FOLLOWING: &[Text] = &[Parts(Place::Following)];
+
 /// One bounce of every path: of plain scenes, whose one kernel was measured as a whole, and of general ones, in stages.
 const BOUNCE: Module = module!("passes/generate_bounce.wgsl");
+
+/// What single rays meet, beside all paths.
+const FIRST_HITS: Module = module!("passes/first_hits.wgsl");
 const STAGES: &[Text] = &[Of(module!("common/wave.wgsl")), Parts(Place::Stage), Of(module!("passes/generate.wgsl"))];
 
 /// What takes spectra along records.
@@ -73,11 +79,14 @@ pub struct Kernels {
     /// Leaves the means of a wave's pixels: it evaluates all saved paths, or folds what `update` made of them. None where records are
     /// all that is wanted.
     pub evaluate: Option<Source>,
+    /// What rays of the host's choice meet, where there are layers: before a tile's first wave.
+    pub first_hits: Option<Source>,
 }
 
 impl Kernels {
     pub fn all(&self) -> impl Iterator<Item = &Source> {
-        [&self.camera, &self.bounce].into_iter().chain(&self.update).chain(&self.thin).chain(&self.evaluate)
+        let always = [&self.camera, &self.bounce].into_iter();
+        always.chain(&self.update).chain(&self.thin).chain(&self.evaluate).chain(&self.first_hits)
     }
 }
 
@@ -88,8 +97,8 @@ impl OnDevice<'_> {
         let mut evaluate = self.defines(Work::Evaluate);
         shape.define(&mut evaluate);
         let bounce = match self.is_general() {
-            true => [TRACING, STAGES].map(|texts| self.modules(texts)).concat(),
-            false => [&self.modules(TRACING)[..], &[BOUNCE]].concat(),
+            true => [TRACING, FOLLOWING, STAGES].map(|texts| self.modules(texts)).concat(),
+            false => [&self.modules(TRACING)[..], &self.modules(FOLLOWING), &[BOUNCE]].concat(),
         };
         let mut try_paths = self.defines(Work::Evaluate);
         if let Some(thinning) = &self.thinning {
@@ -111,6 +120,7 @@ impl OnDevice<'_> {
                 Evaluator::Pt => Some(compose(&self.modules(FOLD_PATHS), &evaluate)),
                 Evaluator::Factored => None,
             },
+            first_hits: self.first_hits.then(|| self.around_tracing(FIRST_HITS)),
         }
     }
 

@@ -5,8 +5,8 @@ use std::ops::Deref;
 
 use crate::device::example::Exhibit;
 use crate::device::parts::{
-    attributes, camera, geometry, heat, instances, lights, media, opacity, paths, scattering, sky, spectra, surfaces,
-    textures,
+    attributes, camera, geometry, heat, instances, layers, lights, media, opacity, paths, scattering, sky, spectra,
+    surfaces, textures,
 };
 use crate::device::prepared::Prepared;
 use crate::device::text::{Defines, Module};
@@ -50,7 +50,10 @@ pub const PARTS: &[&Part] = &[
     &instances::LIGHTS,
     &lights::NEXT_EVENT,
     &camera::THIN_LENS,
+    &camera::DISTORTION,
     &camera::ORTHOGRAPHIC,
+    &camera::LATLONG,
+    &camera::PUSHBROOM,
     &camera::GAUSSIAN,
     &paths::ROULETTE,
     &paths::SOBOL,
@@ -92,6 +95,7 @@ pub const PARTS: &[&Part] = &[
     &geometry::WINDOWS,
     &spectra::BOUNCE_BY_BOUNCE,
     &spectra::LAYOUT,
+    &layers::FIRST_HITS,
 ];
 
 impl Part {
@@ -164,6 +168,8 @@ pub enum Place {
     Traversal,
     /// All else that generating paths needs, and what one stage of that does.
     Generate,
+    /// What needs the records that such kernels save.
+    Following,
     Stage,
     Evaluate,
 }

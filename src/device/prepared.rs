@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use crate::device::accel::{Accel, Emitting, MAX_MATERIALS};
 use crate::device::emission::Emitted;
@@ -25,7 +25,9 @@ use crate::device::words::{
     EMITS_BOTH_SIDES, EMITS_BY_ANGLE, EMITS_BY_PLACE, EMITTER_IS_LAMP, Emitter, Frame, HOT_COSINES, LAMP_DIRECTIONAL,
     LAMP_POINT, LAMP_SPOT, LAMP_SUN, LOOP_LIMIT, Lamp, Material, NONE,
 };
-use crate::scene::{Attributes, Bsdf, Evaluator, Filter, Light, Projection, Reflectance, Sampler, Scene, Sides};
+use crate::scene::{
+    Attributes, Bsdf, Distortion, Evaluator, Filter, Light, Line, Projection, Reflectance, Sampler, Scene, Sides,
+};
 use crate::spectral::table::SpectralTables;
 use crate::spectral::warp::Warp;
 use crate::{Error, Result};
@@ -44,6 +46,8 @@ const MOST_STEPS: u32 = 8_192;
 pub struct Features {
     pub thin_lens: bool,
     pub orthographic: bool,
+    pub latlong: bool,
+    pub pushbroom: bool,
     pub gaussian: bool,
     pub independent: bool,
     pub emitters: bool,
@@ -107,6 +111,12 @@ pub struct Prepared {
     /// The device id of the spectrum with which a path's throughput begins, where it is not 1: weights of responses and of
     /// wavelengths.
     pub path_weight: Option<u32>,
+    /// Of a line scanner, for each line: where it is, and forward, right and nose.
+    pub lines: Vec<[[f32; 4]; 4]>,
+    /// Of the camera's lens: k1, k2, k3, p1, p2.
+    pub distortion: Option<[f32; 5]>,
+    /// Whether the host asks what single rays meet.
+    pub first_hits: bool,
     /// What records say of products of spectra, where those are kept instead of channels.
     pub separable: Option<Separable>,
     /// What keeps the scene from being rendered so, in words.
@@ -205,6 +215,11 @@ impl Prepared {
             separable,
             obstacles: separable::obstacles(scene, &heat),
             thinning: None,
+            lines: lines(scene, &accel),
+            distortion: scene.camera.distortion.map(|Distortion { radial: [k1, k2, k3], tangential: [p1, p2] }| {
+                [k1, k2, k3, p1, p2].map(|number| number as f32)
+            }),
+            first_hits: scene.first_hits,
             warp,
             accel,
             tables,
@@ -458,6 +473,8 @@ fn features(scene: &Scene, accel: &Accel, tables: &SpectralTables) -> Features {
     Features {
         thin_lens: matches!(scene.camera.projection, Projection::ThinLens { .. }),
         orthographic: matches!(scene.camera.projection, Projection::Orthographic { .. }),
+        latlong: scene.camera.projection == Projection::Latlong,
+        pushbroom: matches!(scene.camera.projection, Projection::Pushbroom { .. }),
         gaussian: scene.film.filter == Filter::Gaussian,
         independent: scene.integrator.sampler == Sampler::Independent,
         emitters: !accel.emitters.is_empty() || !accel.luminous.is_empty(),
@@ -479,6 +496,17 @@ fn fit_registers(tables: &SpectralTables, ids: &SpectrumIds) -> bool {
     !tables.has_knots() && ids.factors.len() + ids.sources.len() <= MAX_REGISTER_SPECTRA
 }
 
+/// Of a line scanner, as `generate_camera` reads them.
+fn lines(scene: &Scene, accel: &Accel) -> Vec<[[f32; 4]; 4]> {
+    let Projection::Pushbroom { lines, .. } = &scene.camera.projection else { return Vec::new() };
+    let of = |line: &Line| {
+        let [x, y, z] = accel.space.point(line.position);
+        let direction = |of: DVec3| of.as_vec3().extend(0.0).to_array();
+        [[x, y, z, 0.0], direction(line.forward), direction(line.right), direction(line.nose)]
+    };
+    lines.iter().map(of).collect()
+}
+
 fn frame(
     scene: &Scene,
     seed: u64,
@@ -494,6 +522,9 @@ fn frame(
             (tan_half, space.length(aperture_radius), space.length(focus_distance))
         }
         Projection::Orthographic { half_size } => (half_size * space.scale, 0.0, 1.0),
+        Projection::Pushbroom { half_width, half_pixel, .. } => (DVec2::new(half_width, half_pixel), 0.0, 1.0),
+        // In turns.
+        Projection::Latlong => (DVec2::new(0.5, 0.25), 0.0, 1.0),
     };
     let bounces = scene.integrator.max_bounces;
     Frame {

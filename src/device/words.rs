@@ -87,6 +87,11 @@ constants! {
         MATERIAL_MASK_IS_TEXTURE = 8;
         MASK_SHIFT = 8;
     }
+    /// Flags of what a ray meets first: its traversal gave up; less than half of all rays are stopped there.
+    FIRST_HITS {
+        FIRST_HIT_OVERFLOW = 1;
+        FIRST_HIT_OPEN = 2;
+    }
     /// [`Lobe::kind`]: what it does, in the low byte.
     LOBE_KINDS {
         LOBE_LAMBERT = 0;

@@ -82,21 +82,12 @@ pub fn check_target(path: &Path) -> Result<()> {
 }
 
 /// What stands where nothing is rendered: no radiance and no temperature is negative.
-const MISSING: f32 = -9999.0;
+pub const MISSING: f32 = -9999.0;
 
 /// Writes the data file and, last, its header beside it. `path` may name either.
 pub fn write(view: &View, path: &Path, interleave: Interleave, progress: &mut Progress) -> Result<Vec<PathBuf>> {
-    let data = data_of(path);
-    let header = header_of(&data);
     check_target(path)?;
-    check_space(&data, view.bytes())?;
-    let mut file = Replacement::create(&data, DATA)?;
-    let mut pieces = Pieces { view, reader: view.reader(), file: &mut file, values: Vec::new(), progress };
-    match interleave {
-        Interleave::Bil => pieces.by_line()?,
-        Interleave::Bip => pieces.by_pixel()?,
-        Interleave::Bsq => pieces.by_band()?,
-    }
+    check_space(&data_of(path), view.bytes())?;
     let [width, height] = view.size().map(|side| side as usize);
     let channels = view.channels();
     let each = |value: &dyn Fn(usize) -> f64| (0..channels.len()).map(value).collect();
@@ -104,6 +95,7 @@ pub fn write(view: &View, path: &Path, interleave: Interleave, progress: &mut Pr
         description: long_name(view),
         size: [width, height, channels.len()],
         interleave,
+        is_double: false,
         units: match view.quantity() {
             Quantity::Radiance | Quantity::Xyz(_) => "W m^-2 sr^-1 nm^-1",
             Quantity::Integrated => "W m^-2 sr^-1",
@@ -112,11 +104,34 @@ pub fn write(view: &View, path: &Path, interleave: Interleave, progress: &mut Pr
         },
         ignore: MISSING,
         origin: view.origin(),
-        default_bands: default_bands(view),
+        default_bands: Some(default_bands(view)),
         wavelength_nm: each(&|k| channels.centre(k)),
         fwhm_nm: each(&|k| channels.fwhm(k)),
         names: channels.names.clone(),
+        map: view.georeference(),
     };
+    write_files(path, &image, &mut |file| {
+        let mut pieces =
+            Pieces { view, reader: view.reader(), file, values: Vec::new(), progress, missing: MISSING, begin: 0 };
+        match interleave {
+            Interleave::Bil => pieces.by_line(),
+            Interleave::Bip => pieces.by_pixel(),
+            Interleave::Bsq => pieces.by_band(),
+        }
+    })
+}
+
+/// Writes the numbers of an image as `fill` does, and its header.
+pub fn write_files(
+    path: &Path,
+    image: &Image,
+    fill: &mut dyn FnMut(&mut Replacement) -> Result<()>,
+) -> Result<Vec<PathBuf>> {
+    let data = data_of(path);
+    let header = header_of(&data);
+    check_target(path)?;
+    let mut file = Replacement::create(&data, DATA)?;
+    fill(&mut file)?;
     // Both are whole before either takes its place. The data goes first: it is known by the header of the old one.
     let mut about = Replacement::create(&header, HEADER)?;
     let written = about.file().write_all(image.header().as_bytes());
@@ -127,12 +142,17 @@ pub fn write(view: &View, path: &Path, interleave: Interleave, progress: &mut Pr
     Ok(vec![data, header])
 }
 
-struct Pieces<'a, 'p> {
-    view: &'a View<'a>,
-    reader: Reader<'a>,
-    file: &'a mut Replacement,
-    values: Vec<f32>,
-    progress: &'a mut Progress<'p>,
+/// Numbers on their way into a file.
+pub(super) struct Pieces<'a, 'p> {
+    pub view: &'a View<'a>,
+    pub reader: Reader<'a>,
+    pub file: &'a mut Replacement,
+    pub values: Vec<f32>,
+    pub progress: &'a mut Progress<'p>,
+    /// Instead of NaN.
+    pub missing: f32,
+    /// Where in the file the first one goes, of [`Pieces::by_band`].
+    pub begin: u64,
 }
 
 /// `count` in pieces of at most `most`, which is taken as at least 1.
@@ -173,7 +193,7 @@ impl Pieces<'_, '_> {
     }
 
     /// [band][line][sample]: a row of tiles at a time, so that the cube is read once.
-    fn by_band(&mut self) -> Result<()> {
+    pub fn by_band(&mut self) -> Result<()> {
         let [width, height] = self.view.size().map(|side| side as usize);
         let (rect, tile) = (self.view.rect(), self.view.cube().grid().tile[1]);
         let mut y0 = rect.y0;
@@ -184,7 +204,7 @@ impl Pieces<'_, '_> {
                 self.read(rows, part.clone(), Strides { row: width, pixel: 1, band: plane })?;
                 let values = std::mem::take(&mut self.values);
                 for (band, values) in part.zip(values.chunks_exact(plane)) {
-                    let at = 4 * (band * height + (y0 - rect.y0) as usize) as u64 * width as u64;
+                    let at = self.begin + 4 * (band * height + (y0 - rect.y0) as usize) as u64 * width as u64;
                     let file = self.file.file();
                     let written =
                         file.seek(SeekFrom::Start(at)).and_then(|_| file.write_all(bytemuck::cast_slice(values)));
@@ -214,7 +234,7 @@ impl Pieces<'_, '_> {
     fn read(&mut self, rect: Rect, bands: Range<usize>, strides: Strides) -> Result<()> {
         self.values.resize(rect.pixels() as usize * bands.len(), 0.0);
         self.reader.read(rect, bands, strides, &mut self.values)?;
-        self.values.iter_mut().filter(|value| value.is_nan()).for_each(|value| *value = MISSING);
+        self.values.iter_mut().filter(|value| value.is_nan()).for_each(|value| *value = self.missing);
         Ok(())
     }
 

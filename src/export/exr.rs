@@ -205,7 +205,7 @@ fn header(view: &View, named: &[(String, Source)], strict_units: bool) -> Result
     Ok(header)
 }
 
-fn failed(path: &Path) -> impl Fn(exr::error::Error) -> Error + Copy + use<'_> {
+pub(super) fn failed(path: &Path) -> impl Fn(exr::error::Error) -> Error + Copy + use<'_> {
     move |error| match error {
         exr::error::Error::Io(error) => cannot_write(path, &error),
         error => Error::storage(path, format!("cannot be written: {error}")),

@@ -4,8 +4,11 @@
 mod blocks;
 mod envi;
 mod exr;
+pub mod layers;
 mod picture;
+mod statistics;
 mod table;
+mod tiff;
 mod zarr;
 
 use std::path::{Path, PathBuf};
@@ -37,7 +40,10 @@ pub enum Format {
         /// Several chunks in a file.
         shards: bool,
     },
+    Tiff,
     Csv,
+    /// In CSV too: a line a band.
+    Statistics,
 }
 
 impl Format {
@@ -46,7 +52,8 @@ impl Format {
             Format::Envi { .. } => "envi",
             Format::Exr { .. } => "exr",
             Format::Zarr { .. } => "zarr",
-            Format::Csv => "csv",
+            Format::Tiff => "tif",
+            Format::Csv | Format::Statistics => "csv",
         }
     }
 
@@ -56,7 +63,9 @@ impl Format {
             Format::Envi { .. } => envi::check_target(path),
             Format::Exr { .. } => exr::IMAGE.check_target(path),
             Format::Zarr { .. } => zarr::STORE.check_target(path),
+            Format::Tiff => tiff::IMAGE.check_target(path),
             Format::Csv => table::TABLE.check_target(path),
+            Format::Statistics => statistics::TABLE.check_target(path),
         }
     }
 
@@ -76,7 +85,9 @@ pub fn write(view: &View, path: &Path, format: Format, progress: &mut Progress) 
         Format::Envi { interleave } => envi::write(view, path, interleave, progress),
         Format::Exr { strict_units, split } => exr::write(view, path, strict_units, split, progress),
         Format::Zarr { shards } => zarr::write(view, path, shards, progress),
+        Format::Tiff => tiff::write(view, path, progress),
         Format::Csv => table::write(view, path, progress),
+        Format::Statistics => statistics::write(view, path, progress),
     }
 }
 

@@ -27,12 +27,16 @@ pub const STORE: Product = Product {
 /// The attribute that tells who wrote a store.
 const SOURCE: &str = "source";
 const SOURCE_BEGINS: &str = "Spectile ";
+/// The array whose attributes say where on a map a picture lies (CF, grid mappings).
+const SPATIAL_REF: &str = "spatial_ref";
 /// All arrays that stores may have.
-const ARRAYS: [&str; 10] = [
+const ARRAYS: [&str; 12] = [
     "radiance",
     "standard_error",
     "brightness_temperature",
     "xyz",
+    "reflectance",
+    SPATIAL_REF,
     "wavelength",
     "wavelength_width",
     "wavelength_bounds",
@@ -115,14 +119,21 @@ pub fn write(view: &View, path: &Path, shards: bool, progress: &mut Progress) ->
     let channels = view.channels();
     let each = |value: &dyn Fn(usize) -> f64| (0..channels.len()).map(value).collect::<Vec<f64>>();
     let ([left, top], [width, height]) = (view.origin(), view.size());
-    let centres = |from: u32, count: u32| (0..count).map(|i| f64::from(from + i) + 0.5).collect::<Vec<f64>>();
+    // On the map, where its axes are those of the picture; else the number of the pixel on the full film.
+    let along = |axis: usize, from: u32, count: u32| -> Vec<f64> {
+        let place = |i: u32| match upright(view) {
+            Some([step, first]) => first[axis] + step[axis] * (f64::from(i) + 0.5),
+            None => f64::from(from + i),
+        };
+        (0..count).map(place).collect()
+    };
     for (name, indices, values) in [
         ("wavelength", vec![0], each(&|k| channels.centre(k))),
         ("wavelength_width", vec![0], each(&|k| channels.width(k))),
         ("wavelength_bounds", vec![0, 0], channels.bounds.iter().flatten().copied().collect()),
         ("response_integral", vec![0], each(&|k| channels.integral(k))),
-        ("x", vec![0], centres(left, width)),
-        ("y", vec![0], centres(top, height)),
+        ("x", vec![0], along(0, left, width)),
+        ("y", vec![0], along(1, top, height)),
     ] {
         let bytes: Vec<u8> = bytemuck::cast_slice(&values).to_vec();
         open(name)?.put(&indices, bytes)?;
@@ -205,6 +216,14 @@ fn variable(view: &View) -> &'static str {
     }
 }
 
+/// Steps of x and y on the map from pixel to pixel, and where the first one's corner is; `None` where the picture lies on none, or is turned
+/// on it.
+fn upright(view: &View) -> Option<[[f64; 2]; 2]> {
+    let (_, [a, b, c, d, e, f]) = view.georeference()?;
+    let is_upright = b.abs() <= 1e-9 * e.abs() && d.abs() <= 1e-9 * a.abs();
+    is_upright.then_some([[a, e], [c, f]])
+}
+
 fn group(view: &View, arrays: &[(&str, Value)]) -> Value {
     let header = view.cube().header();
     let mut attributes = header.attributes.clone();
@@ -263,14 +282,27 @@ fn arrays(view: &View, layout: &Layout) -> Result<Vec<(&'static str, Value)>> {
     let coordinate = |shape: &[u64], names: &[&str], attributes: Value| {
         array("float64", shape, shape, json!([little]), names, attributes)
     };
-    let pixel = |side: &str| json!({ "long_name": format!("pixel centre on the full film, from the {side}"), "units": "pixel" });
+    let pixel = |axis: &str, side: &str| match upright(view) {
+        Some(_) => json!({
+            "standard_name": format!("projection_{axis}_coordinate"),
+            "long_name": format!("{axis} of the pixel's centre on the map"),
+            "units": "m",
+        }),
+        None => {
+            json!({ "long_name": format!("pixel on the full film, from the {side}, the first 0"), "units": "pixel" })
+        }
+    };
     let mut arrays = Vec::new();
     for of in views(view)? {
-        let attributes = json!({
+        let mut attributes = json!({
             "long_name": long_name(&of),
             "units": units(&of),
             "coordinates": "wavelength_width response_integral",
         });
+        if view.georeference().is_some() {
+            attributes["grid_mapping"] = json!(SPATIAL_REF);
+            attributes["coordinates"] = json!(format!("wavelength_width response_integral {SPATIAL_REF}"));
+        }
         let names = ["wavelength", "y", "x"];
         let shape = [bands, height, width];
         arrays.push((variable(&of), array("float32", &shape, &layout.file, codecs.clone(), &names, attributes)));
@@ -309,8 +341,16 @@ fn arrays(view: &View, layout: &Layout) -> Result<Vec<(&'static str, Value)>> {
                 json!({ "long_name": "integral of the channel's response (its width where it has none)", "units": "nm" }),
             ),
         ),
-        ("y", coordinate(&[height], &["y"], pixel("top"))),
-        ("x", coordinate(&[width], &["x"], pixel("left"))),
+        ("y", coordinate(&[height], &["y"], pixel("y", "top"))),
+        ("x", coordinate(&[width], &["x"], pixel("x", "left"))),
     ]);
+    if let Some((crs, [a, b, c, d, e, f])) = view.georeference() {
+        // As GDAL and rioxarray have them: the corner, and the steps, x first.
+        let transform = [c, a, b, f, d, e].map(|number| number.to_string()).join(" ");
+        let attributes = json!({ "crs_wkt": crs, "spatial_ref": crs, "GeoTransform": transform });
+        let mut array = array("int32", &[], &[], json!([little]), &[], attributes);
+        array["fill_value"] = json!(0);
+        arrays.push((SPATIAL_REF, array));
+    }
     Ok(arrays)
 }

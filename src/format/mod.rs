@@ -23,6 +23,7 @@ pub mod response;
 pub mod stl;
 pub mod table;
 pub mod text;
+pub mod track;
 pub mod unit;
 pub mod volume;
 pub mod zarr;

@@ -1,5 +1,7 @@
 //! Camera rays: pixel filter and projection by importance sampling, so that every sample weighs 1.
 
+use glam::DVec2;
+
 use super::primitive::Ray;
 use super::rng::Rng;
 use crate::scene::{Camera, Film, Filter, Projection};
@@ -10,27 +12,15 @@ const CUT: f64 = 2.0;
 
 /// A ray through pixel (x, y) of the full film.
 pub fn ray(camera: &Camera, film: &Film, [x, y]: [u32; 2], rng: &mut Rng) -> Ray {
-    let (px, py) =
-        (f64::from(x) + 0.5 + filter_offset(film.filter, rng), f64::from(y) + 0.5 + filter_offset(film.filter, rng));
-    // -1 … 1 across the film, y upwards.
-    let (u, v) = (2.0 * px / f64::from(film.width) - 1.0, 1.0 - 2.0 * py / f64::from(film.height));
-    let Camera { position, forward, right, up, ref projection } = *camera;
-    match *projection {
-        Projection::Perspective { tan_half } => {
-            let direction = forward + u * tan_half.x * right + v * tan_half.y * up;
-            Ray { origin: position, direction: direction.normalize() }
-        }
-        Projection::ThinLens { tan_half, aperture_radius, focus_distance } => {
-            let [lens_x, lens_y] = rng.unit_disk();
-            let lens = aperture_radius * (lens_x * right + lens_y * up);
-            let focus = focus_distance * (forward + u * tan_half.x * right + v * tan_half.y * up);
-            Ray { origin: position + lens, direction: (focus - lens).normalize() }
-        }
-        Projection::Orthographic { half_size } => {
-            let origin = position + u * half_size.x * right + v * half_size.y * up;
-            Ray { origin, direction: forward }
-        }
-    }
+    let place = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5)
+        + DVec2::new(filter_offset(film.filter, rng), filter_offset(film.filter, rng));
+    let lens = match camera.projection {
+        Projection::ThinLens { .. } => DVec2::from(rng.unit_disk()),
+        Projection::Pushbroom { .. } => DVec2::new(2.0 * rng.uniform() - 1.0, 0.0),
+        _ => DVec2::ZERO,
+    };
+    let [origin, direction] = camera.ray(film, place, lens);
+    Ray { origin, direction }
 }
 
 /// Distance from the pixel's centre along one axis, in pixels.
@@ -48,14 +38,21 @@ fn filter_offset(filter: Filter, rng: &mut Rng) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use glam::{DVec2, DVec3};
+    use glam::DVec3;
 
     use super::*;
 
     const WIDE: Film = Film { width: 400, height: 200, filter: Filter::Box, crop: [0, 0, 400, 200] };
 
     fn camera(projection: Projection) -> Camera {
-        Camera { position: DVec3::new(1.0, 2.0, 3.0), forward: DVec3::NEG_Z, right: DVec3::X, up: DVec3::Y, projection }
+        Camera {
+            position: DVec3::new(1.0, 2.0, 3.0),
+            forward: DVec3::NEG_Z,
+            right: DVec3::X,
+            up: DVec3::Y,
+            projection,
+            distortion: None,
+        }
     }
 
     /// Where a ray crosses the plane one metre in front of the camera, relative to the axis.

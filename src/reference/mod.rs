@@ -144,6 +144,7 @@ mod tests {
                 right: DVec3::X,
                 up: DVec3::Y,
                 projection: Projection::Perspective { tan_half: DVec2::splat(0.5) },
+                distortion: None,
             },
             film: Film { width: 4, height: 3, filter: Filter::Gaussian, crop: [1, 0, 4, 2] },
             channels: Channels::equal(400.0, 700.0, 2),
@@ -181,6 +182,8 @@ mod tests {
             camera_medium: None,
             lights: vec![],
             environment: Some(Environment::Uniform(1)),
+            georeference: None,
+            first_hits: false,
             warnings: vec![],
             digest: String::new(),
         }

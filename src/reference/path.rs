@@ -176,7 +176,7 @@ impl<'a> Tracer<'a> {
         let mut ray_density = None;
         path.spectra.fill(&self.gas_spectra);
         match self.scene.camera.projection {
-            Projection::Perspective { .. } => path.interiors.clone_from(&self.around_camera),
+            Projection::Perspective { .. } | Projection::Latlong => path.interiors.clone_from(&self.around_camera),
             _ => path.interiors = self.interiors_around(ray.origin),
         }
 

@@ -87,6 +87,7 @@ fn render_into(
         seed: 3,
         tile: Some(TILE),
         uncertainty: false,
+        layers: Vec::new(),
         stop: StopRule { samples: Some(samples), ..StopRule::default() },
         preview: None,
         profile: false,

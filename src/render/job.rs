@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::cube::{Existing, Header, epochs_in, whole_epochs};
+use crate::cube::{Existing, Header, Layer, epochs_in, whole_epochs};
 use crate::gpu::adapter::Selection;
 use crate::preview::Feed;
 use crate::render::plan;
@@ -51,6 +51,8 @@ pub struct Job {
     pub stop: StopRule,
     /// Whether the cube has standard errors.
     pub uncertainty: bool,
+    /// What of the first surface behind each pixel it has, of a scene [`Scene::with_first_hits`].
+    pub layers: Vec<Layer>,
     pub preview: Option<Preview>,
     pub profile: bool,
     pub devices: Selection,
@@ -82,8 +84,8 @@ impl StopRule {
 
 impl Job {
     /// What the cube is, in tiles of this size.
-    pub fn header(&self, tile: [u32; 2]) -> Header {
-        plan::header(&self.scene, tile, self.seed, self.uncertainty)
+    pub fn header(&self, tile: [u32; 2]) -> Result<Header> {
+        plan::header(&self.scene, tile, self.seed, self.uncertainty, &self.layers)
     }
 
     /// The tiles to render, of the cube that `header` describes.

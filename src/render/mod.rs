@@ -6,6 +6,7 @@ mod gather;
 pub mod interrupt;
 pub mod job;
 mod last_bounce;
+pub mod layers;
 pub mod pilot;
 pub mod plan;
 pub mod pool;

@@ -2,15 +2,16 @@
 
 use serde_json::{Map, json};
 
-use crate::cube::{self, BLOCK, Header};
+use crate::cube::{self, BLOCK, Header, Layer};
 use crate::device::evaluator;
 use crate::device::facts;
 use crate::device::part::OnDevice;
 use crate::device::prepared::Prepared;
 use crate::device::separable;
 use crate::device::windows::Windows;
+use crate::render::layers;
 use crate::render::wave::{Budget, DeviceLimits, WavePlan};
-use crate::scene::{Evaluator, Scene};
+use crate::scene::{Evaluator, Georeference, Scene};
 use crate::{Error, Result};
 
 /// Side of a tile where nothing says otherwise, in pixels.
@@ -32,8 +33,8 @@ pub fn tile_size(scene: &Scene, asked: Option<u32>) -> [u32; 2] {
     [side.min(width), side.min(height)]
 }
 
-/// The header of the cube that rendering `scene` makes, but for [`record_evaluator`].
-pub fn header(scene: &Scene, tile: [u32; 2], seed: u64, uncertainty: bool) -> Header {
+/// The header of the cube that rendering `scene` makes, but for [`record_evaluator`]. Errors: layers that the scene does not have.
+pub fn header(scene: &Scene, tile: [u32; 2], seed: u64, uncertainty: bool, layers: &[Layer]) -> Result<Header> {
     let integrator = serde_json::to_value(&scene.integrator).expect("plain values");
     let mut attributes = Map::new();
     attributes.insert("scene_digest".into(), json!(scene.digest));
@@ -45,6 +46,12 @@ pub fn header(scene: &Scene, tile: [u32; 2], seed: u64, uncertainty: bool) -> He
             "integrator": integrator,
         }),
     );
+    if let Some(Georeference { crs, affine: [a, b, c, d, e, f] }) = &scene.georeference {
+        // Of the cube, not of the full film.
+        let [x, y] = [scene.film.crop[0], scene.film.crop[1]].map(f64::from);
+        attributes.insert(cube::CRS.into(), json!(crs));
+        attributes.insert(cube::AFFINE.into(), json!([a, b, a * x + b * y + c, d, e, d * x + e * y + f]));
+    }
     let header = Header {
         size: scene.film.cube_size(),
         origin: [scene.film.crop[0], scene.film.crop[1]],
@@ -54,11 +61,12 @@ pub fn header(scene: &Scene, tile: [u32; 2], seed: u64, uncertainty: bool) -> He
         attributes,
     };
     let header = if uncertainty { header.with_uncertainty() } else { header };
-    match scene.is_factored() {
+    let header = header.with_layers(&layers::names(scene, layers)?);
+    Ok(match scene.is_factored() {
         // What does not separate is refused by `check`.
         true => header.with_weights(&separable::basis(scene).unwrap_or_default(), scene.integrator.max_bounces),
         false => header,
-    }
+    })
 }
 
 /// The evaluator for `scene` on a software device or a GPU; or the one with which the cube was begun that `there` describes, since

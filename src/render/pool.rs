@@ -10,7 +10,7 @@ use crossbeam_channel::{Sender, unbounded};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use crate::cube::{CubeState, Weights, Writer, epoch_samples, merge_means, samples_before};
+use crate::cube::{CubeState, Rect, Weights, Writer, epoch_samples, merge_means, samples_before};
 use crate::device::prepared::Prepared;
 use crate::device::words::Counters;
 use crate::files::format_bytes;
@@ -20,6 +20,7 @@ use crate::gpu::buffer::{self, WARM_UP};
 use crate::gpu::fault::Phase;
 use crate::preview::Source;
 use crate::render::interrupt::Interrupt;
+use crate::render::layers::Layers;
 use crate::render::queue::{Group, Next, Queue};
 use crate::render::self_test;
 use crate::render::watch::{Device, Reports};
@@ -34,6 +35,8 @@ pub const MERGE_THREADS: usize = 8;
 /// What all devices of a render share. Nobody borrows it: a thread that is stuck in its driver keeps it for good.
 pub struct Pool {
     pub prepared: Arc<Prepared>,
+    /// What of the first surfaces is stored, if anything.
+    pub layers: Option<Layers>,
     pub queue: Queue,
     /// Set before the first unit may be taken.
     pub cube: OnceLock<Writer>,
@@ -243,7 +246,11 @@ impl Pool {
                 Next::Units(group) => {
                     let units: Vec<UnitRect> = group.tiles.iter().map(|&tile| self.unit_rect(tile)).collect();
                     let epochs = group.epoch..group.epoch + group.epochs;
+                    let tiles = group.tiles.clone();
                     post.taken.push_back(Taken::new(group));
+                    if epochs.start == 0 {
+                        self.lay(&tiles, worker)?;
+                    }
                     for epoch in epochs {
                         let samples = epoch_samples(epoch, self.full_epoch);
                         let before = worker.submit(&units, epoch, samples)?;
@@ -256,6 +263,18 @@ impl Pool {
                 Next::Never => return worker.collect()?.map_or(Ok(()), |last| self.merge(&last, post)),
             }
         }
+    }
+
+    /// Makes the layers, if there are any, of tiles that have no sample yet.
+    fn lay(&self, tiles: &[u32], worker: &mut Worker) -> Result<()> {
+        let Some(layers) = &self.layers else { return Ok(()) };
+        let (cube, accel) = (self.cube(), &self.prepared.accel);
+        for &tile in tiles {
+            let [x0, y0, x1, y1] = self.unit_rect(tile);
+            let rect = Rect { x0, y0, x1, y1 };
+            cube.lay(tile, layers.of_tile(accel, cube.cube().grid(), rect, &mut |rays| worker.meet(rays))?);
+        }
+        Ok(())
     }
 
     fn cube(&self) -> &Writer {

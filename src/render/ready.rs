@@ -40,7 +40,7 @@ pub(super) fn get_ready(
     plan::check(&job.scene)?;
     let samples_limit = job.stop.samples_limit(job.scene.integrator.epoch, job.uncertainty)?;
     let tile = plan::tile_size(&job.scene, job.tile);
-    let mut header = job.header(tile);
+    let mut header = job.header(tile)?;
     let tiles = job.tiles(&header)?;
     let there = check_target(&job.output, &header, job.existing, &tiles)?;
     if let Some(preview) = &job.preview {

@@ -12,6 +12,7 @@ use crate::cube::{Run, RunFile, Writer, epoch_samples, epochs_in, reduction, sam
 use crate::preview::{Control, DeviceStatus, Status};
 use crate::render::interrupt::Interrupt;
 use crate::render::job::{Job, SURE_EPOCHS};
+use crate::render::layers::Layers;
 use crate::render::plan;
 use crate::render::pool::{Merged, Pool, Report, Tally};
 use crate::render::queue::Queue;
@@ -64,6 +65,7 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
         get_ready(job, interrupt, observe)?;
     let pool = Arc::new(Pool {
         prepared,
+        layers: Layers::new(&job.scene, &job.layers)?,
         queue: Queue::default(),
         cube: OnceLock::new(),
         tile: header.tile,

@@ -23,6 +23,13 @@ const LEAST_PATHS: u64 = 256;
 /// Waves of which records are on their way to the host, or walked through there, while the next one computes.
 pub const SAVED_WAVES: usize = 2;
 
+/// Rays whose first hits are asked for at a time, and bytes of each: the ray, what it meets, and that on its way to the host.
+pub const FIRST_HIT_RAYS: usize = 4096;
+const FIRST_HIT_BYTES: [u64; 3] = [32, 16, 16];
+
+/// Of a buffer that nobody uses.
+pub const UNUSED_BYTES: u64 = 256;
+
 /// Most samples per pixel of a wave: those of the longest epoch that is usual.
 const MOST_SAMPLES: u32 = 64;
 
@@ -75,6 +82,8 @@ pub struct WavePlan {
     pub thinned: bool,
     /// Whether records are read back instead of means (factored renders).
     pub gathered: bool,
+    /// Whether single rays are asked for (layers).
+    pub first_hits: bool,
     pub limits: DeviceLimits,
     /// The scene on the device, bytes.
     pub scene_bytes: u64,
@@ -137,6 +146,7 @@ impl WavePlan {
             scaled: prepared.features.roulette || prepared.scattering.is_some(),
             thinned,
             gathered,
+            first_hits: prepared.first_hits,
             limits,
             scene_bytes: facts::scene_bytes(&on_device, buffer::allocated),
         };
@@ -278,8 +288,11 @@ impl WavePlan {
         let throughputs = self.scaled.then(|| self.throughput_bytes());
         let spectral = (self.spectral_state_size > 0).then(|| self.spectral_state_bytes());
         let saved = self.gathered.then(|| [self.saved_bytes(); SAVED_WAVES]);
+        let [asked, met, read] = FIRST_HIT_BYTES.map(|bytes| bytes * FIRST_HIT_RAYS as u64);
+        let first_hits = self.first_hits.then_some([asked, met, read, UNUSED_BYTES]);
         let sizes = [fixed, by_paths, by_units];
         let others = throughputs.into_iter().chain(spectral).chain(saved.into_iter().flatten());
+        let others = others.chain(first_hits.into_iter().flatten());
         sizes.iter().flatten().copied().chain(others).map(buffer::allocated).sum()
     }
 
@@ -375,6 +388,7 @@ mod tests {
             scaled: false,
             thinned: false,
             gathered: false,
+            first_hits: false,
             limits: LIMITS,
             scene_bytes: 0,
         }

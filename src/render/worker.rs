@@ -26,8 +26,11 @@ use crate::render::time_limit::TimeLimit;
 use crate::render::wave::{Budget, DeviceLimits, SAVED_WAVES, WavePlan};
 use crate::{Error, Result};
 
+mod first_hits;
 mod path_buffers;
 
+use first_hits::FirstHits;
+pub use first_hits::{Met, Question};
 use path_buffers::PathBuffers;
 
 /// A rectangle x0, y0, x1, y1 of the full film: one tile in one epoch.
@@ -69,6 +72,8 @@ pub struct Worker {
     thin: Option<Stage>,
     /// None where records are read back instead.
     evaluate: Option<Stage>,
+    /// Where there are layers.
+    first_hits: Option<FirstHits>,
     shape: EvaluateShape,
     path_buffers: PathBuffers,
     frame: wgpu::Buffer,
@@ -189,6 +194,7 @@ impl Worker {
         let update = kernels.update.as_ref().map(stage).transpose()?;
         let thin = kernels.thin.as_ref().map(stage).transpose()?;
         let evaluate = kernels.evaluate.as_ref().map(stage).transpose()?;
+        let first_hits = kernels.first_hits.as_ref().map(|source| FirstHits::new(&gpu, source, &scene)).transpose()?;
         // The cores of a software device have enough to do.
         let threads = if gpu.is_software { 1 } else { MERGE_THREADS.min(rayon::current_num_threads()) };
         let gather = Gather::new(&prepared, plan.tile, SLOTS, threads);
@@ -210,6 +216,7 @@ impl Worker {
             update,
             thin,
             evaluate,
+            first_hits,
             shape,
             path_buffers,
             frame,
@@ -301,6 +308,13 @@ impl Worker {
             Some(before) => self.receive(before).map(Some),
             None => Ok(None),
         }
+    }
+
+    /// What each of `rays` meets first, once what is under way is done. Only where the scene has layers.
+    pub fn meet(&mut self, rays: &[Question]) -> Result<Vec<Met>> {
+        let limit = self.limit();
+        let first_hits = self.first_hits.as_ref().ok_or_else(|| Error::Internal("no layers were asked for".into()))?;
+        first_hits.ask(&self.gpu, rays, limit)
     }
 
     /// How long whatever is under way may take.

@@ -207,7 +207,8 @@ fn fronts(shape: &Shape) -> Option<Vec<(DVec3, DVec3)>> {
 fn eyes(scene: &Scene) -> Vec<DVec3> {
     let camera = &scene.camera;
     match camera.projection {
-        Projection::Perspective { .. } | Projection::ThinLens { .. } => vec![camera.position],
+        Projection::Pushbroom { ref lines, .. } => lines.iter().map(|line| line.position).collect(),
+        Projection::Perspective { .. } | Projection::ThinLens { .. } | Projection::Latlong => vec![camera.position],
         Projection::Orthographic { half_size } => [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)]
             .map(|(x, y)| camera.position + camera.right * (x * half_size.x) + camera.up * (y * half_size.y))
             .to_vec(),

@@ -7,10 +7,10 @@ use glam::DVec3;
 use sha2::{Digest, Sha256};
 
 use super::{
-    Absorber, Assembly, Attributes, Bsdf, Camera, Component, Cone, Emission, Environment, EnvironmentMap, Evaluation,
-    Field, Film, Filter, Grid, Integrator, Interior, Light, Material, Medium, Mesh, Object, Phase, PhaseTable,
-    Placement, Profile, Projection, Reflectance, Sampler, Scattering, Scene, Shape, Sides, Spectrum, Temperature,
-    Texels, Texture, TextureFilter, TextureKind, Wavelengths, Weight,
+    Absorber, Assembly, Attributes, Bsdf, Camera, Component, Cone, Distortion, Emission, Environment, EnvironmentMap,
+    Evaluation, Field, Film, Filter, Grid, Integrator, Interior, Light, Line, Material, Medium, Mesh, Object, Phase,
+    PhaseTable, Placement, Profile, Projection, Reflectance, Sampler, Scattering, Scene, Shape, Sides, Spectrum,
+    Temperature, Texels, Texture, TextureFilter, TextureKind, Wavelengths, Weight,
 };
 use crate::spectral::{Channels, Curve, Outside};
 
@@ -31,6 +31,9 @@ pub fn digest(scene: &Scene) -> String {
         camera_medium,
         lights,
         environment,
+        // They change no value of the radiance.
+        georeference: _,
+        first_hits: _,
         warnings: _,
         digest: _,
     } = scene;
@@ -121,7 +124,7 @@ impl Hash {
     }
 
     fn camera(&mut self, camera: &Camera) {
-        let Camera { position, forward, right, up, projection } = camera;
+        let Camera { position, forward, right, up, projection, distortion } = camera;
         for vector in [position, forward, right, up] {
             self.vector(*vector);
         }
@@ -138,6 +141,19 @@ impl Hash {
                 self.tag(2);
                 self.numbers(&half_size.to_array());
             }
+            Projection::Latlong => self.tag(3),
+            Projection::Pushbroom { half_width, half_pixel, lines } => {
+                self.tag(4);
+                self.numbers(&[*half_width, *half_pixel]);
+                self.list(lines, |hash, Line { position, forward, right, nose }| {
+                    [position, forward, right, nose].into_iter().for_each(|vector| hash.vector(*vector));
+                });
+            }
+        }
+        if let Some(Distortion { radial, tangential }) = distortion {
+            self.text("distortion");
+            self.numbers(radial);
+            self.numbers(tangential);
         }
     }
 

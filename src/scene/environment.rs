@@ -59,7 +59,7 @@ pub fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Environm
 
 /// The rotation from the world to the map, in which up is +y: the inverse of the shortest turn from +y to `up`, then
 /// `rotate_degrees` about `up`.
-fn to_map(fields: &Fields) -> Option<DMat3> {
+pub(super) fn to_map(fields: &Fields) -> Option<DMat3> {
     let up = fields.get("up").map_or(Some(DVec3::Y), |item| item.direction());
     let degrees = fields.get("rotate_degrees").map_or(Some(0.0), |item| item.number());
     let (up, degrees) = (up?, degrees?);

@@ -10,6 +10,7 @@ use super::coverage;
 use super::decode::{Fields, Item};
 use super::digest::digest;
 use super::environment;
+use super::georeference;
 use super::keys;
 use super::light;
 use super::material::Materials;
@@ -107,6 +108,7 @@ fn decode<'a>(cx: &'a Context<'a>, root: &'a [Entry]) -> Option<Scene> {
     let film = section("film", "[film] with width and height in pixels").and_then(|i| camera::decode_film(&i));
     let camera = section("camera", "[camera.perspective] with position, look_at and fov")
         .and_then(|i| camera::decode_camera(&i, film.as_ref()));
+    let georeference = top.get("georeference").map(|item| georeference::decode(&item, camera.as_ref(), film.as_ref()));
     let channels = section("channels", "[channels] with equal = { from = 380, to = 780, count = 400 }")
         .and_then(|i| channels::decode(&i));
     let integrator = match top.get("integrator") {
@@ -126,6 +128,10 @@ fn decode<'a>(cx: &'a Context<'a>, root: &'a [Entry]) -> Option<Scene> {
     let (materials, textures) = materials.finish();
     let outer = top.get("camera").and_then(|item| camera::medium(&item));
     let camera_medium = outer.map(|item| media.take_outer(&item, &mut spectra));
+    if let (Some(item), Some(camera)) = (top.get("camera"), &camera) {
+        let fills = |object: &super::Object| object.interior.is_some();
+        camera::check_media(&item, camera, camera_medium.is_some() || objects.iter().any(fills));
+    }
     let lights = light::decode_lights(top.get("lights"), &mut spectra);
     let environment = top.get("environment").map(|item| environment::decode(&item, &mut spectra));
 
@@ -150,6 +156,11 @@ fn decode<'a>(cx: &'a Context<'a>, root: &'a [Entry]) -> Option<Scene> {
             Some(environment) => Some(environment?),
             None => None,
         },
+        georeference: match georeference {
+            Some(georeference) => Some(georeference?),
+            None => None,
+        },
+        first_hits: false,
         warnings: Vec::new(),
         digest: String::new(),
     })

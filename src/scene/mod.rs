@@ -14,6 +14,7 @@ mod digest;
 mod draft;
 mod environment;
 mod file;
+mod georeference;
 mod integrator;
 pub mod keys;
 mod light;
@@ -88,6 +89,9 @@ pub struct Scene {
     pub camera_medium: Option<MediumId>,
     pub lights: Vec<Light>,
     pub environment: Option<Environment>,
+    pub georeference: Option<Georeference>,
+    /// Whether the first surface behind each pixel is asked for, beside its radiance (`render --layers`).
+    pub first_hits: bool,
     /// Said once to the user: held tables, dropped triangles, …
     pub warnings: Vec<String>,
     /// Hex SHA-256 over everything above that decides the values of a cube (not paths or warnings).
@@ -98,6 +102,12 @@ impl Scene {
     /// Whether weights of products of its spectra are kept instead of radiance.
     pub fn is_factored(&self) -> bool {
         self.integrator.evaluator == Evaluator::Factored
+    }
+
+    /// The same, with the first surface behind each pixel asked for.
+    pub fn with_first_hits(mut self) -> Scene {
+        self.first_hits = true;
+        self
     }
 
     /// The same, with weights of products of its spectra kept instead of radiance.
@@ -137,6 +147,19 @@ pub struct Camera {
     pub right: DVec3,
     pub up: DVec3,
     pub projection: Projection,
+    /// Of the lens, under a perspective.
+    pub distortion: Option<Distortion>,
+}
+
+/// Where a lens makes a picture of what a pinhole would have at (x, y), x to the right and y down in units of the focal length: with
+/// r² = x² + y² at x (1 + k₁ r² + k₂ r⁴ + k₃ r⁶) + 2 p₁ x y + p₂ (r² + 2 x²), y (1 + k₁ r² + k₂ r⁴ + k₃ r⁶) + p₁ (r² + 2 y²) + 2 p₂ x y
+/// (Brown 1966, *Decentering distortion of lenses*, with the names and signs of OpenCV).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Distortion {
+    /// Radial: k₁, k₂, k₃.
+    pub radial: [f64; 3],
+    /// Tangential: p₁, p₂.
+    pub tangential: [f64; 2],
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -154,6 +177,55 @@ pub enum Projection {
     Orthographic {
         half_size: DVec2,
     },
+    /// All directions from one point, by longitude along x and latitude along y, as [`EnvironmentMap`] has them: `forward` (the map's -z)
+    /// is in the middle, `right` (its +x) a quarter of the width right of it, `up` along the upper edge.
+    Latlong,
+    /// A line at a time, each from where the scanner is then. Across the track a line spans ± `half_width` at distance 1, along it ±
+    /// `half_pixel`. The row of place y on the film is exposed from y = row to row + 1, while the scanner moves: at y it stands between
+    /// lines as [`Line::at`] says.
+    Pushbroom {
+        half_width: f64,
+        half_pixel: f64,
+        /// One for each row of the full film, as it is in the middle of its exposure.
+        lines: Arc<[Line]>,
+    },
+}
+
+/// Where a line scanner is, and where it looks: unit vectors.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Line {
+    pub position: DVec3,
+    pub forward: DVec3,
+    /// Columns run along it.
+    pub right: DVec3,
+    /// Where the nose points.
+    pub nose: DVec3,
+}
+
+impl Line {
+    /// Between two of `lines`, at least two, in proportion: at the place y on the film, and on beyond the first and the last as between those
+    /// next to them. Directions are not normalised.
+    pub fn at(lines: &[Line], y: f64) -> Line {
+        let place = y - 0.5;
+        let first = place.floor().clamp(0.0, lines.len() as f64 - 2.0);
+        let (from, to, share) = (&lines[first as usize], &lines[first as usize + 1], place - first);
+        let between = |a: DVec3, b: DVec3| a + share * (b - a);
+        Line {
+            position: between(from.position, to.position),
+            forward: between(from.forward, to.forward),
+            right: between(from.right, to.right),
+            nose: between(from.nose, to.nose),
+        }
+    }
+}
+
+/// Where on a map the full film lies.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Georeference {
+    /// `EPSG:` and a number, or WKT.
+    pub crs: String,
+    /// Of the place x, y on the film, in pixels from its top left corner: easting `a x + b y + c`, northing `d x + e y + f`, from a to f.
+    pub affine: [f64; 6],
 }
 
 #[derive(Debug, Clone, PartialEq)]

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::cube::node_name;
+use crate::cube::{Layer, node_name};
 use crate::files::output::Product;
 use crate::{Error, Result, files};
 
@@ -49,6 +49,9 @@ pub struct Job {
     /// Whether weights of products of spectra are kept instead of radiance.
     #[serde(default)]
     pub factored: bool,
+    /// What of the first surface behind each pixel the cube has.
+    #[serde(default)]
+    pub layers: Vec<Layer>,
     pub memory: Option<u64>,
     /// Whether tasks may use software devices where no GPU is found.
     #[serde(default)]
@@ -211,6 +214,8 @@ impl Job {
         words.extend((self.seed != 0).then(|| format!("--seed {}", self.seed)));
         words.extend(self.uncertainty.then(|| "--uncertainty".into()));
         words.extend(self.factored.then(|| "--factored".into()));
+        let layers: Vec<&str> = self.layers.iter().map(|layer| layer.name()).collect();
+        words.extend((!layers.is_empty()).then(|| format!("--layers {}", layers.join(","))));
         words.extend(self.memory.map(|memory| format!("--memory {memory}")));
         words.join(" ")
     }
@@ -271,6 +276,7 @@ pub(crate) mod tests {
             seed: 7,
             uncertainty: false,
             factored: false,
+            layers: Vec::new(),
             memory: None,
             allow_software: false,
             samples: 256,

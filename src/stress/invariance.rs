@@ -63,6 +63,7 @@ fn machinery(bench: &mut Bench) -> Result<()> {
         seed: 7,
         tile: Some(8),
         uncertainty: true,
+        layers: Vec::new(),
         stop: StopRule { samples: Some(SAMPLES), ..StopRule::default() },
         preview: None,
         profile: false,

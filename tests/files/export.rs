@@ -330,7 +330,7 @@ fn what_cannot_be_exported_is_refused() {
         (vec!["-o", "a.img", "--zarr-no-shards"], "--zarr-no-shards goes with zarr"),
         (vec!["-o", "a.csv", "--exposure", "1"], "--exposure goes with png"),
         (vec!["-o", "a", "--blocks", "8"], "--format"),
-        (vec!["-o", "a.tif"], "names no format"),
+        (vec!["-o", "a.bmp"], "names no format"),
         (vec!["-o", "a.zarr", "--format", "envi"], "GDAL"),
         (vec!["-o", "cube.zarr"], "exists already"),
     ] {

@@ -8,7 +8,7 @@
 use glam::{DVec2, DVec3};
 use spectile::device::prepared::{Features, Prepared};
 use spectile::device::rng::hash;
-use spectile::scene::{Filter, Mesh, Projection, Sampler, Scene, Shape, Sides, Wavelengths};
+use spectile::scene::{Distortion, Filter, Line, Mesh, Projection, Sampler, Scene, Shape, Sides, Wavelengths};
 use spectile::spectral::{Channels, Curve, Outside, Response};
 
 use crate::device::{Settings, render};
@@ -101,6 +101,14 @@ fn block(min: DVec3, max: DVec3) -> Shape {
         }
         other => other,
     }
+}
+
+/// A line of a scanner that flies past and turns.
+fn scanned(i: i32) -> Line {
+    let i = f64::from(i);
+    let forward = DVec3::new(0.05 * i - 0.2, -0.3 + 0.02 * i * i, -1.0).normalize();
+    let right = forward.cross(DVec3::new(0.1 * i, 1.0, 0.0)).normalize();
+    Line { position: DVec3::new(0.3 - 0.05 * i, 0.9 - 0.25 * i, 2.2), forward, right, nose: forward.cross(right) }
 }
 
 /// One wall of the room [-1, 1]³, facing inwards.
@@ -236,7 +244,7 @@ fn many_plain_spectra() {
     compare("plain tables", &scene, &Effort { epochs: 40, reference: 4096, ..USUAL });
 }
 
-/// Every shape as a lamp, seen from outside, one side and both, under a sky, before one-sided surfaces; three cameras,
+/// Every shape as a lamp, seen from outside, one side and both, under a sky, before one-sided surfaces; four cameras,
 /// mirrored film.
 #[test]
 fn lamps_of_every_shape_and_a_sky() {
@@ -246,8 +254,11 @@ fn lamps_of_every_shape_and_a_sky() {
         Projection::Perspective { tan_half },
         Projection::Orthographic { half_size: DVec2::new(1.5, 1.2) },
         Projection::ThinLens { tan_half, aperture_radius: 0.2, focus_distance: 2.0 },
+        Projection::Latlong,
+        Projection::Pushbroom { half_width: 0.7, half_pixel: 0.08, lines: (0..7).map(scanned).collect() },
     ];
     for (i, projection) in projections.into_iter().enumerate() {
+        let is_lens = matches!(projection, Projection::Perspective { .. } | Projection::ThinLens { .. });
         let sides = if i == 1 { Sides::Front } else { Sides::Both };
         let mut scene = Builder::new()
             .camera(look(DVec3::new(0.3, 0.4, 2.2), DVec3::new(0.0, -0.3, 0.0), DVec3::Y, projection))
@@ -274,11 +285,14 @@ fn lamps_of_every_shape_and_a_sky() {
             )
             .sky(jagged(5, 7, 0.2, 0.5))
             .build();
+        if is_lens {
+            scene.camera.distortion = Some(Distortion { radial: [-0.25, 0.1, 0.02], tangential: [0.03, -0.02] });
+        }
         if i == 2 {
             scene.camera.right = -scene.camera.right;
             scene.integrator.sampler = Sampler::Sobol;
         }
-        compare(["perspective", "orthographic", "thin lens"][i], &scene, &USUAL);
+        compare(["perspective", "orthographic", "thin lens", "latlong", "pushbroom"][i], &scene, &USUAL);
     }
 }
 

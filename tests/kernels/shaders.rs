@@ -65,8 +65,11 @@ fn combinations() -> Vec<Features> {
     let bit = |i: u32, at: u32| i >> at & 1 == 1;
     (0..1u32 << 12)
         .map(|i| Features {
-            thin_lens: bit(i, 0),
-            orthographic: bit(i, 1),
+            // One camera of four.
+            thin_lens: i & 3 == 1,
+            orthographic: i & 3 == 2,
+            latlong: i & 3 == 3,
+            pushbroom: false,
             gaussian: bit(i, 2),
             independent: bit(i, 3),
             emitters: bit(i, 4),
@@ -78,7 +81,7 @@ fn combinations() -> Vec<Features> {
             registers: bit(i, 10),
             few_triangles: bit(i, 11),
         })
-        .filter(|f| !(f.thin_lens && f.orthographic || f.knots && f.registers || f.shapes && f.few_triangles))
+        .filter(|f| !(f.knots && f.registers || f.shapes && f.few_triangles))
         .collect()
 }
 

@@ -175,6 +175,65 @@ fn factored_cubes_are_as_the_page_says() {
     }
 }
 
+/// Layers are the arrays of the chapter on them beside all others, with those attributes and files; and a record has six checksums more.
+#[test]
+fn layers_are_as_the_page_says() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let sun = "\n[[lights]]\ndirectional = { direction = [0, -1, -1], irradiance = 1.0 }\n";
+    std::fs::write(folder.path().join("scene.toml"), format!("{SCENE}{sun}")).expect("written");
+    let documented = rows("Layers");
+    let names: Vec<&str> = documented.iter().map(|row| code(&row[0])).collect();
+    let line = format!("render scene.toml -o layers.zarr --spp 64 --tile 16 --quiet --layers {}", names.join(","));
+    let output = spectile(folder.path(), &line.split(' ').collect::<Vec<_>>(), true);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let path = folder.path().join("layers.zarr");
+    let group = json(&path.join("zarr.json"));
+    let arrays = group["consolidated_metadata"]["metadata"].as_object().expect("arrays");
+    let others = rows("Arrays");
+    let others = others.iter().map(|row| code(&row[0])).filter(|array| *array != "standard_error");
+    assert_eq!(
+        arrays.keys().map(String::as_str).collect::<BTreeSet<_>>(),
+        others.chain(names.iter().copied()).collect()
+    );
+    for row in &documented {
+        let found = &arrays[code(&row[0])];
+        let size = |word: &str| match word.trim() {
+            "W" => "24".to_owned(),
+            "H" => "20".to_owned(),
+            "w" | "h" => TILE.to_string(),
+            number => number.to_owned(),
+        };
+        let sizes = |cell: &str| cell.split(',').map(size).collect::<Vec<_>>().join(", ");
+        let codec = &found["codecs"][0];
+        let written = [
+            list(&found["dimension_names"]),
+            list(&found["shape"]),
+            plain(&found["data_type"]),
+            list(&found["chunk_grid"]["configuration"]["chunk_shape"]),
+            format!("{} {}", plain(&codec["name"]), plain(&codec["configuration"]["endian"])),
+            plain(&found["fill_value"]),
+            plain(&found["attributes"]["units"]),
+            plain(&found["attributes"]["long_name"]),
+        ];
+        let cells = [&row[1], &sizes(&row[2]), &row[3], &sizes(&row[4]), &row[5], &row[6], code(&row[8]), &row[9]];
+        assert_eq!(written.each_ref().map(String::as_str), cells.map(|cell| cell as &str), "{}", row[0]);
+    }
+    assert_eq!(arrays["material"]["attributes"]["flag_meanings"], "grey black");
+    let layers: Value = serde_json::from_str(group["attributes"]["layers"].as_str().expect("text")).expect("JSON");
+    assert_eq!(layers["objects"], serde_json::json!(["objects.0", "objects.1"]));
+    assert_eq!(layers.as_object().map(|all| all.len()), Some(3));
+    // 128 + 16 K without, and the last record of each tile.
+    let bytes = std::fs::read(path.join(".spectile/journal/1")).expect("a journal");
+    let size = 128 + 96 + 16 * 5;
+    assert!(bytes.len().is_multiple_of(size), "{}", bytes.len());
+    let record = &bytes[bytes.len() - size..];
+    for (i, row) in documented.iter().enumerate() {
+        let file = code(&row[7]).replace("ROW", "0").replace("COLUMN", "1");
+        let sum = u128::from_le_bytes(record[112 + 16 * i..][..16].try_into().expect("sixteen bytes"));
+        assert_eq!(sum, xxh3_128(&std::fs::read(path.join(&file)).expect("a file")), "{file}");
+    }
+}
+
 fn choices_have_the_fields_of_the_page(cubes: &Cubes) {
     let found = json(&cubes.path("plain").join(".spectile/choices.json"));
     let documented = rows("Choices");

@@ -18,6 +18,10 @@ pub fn make(folder: &Path) {
     write("spectra/lamp.csv", b"um,warm\n0.35,100\n0.6,900\n0.85,2000\n");
     write("spectra/sun.csv", b"nm,W m-2 nm-1\n350,0.6\n550,1.5\n850,0.9\n");
     write("spectra/soil.csv", b"350,0.1\n850,0.3\n");
+    write(
+        "track.csv",
+        b"x,y,z,yaw_degrees,pitch_degrees,roll_degrees\n0,0,1000,0,0,0\n0.5,0,1000,0.1,0,0\n1,0,1000,0,0,0.1\n",
+    );
     write("paints.csv", b"wavelength_nm,red,green\n350,0.05,0.04\n600,0.6,0.3\n850,0.7,0.2\n");
     write("gold.csv", b"nm,n,k\n350,1.6,1.9\n600,0.25,3.0\n850,0.15,5.2\n");
     write(

@@ -91,7 +91,8 @@ if (what === "render") {
 }
 
 if (what === "heat") {
-  await page.keyboard.press("4");
+  // By itself: all channels are thermal.
+  seen.opens_as = await page.evaluate(() => window.spectile.picture.show.mode);
   await browser.settled();
   await page.mouse.move(...(await browser.at(Number(x), Number(y))));
   await page.waitForFunction(() => document.getElementById("cursor").textContent.includes(" K"));

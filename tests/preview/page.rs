@@ -146,6 +146,7 @@ fn heat_is_shown_in_kelvins() {
     }
     let running = Running::start(folder.path(), &["view", "cube.zarr", "--listen", "127.0.0.1:0", "--json"]);
     let Some(seen) = drive("heat", &running.url, [80, 60]) else { return };
+    assert_eq!(seen["opens_as"], "temperature");
     assert_eq!(seen["against_png"], 0, "one colour map for the page and for pictures");
     let cursor = seen["cursor"].as_str().expect("text");
     let shown: f64 =

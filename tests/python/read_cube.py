@@ -46,14 +46,14 @@ def still(path, expected_path):
     assert ds["wavelength_bounds"].dims == ("wavelength", "bnds")
     assert np.array_equal(da["response_integral"].values, bounds[:, 1] - bounds[:, 0])
     x0, y0 = expected["origin"]
-    assert np.array_equal(da["x"].values, x0 + np.arange(width) + 0.5)
-    assert np.array_equal(da["y"].values, y0 + np.arange(height) + 0.5)
+    assert np.array_equal(da["x"].values, x0 + np.arange(width))
+    assert np.array_equal(da["y"].values, y0 + np.arange(height))
     assert ds.attrs["Conventions"].startswith("CF-") and ds.attrs["scene_digest"] == "0123abcd"
     assert ds.attrs["seed"] == 7 and len(ds.attrs["channel_names"]) == channels
 
     # One pixel and one channel by label, as a user would.
     k = channels // 2
-    one = da.sel(x=x0 + 1.5, y=y0 + 0.5).isel(wavelength=k)
+    one = da.sel(x=x0 + 1, y=y0).isel(wavelength=k)
     assert one.values.tobytes() == radiance[0, 1, k].tobytes()
     if da.indexes["wavelength"].is_monotonic_increasing:
         nearest = da.sel(wavelength=float(da["wavelength"][k]) + 1e-3, method="nearest")

@@ -132,8 +132,8 @@ def zarr(names, values, expected):
     assert np.array_equal(da["wavelength_width"].values, expected["fwhm"])
     assert np.array_equal(ds["wavelength_bounds"].values.mean(axis=1), expected["wavelength"])
     x0, y0 = expected["origin"]
-    assert np.array_equal(da["x"].values, x0 + np.arange(values.shape[1]) + 0.5)
-    assert np.array_equal(da["y"].values, y0 + np.arange(values.shape[0]) + 0.5)
+    assert np.array_equal(da["x"].values, x0 + np.arange(values.shape[1]))
+    assert np.array_equal(da["y"].values, y0 + np.arange(values.shape[0]))
     alone = zarr.open_array(os.path.join(name, expected["variable"]), mode="r")
     assert (alone.shards is not None) == expected["sharded"], alone.shards
     assert alone.chunks[0] <= 64 and alone.chunks[1] == alone.chunks[2] == 32

@@ -90,6 +90,8 @@ fn the_document_names_every_event_and_field() {
         vec!["export", "a.zarr", "-o", "c.png", "--colour-map", "--json"],
         vec!["export", "a.zarr", "-o", "b.csv", "--json"],
         vec!["sensor", "a.zarr", "--responses", "s.csv", "-o", "s.zarr", "--json"],
+        render(&["l.zarr", "--spp", "1", "--layers", "depth"]),
+        vec!["export", "l.zarr", "-o", "l.csv", "--layers", "depth", "--json"],
         render(&["w.zarr", "--spp", "1", "--factored"]),
         vec!["relight", "w.zarr", "-o", "r.zarr", "--json"],
         vec!["info", "nothing.zarr", "--json"],

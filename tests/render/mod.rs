@@ -4,10 +4,14 @@
 mod accuracy;
 mod evaluation;
 mod factored;
+mod georeference;
 mod json;
+mod latlong;
+mod layers;
 mod memory;
 mod out_of_core;
 mod outcome;
+mod products;
 mod reflectance;
 mod responses;
 mod resume;

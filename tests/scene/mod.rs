@@ -2,6 +2,7 @@
 //! that nothing makes it panic.
 
 mod assemblies;
+mod cameras;
 mod heat;
 mod lights;
 mod materials;

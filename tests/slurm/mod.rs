@@ -216,21 +216,30 @@ fn an_array_render_is_byte_equal_to_the_one_machine_render() {
     assert!(again.contains("all 64 tiles have 64 samples per pixel; there is nothing to submit"), "{again}");
     place.submit(&["--resume", "--spp", "128", "--tasks", "5"]);
     place.ends_with_the_same_bytes("128");
+    // Or it is begun anew, which must be said.
+    let output = place.run(&[&["submit", "--spp", "64"], SUBMIT].concat());
+    assert!(
+        output.status.code() == Some(2) && text(&output.stderr).contains("exists already"),
+        "{}",
+        text(&output.stderr)
+    );
+    place.submit(&["--overwrite", "--spp", "64", "--tasks", "3"]);
+    place.ends_with_the_same_bytes("64");
 }
 
-/// With `--uncertainty` the cube has an array more, of which every task writes its part.
+/// With `--uncertainty` the cube has an array more, with `--layers` some, of which every task writes its part.
 #[test]
 fn an_array_job_makes_standard_errors_too() {
     let Some(place) = Place::new(2, 2) else { return };
-    place.submit(&["--spp", "128", "--tasks", "4", "--uncertainty"]);
-    place.ends_with_the_bytes_of(&["--spp", "128", "--uncertainty"]);
-    let [radiance, error] = ["radiance", "standard_error"].map(|array| {
-        straight(&["--spp", "128", "--uncertainty"])
+    place.submit(&["--spp", "128", "--tasks", "4", "--uncertainty", "--layers", "depth,object"]);
+    place.ends_with_the_bytes_of(&["--spp", "128", "--uncertainty", "--layers", "depth,object"]);
+    let [radiance, error, depth] = ["radiance", "standard_error", "depth"].map(|array| {
+        straight(&["--spp", "128", "--uncertainty", "--layers", "depth,object"])
             .keys()
             .filter(|name| name.starts_with(&format!("{array}/c/")))
             .count()
     });
-    assert_eq!((radiance, error), (64, 64));
+    assert_eq!((radiance, error, depth), (64, 64, 64));
     // Going on without it would be another cube.
     let output = place.run(&[&["submit", "--resume", "--spp", "256"], SUBMIT].concat());
     assert!(

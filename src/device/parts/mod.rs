@@ -7,6 +7,7 @@ pub mod crossings;
 pub mod geometry;
 pub mod heat;
 pub mod instances;
+pub mod layers;
 pub mod lights;
 mod lobes;
 pub mod media;

@@ -35,7 +35,8 @@ impl Origins {
     pub fn of(scene: &Scene, space: &DeviceSpace) -> Option<Origins> {
         let camera = &scene.camera;
         let half_size = match camera.projection {
-            Projection::Perspective { .. } => return None,
+            // A line scanner goes with no media.
+            Projection::Perspective { .. } | Projection::Latlong | Projection::Pushbroom { .. } => return None,
             Projection::ThinLens { aperture_radius, .. } => DVec2::splat(aperture_radius),
             Projection::Orthographic { half_size } => {
                 let film = DVec2::new(f64::from(scene.film.width), f64::from(scene.film.height));

@@ -84,7 +84,7 @@ pub const ROULETTE_ON_EVALUATION: Part = Part {
         None => "8 more bytes a path, and a pass that tries paths in a few channels".into(),
     },
     is_planned: true,
-    modules: &[(Place::Generate, module!("parts/paths/seen.wgsl"))],
+    modules: &[(Place::Following, module!("parts/paths/seen.wgsl"))],
     lines: &[("BEYOND", "note_seen(&list);"), ("EMIT", "note_seen(&list);")],
     defines: |scene, work, defines| {
         defines.set("THINNED", true);

@@ -35,13 +35,15 @@ fn what_is_written_is_read() {
         description: "of a test, {1}",
         size: [2, 3, 2],
         interleave: Interleave::Bil,
+        is_double: false,
         units: "W m^-2 sr^-1 nm^-1",
         ignore: -9999.0,
         origin: [10, 20],
-        default_bands: [1, 0, 0],
+        default_bands: Some([1, 0, 0]),
         wavelength_nm: vec![400.1, 1.0 / 3.0],
         fwhm_nm: vec![1.0, 2.0],
         names: vec!["a, b".into(), "c".into()],
+        map: None,
     };
     let header = read(&image.header()).unwrap();
     assert_eq!((header.samples, header.lines, header.bands), (2, 3, 2));

@@ -84,6 +84,7 @@ fn full() -> Scene {
             right: DVec3::X,
             up: DVec3::Y,
             projection: Projection::Perspective { tan_half: DVec2::new(0.5, 0.4) },
+            distortion: None,
         },
         film: Film { width: 40, height: 30, filter: Filter::Box, crop: [1, 2, 39, 28] },
         channels: Channels::from_bounds(vec![[400.0, 500.0], [500.0, 650.0]], None),
@@ -121,6 +122,8 @@ fn full() -> Scene {
             size: [1, 1],
             texels,
         })),
+        georeference: None,
+        first_hits: false,
         warnings: Vec::new(),
         digest: String::new(),
     }

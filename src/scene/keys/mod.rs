@@ -4,6 +4,7 @@
 //!
 //! A new key is a row; a new table is a [`Section`], named in [`SECTIONS`] and given a place in `page.md`.
 
+mod cameras;
 mod lights;
 mod materials;
 mod media;
@@ -15,6 +16,7 @@ mod view;
 
 use std::fmt;
 
+pub use cameras::*;
 pub use lights::*;
 pub use materials::*;
 pub use media::*;
@@ -252,8 +254,12 @@ pub static SECTIONS: &[&Section] = &[
     &CAMERA,
     &PERSPECTIVE,
     &THIN_LENS,
+    &DISTORTION,
     &ORTHOGRAPHIC,
+    &LATLONG,
+    &PUSHBROOM,
     &FILM,
+    &GEOREFERENCE,
     &CHANNELS,
     &EQUAL,
     &WAVENUMBER,

@@ -1,9 +1,7 @@
-//! The file as a whole; what is seen, in which channels, and how it is computed.
+//! The file as a whole; the film and where it lies on a map, channels, and how all is computed.
 
-use super::Kind::{
-    Boolean, Choice, Direction, File, List, ListOfTables, Name, NamedTables, Number, Table, Vector, Whole,
-};
-use super::{ASSEMBLY, ENVIRONMENT, INSTANCE, Key, LIGHT, MATERIAL, MEDIUM, OBJECT, SPECTRUM, Section};
+use super::Kind::{Choice, Direction, File, List, ListOfTables, NamedTables, Number, Table, Text, Vector, Whole};
+use super::{ASSEMBLY, CAMERA, ENVIRONMENT, INSTANCE, Key, LIGHT, MATERIAL, MEDIUM, OBJECT, SPECTRUM, Section};
 
 pub static SCENE: Section = Section {
     path: "scene",
@@ -13,6 +11,8 @@ pub static SCENE: Section = Section {
     keys: &[
         Key::required("camera", Table, "From where the scene is seen.").tables(&[&CAMERA]),
         Key::required("film", Table, "The picture's size in pixels.").tables(&[&FILM]),
+        Key::optional("georeference", Table, "nowhere on earth", "Where on a map the picture lies.")
+            .tables(&[&GEOREFERENCE]),
         Key::required("channels", Table, "The intervals of wavelength that are rendered.").tables(&[&CHANNELS]),
         Key::optional("integrator", Table, "all its defaults", "How paths are made.").tables(&[&INTEGRATOR]),
         Key::optional("spectra", NamedTables, "none", "Spectra that others name.").tables(&[&SPECTRUM]),
@@ -28,7 +28,7 @@ pub static SCENE: Section = Section {
     ],
     later: &[],
     at: "",
-    examples: &[EVERY_SECTION],
+    examples: &[EVERY_SECTION, ON_A_MAP],
     notes: "Tables of the same kind stand in any order. What no object uses (a material, a spectrum, a medium) is \
             checked, and then left out; an assembly that no instance places is left out without a look.",
 };
@@ -80,166 +80,18 @@ radiance = 0.01
 absorption = 1e-4
 "#;
 
-pub static CAMERA: Section = Section {
-    path: "camera",
-    heading: "`[camera]`",
-    summary: "from where the scene is seen",
-    about: "One of three kinds of camera.",
-    keys: &[
-        Key::one_of("perspective", Table, "All rays start in one point.").tables(&[&PERSPECTIVE]),
-        Key::one_of("thin_lens", Table, "As perspective, through an ideal lens: what is out of focus is blurred.")
-            .tables(&[&THIN_LENS]),
-        Key::one_of("orthographic", Table, "Parallel rays through a window.").tables(&[&ORTHOGRAPHIC]),
-    ],
-    later: &[],
-    at: "camera",
-    examples: &[A_PERSPECTIVE, A_THIN_LENS, AN_ORTHOGRAPHIC],
-    notes: "All three look from `position` to `look_at`. Row 0 of the picture is its top, column 0 its left: columns \
-            run along the cross product of the view and `up`, rows from `up` downward.",
-};
-
-const A_PERSPECTIVE: &str = r#"
-[camera.perspective]
-position = [278.0, 273.0, -800.0]
-look_at = [278.0, 273.0, 0.0]
-up = [0.0, 1.0, 0.0]
-fov = 39.3077
-fov_axis = "x"
-flip_x = false
-medium = "air"
-
-[media.air]
-absorption = 0.0
-"#;
-const A_THIN_LENS: &str = r#"
-[camera.thin_lens]
-position = [0, -4, 1.5]
-look_at = [0, 0, 0.5]
-up = [0, 0, 1]
-fov = 30
-fov_axis = "smaller"
-aperture_radius = 0.05
-focus_distance = 3.6
-flip_x = false
-medium = "air"
-
-[media.air]
-absorption = 0.0
-"#;
-const AN_ORTHOGRAPHIC: &str = r#"
+const ON_A_MAP: &str = r#"
 [camera.orthographic]
-position = [3, -4, 2]
-look_at = [0, 0, 0.5]
+position = [0, 0, 10]
+look_at = [0, 0, 0]
+up = [0, 1, 0]
+width = 8
+
+[georeference]
+crs = "EPSG:32631"
+origin = [650000, 4800000, 0]
 up = [0, 0, 1]
-width = 3.0
-flip_x = false
-medium = "air"
-
-[media.air]
-absorption = 0.0
 "#;
-
-const POSITION: Key = Key::required(
-    "position",
-    Vector,
-    "Where the camera is: the point, or the middle of the lens or window that rays start from.",
-)
-.unit("m");
-const LOOK_AT: Key =
-    Key::required("look_at", Vector, "What is in the middle of the full film; not where `position` is.").unit("m");
-const UP: Key = Key::default(
-    "up",
-    Direction,
-    "[0, 1, 0]",
-    "What points up in the picture. It need not be perpendicular to the view, but must not be parallel to it.",
-);
-const FLIP_X: Key = Key::default(
-    "flip_x",
-    Boolean,
-    "false",
-    "Mirrors the picture: columns run the other way. For scenes out of programs with left-handed coordinates (pbrt).",
-);
-const CAMERA_MEDIUM: Key = Key::optional(
-    "medium",
-    Name("medium"),
-    "empty space",
-    "What fills space outside every `interior`. It may have no grids. Light of the environment, of suns and of \
-     directional lights arrives through it undimmed.",
-);
-const FOV: Key =
-    Key::required("fov", Number, "The full angle of view along `fov_axis`.").unit("degrees").range("(0, 180)");
-const FOV_AXIS: Key = Key::default(
-    "fov_axis",
-    Choice(&["x", "y", "smaller", "larger"]),
-    "\"x\"",
-    "Whether `fov` is the angle between the left and right edges of the full film, between top and bottom, or along \
-     its smaller or larger side.",
-);
-
-pub static PERSPECTIVE: Section = Section {
-    path: "camera.perspective",
-    heading: "`[camera.perspective]`",
-    summary: "a pinhole camera",
-    about: "",
-    keys: &[POSITION, LOOK_AT, UP, FLIP_X, CAMERA_MEDIUM, FOV, FOV_AXIS],
-    later: &[],
-    at: "camera.perspective",
-    examples: &[A_PERSPECTIVE],
-    notes: "",
-};
-
-pub static THIN_LENS: Section = Section {
-    path: "camera.thin_lens",
-    heading: "`[camera.thin_lens]`",
-    summary: "a camera with a lens",
-    about: "",
-    keys: &[
-        POSITION,
-        LOOK_AT,
-        UP,
-        FLIP_X,
-        CAMERA_MEDIUM,
-        FOV,
-        FOV_AXIS,
-        Key::required("aperture_radius", Number, "Radius of the lens; 0 is a pinhole.").unit("m").range("[0, ∞)"),
-        Key::required(
-            "focus_distance",
-            Number,
-            "Distance of the plane that is sharp, measured along the axis of view (not along each ray).",
-        )
-        .unit("m")
-        .range("(0, ∞)"),
-    ],
-    later: &[],
-    at: "camera.thin_lens",
-    examples: &[A_THIN_LENS],
-    notes: "",
-};
-
-pub static ORTHOGRAPHIC: Section = Section {
-    path: "camera.orthographic",
-    heading: "`[camera.orthographic]`",
-    summary: "a camera with parallel rays",
-    about: "",
-    keys: &[
-        POSITION,
-        LOOK_AT,
-        UP,
-        FLIP_X,
-        CAMERA_MEDIUM,
-        Key::required(
-            "width",
-            Number,
-            "What is seen from the left edge of the full film to the right one; the height follows from the film's.",
-        )
-        .unit("m")
-        .range("(0, ∞)"),
-    ],
-    later: &[],
-    at: "camera.orthographic",
-    examples: &[AN_ORTHOGRAPHIC],
-    notes: "",
-};
 
 pub static FILM: Section = Section {
     path: "film",
@@ -283,6 +135,58 @@ crop = [200, 100, 328, 228]            # 128 x 128 pixels of it
 ",
     ],
     notes: "",
+};
+
+pub static GEOREFERENCE: Section = Section {
+    path: "georeference",
+    heading: "`[georeference]`",
+    summary: "where on a map the picture lies",
+    about: "For orthographic cameras that look down, and for perspective ones that look straight down: the cube and its exports say where \
+            on a map each pixel is, so that QGIS places the picture.",
+    keys: &[
+        Key::required("crs", Text, "The coordinate reference system of the map: `\"EPSG:32631\"` or the like, or WKT."),
+        Key::optional(
+            "origin",
+            Vector,
+            "`[0, 0, 0]`: the scene has the map's coordinates",
+            "Easting, northing and height of the scene's origin.",
+        )
+        .unit("m"),
+        Key::default("up", Direction, "[0, 1, 0]", "Where up is in the scene."),
+        Key::optional(
+            "north",
+            Direction,
+            "`[0, 0, -1]`; `[0, 1, 0]` where `up` is z",
+            "Where the map's northing grows; made level.",
+        ),
+        Key::default(
+            "ground",
+            Number,
+            "0",
+            "Height of the level ground on which pixels are placed. What stands higher is seen displaced, as in any picture that is no \
+             orthophoto; under an orthographic camera that looks straight down nothing is.",
+        )
+        .unit("m"),
+    ],
+    later: &[],
+    at: "georeference",
+    examples: &[
+        r#"
+[camera.orthographic]
+position = [0, 100, 0]
+look_at = [0, 0, 0]
+up = [0, 0, -1]
+width = 64
+
+[georeference]
+crs = "EPSG:32631"
+origin = [650000, 4800000, 120]
+up = [0, 1, 0]
+north = [0, 0, -1]
+ground = 120
+"#,
+    ],
+    notes: "One unit of the scene is one of the map: metres, in most. Large coordinates lose nothing, in the scene or as `origin`.",
 };
 
 pub static CHANNELS: Section = Section {

@@ -43,6 +43,8 @@ impl Builder {
             camera_medium: None,
             lights: Vec::new(),
             environment: None,
+            georeference: None,
+            first_hits: false,
             warnings: Vec::new(),
             digest: String::new(),
         })
@@ -306,7 +308,7 @@ pub fn narrow() -> Projection {
 pub fn look(position: DVec3, target: DVec3, up: DVec3, projection: Projection) -> Camera {
     let forward = (target - position).normalize();
     let right = forward.cross(up).normalize();
-    Camera { position, forward, right, up: right.cross(forward), projection }
+    Camera { position, forward, right, up: right.cross(forward), projection, distortion: None }
 }
 
 /// A parallelogram with normal edge_u x edge_v, its tangent along edge_u.

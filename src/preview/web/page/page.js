@@ -350,6 +350,11 @@ async function hear(state) {
       spectra.open(channels);
       picture.show.rgb = channels.rgb;
       picture.show.k = spectra.order[(channels.count - 1) >> 1];
+      // All that a thermal camera sees is how warm things are.
+      if (channels.thermal.length === channels.count) {
+        picture.show.mode = "temperature";
+        picture.tone.map = "inferno";
+      }
       if (state.exposure_ev !== null) Object.assign(picture.tone, { auto: false, ev: state.exposure_ev });
       picture.open(state.cube, channels);
       notice("");

@@ -1,0 +1,96 @@
+//! `camera.latlong` makes environment maps: what it sees, used as a sky, is seen again.
+
+use super::Place;
+
+const ROOM: &str = r#"
+[camera.latlong]
+position = [0.1, -0.2, 0.3]
+up = [0.2, 0.3, 1]
+rotate_degrees = 35
+
+[film]
+width = 32
+height = 16
+
+[channels]
+intervals = [[400, 500], [500, 600]]
+
+[integrator]
+max_bounces = 0
+epoch = 1024
+
+[materials.lamp.black]
+"#;
+
+/// Six walls of their own radiance, in two channels.
+fn room() -> String {
+    let walls = [
+        ("[-1, -1, -1]", "[0, 2, 0]", "[2, 0, 0]"),
+        ("[-1, -1, 1]", "[2, 0, 0]", "[0, 2, 0]"),
+        ("[-1, -1, -1]", "[2, 0, 0]", "[0, 0, 2]"),
+        ("[-1, 1, -1]", "[0, 0, 2]", "[2, 0, 0]"),
+        ("[-1, -1, -1]", "[0, 0, 2]", "[0, 2, 0]"),
+        ("[1, -1, -1]", "[0, 2, 0]", "[0, 0, 2]"),
+    ];
+    let wall = |(i, (corner, u, v)): (usize, &(&str, &str, &str))| {
+        let [a, b] = [1.0 + i as f64, 7.5 - i as f64];
+        format!(
+            "\n[[objects]]\nquad = {{ corner = {corner}, edge_u = {u}, edge_v = {v} }}\nmaterial = \"lamp\"\nemission_sides = \"both\"\n\
+             emission = {{ samples = [[400, {a}], [500, {a}], [500.001, {b}], [600, {b}]] }}\n"
+        )
+    };
+    walls.iter().enumerate().map(wall).collect()
+}
+
+/// A map that is seen from inside is, in each pixel, the mean of what is bilinear between its texels: 3/4 of the texel's own value and 1/8 of
+/// each neighbour's, along both axes. With 1,024 samples that are a net the error is at most their discrepancy, (m/2 + 3/2) / 2^m
+/// with m = 10 (Niederreiter 1992, theorem 4.7), times the variation, three times the range of the nine texels that have a part in it.
+#[test]
+fn a_map_that_was_rendered_is_the_sky_that_was_seen() {
+    let place = Place::of(&format!("{ROOM}{}", room()));
+    let spp = ["--spp", "1024"];
+    let seen = place.render("sky.zarr", &spp);
+    let sky = "\n[environment]\nmap = \"sky.zarr\"\nup = [0.2, 0.3, 1]\nrotate_degrees = 35\n";
+    std::fs::write(place.path().join("scene.toml"), format!("{ROOM}{sky}")).expect("written");
+    let again = place.render("again.zarr", &spp);
+    let at = |x: i64, y: i64, k: usize| {
+        let (x, y) = (x.rem_euclid(32) as u32, y.clamp(0, 15) as u32);
+        f64::from(seen.spectrum(x, y).expect("read").expect("there")[k])
+    };
+    let discrepancy = (5.0 + 1.5) / 1024.0;
+    let mut most = 0.0f64;
+    for (x, y) in (0..16).flat_map(|y| (0..32).map(move |x| (x, y))) {
+        let found = again.spectrum(x as u32, y as u32).expect("read").expect("there");
+        for (k, &found) in found.iter().enumerate() {
+            let around = (-1..=1).flat_map(|j| (-1..=1).map(move |i| (i, j)));
+            let (mut expected, mut low, mut high) = (0.0, f64::INFINITY, 0.0f64);
+            for (i, j) in around {
+                let value = at(x + i, y + j, k);
+                let weight = |i: i64| if i == 0 { 0.75 } else { 0.125 };
+                expected += weight(i) * weight(j) * value;
+                (low, high) = (low.min(value), high.max(value));
+            }
+            let bound = 3.0 * discrepancy * (high - low) + 1e-5 * high;
+            let off = (f64::from(found) - expected).abs();
+            assert!(off <= bound, "pixel {x} {y}, channel {k}: {found} {expected} {bound}");
+            most = most.max(off / bound);
+        }
+    }
+    // The map has edges, so that a wrong turn or a flip is far beyond that.
+    println!("{most:.3} of the bound");
+    let flat = (0..32).all(|x| (at(x, 4, 0) - at(x + 1, 4, 0)).abs() < 0.5);
+    assert!(!flat, "a poor test");
+}
+
+/// In a furnace all directions are the same, to the last bit.
+#[test]
+fn a_furnace_is_even() {
+    let place = Place::of(&format!("{ROOM}\n[environment]\nradiance = 0.7\n"));
+    let cube = place.render("cube.zarr", &["--spp", "8"]);
+    for (x, y) in (0..16).flat_map(|y| (0..32).map(move |x| (x, y))) {
+        assert_eq!(cube.spectrum(x, y).expect("read").expect("there"), [0.7, 0.7], "{x} {y}");
+    }
+    // A film of another shape is seldom meant.
+    let output = place.run(&["plan", "scene.toml", "--set", "film.width=30"]);
+    assert!(crate::binary::text(&output.stderr).contains("twice as wide as high"));
+}
