@@ -179,7 +179,17 @@ material = "ball"
 [[instances]]
 assembly = "tree"
 placements = "trees.csv"               # x,y,z,yaw_degrees,scale
-up = [0, 0, 1]
+"#,
+        r#"
+[[assemblies.tree.objects]]
+sphere = { center = [0, 0, 1.5], radius = 0.6 }
+material = "ball"
+
+[[instances]]
+assembly = "tree"
+placements = "trees.csv"
+up = [0, 0, 1]                         # yaw turns about the axis of the trunk
+transform = { translate = [0, 0, 0.5] }
 "#,
     ],
     notes: "Spheres, disks and cylinders in an assembly ask for instances that keep their shape: one scale in all \
