@@ -1,7 +1,8 @@
 """Error against time for every choice between paths and evaluations: wavelengths per channel, roulette on evaluation, and what `auto`
 makes of it.
 
-    measure.py --spectile PROGRAM [-o FOLDER] [--scenes NAMES] [--channels K,K] [--rounds N] [--minutes N] [--gas FOLDER]
+    measure.py --spectile PROGRAM [-o FOLDER] [--scenes NAMES] [--channels K,K] [--choices NAMES]
+               [--rounds N] [--minutes N] [--gas FOLDER]
 
 What was measured is kept in FOLDER/measured.jsonl, a line a render, and not measured again: so it can be done in parts. Each choice renders the same picture for some epochs. Time is that of the epochs, compilation and the pilot apart; processor time on
 software devices. The choices of a scene and number of channels take turns. Error is the cube's own estimate from the spread of its epochs, one for each channel:
@@ -136,12 +137,14 @@ class Measured:
         return refused[0] if refused else found or None
 
 
-def measure(program, measured, scenes, channel_counts, rounds, until):
+def measure(program, measured, scenes, channel_counts, wanted, rounds, until):
     """Whatever is missing, turn by turn, while there is time."""
     for turn in range(rounds):
         for scene in scenes:
             for channels in channel_counts:
                 for choice in choices(channels, channels == max(channel_counts)):
+                    if wanted and choice.name not in wanted:
+                        continue
                     what = (scene, channels, choice.name, turn)
                     if what in measured.found or isinstance(measured.turns(scene, channels, choice.name), str):
                         continue
@@ -303,6 +306,7 @@ def main():
     parser.add_argument("--scenes", default=",".join(SCENES))
     parser.add_argument("--channels", default="8,32,128,512")
     parser.add_argument("--rounds", type=int, default=1, help="turns of every choice, with other seeds: medians of times")
+    parser.add_argument("--choices", help="only these, such as all,auto")
     parser.add_argument("--minutes", type=float, default=math.inf, help="begins no render after these; the next call goes on")
     parser.add_argument("--gas", type=pathlib.Path, default=pathlib.Path("../shared/data/gas"), help=f"where {' and '.join(LINES)} are")
     arguments = parser.parse_args()
@@ -312,7 +316,8 @@ def main():
     until = time.monotonic() + 60 * arguments.minutes
     try:
         channels = [int(k) for k in arguments.channels.split(",")]
-        measure(program, measured, arguments.scenes.split(","), channels, arguments.rounds, until)
+        wanted = arguments.choices and arguments.choices.split(",")
+        measure(program, measured, arguments.scenes.split(","), channels, wanted, arguments.rounds, until)
     finally:
         shutil.rmtree(program.folder, ignore_errors=True)
     rows = table_of(measured)
