@@ -1,9 +1,10 @@
 """Error against time for every choice between paths and evaluations: wavelengths per channel, roulette on evaluation, and what `auto`
 makes of it.
 
-    measure.py --spectile PROGRAM [-o FOLDER] [--scenes NAMES] [--channels K,K] [--rounds N]
+    measure.py --spectile PROGRAM [-o FOLDER] [--scenes NAMES] [--channels K,K] [--choices NAMES]
+               [--rounds N] [--minutes N] [--gas FOLDER]
 
-Each choice renders the same picture for some epochs. Time is that of the epochs, compilation and the pilot apart; processor time on
+What was measured is kept in FOLDER/measured.jsonl, a line a render, and not measured again: so it can be done in parts. Each choice renders the same picture for some epochs. Time is that of the epochs, compilation and the pilot apart; processor time on
 software devices. The choices of a scene and number of channels take turns. Error is the cube's own estimate from the spread of its epochs, one for each channel:
 efficiency is 1 / (mean over channels of error² x time a path), of which ratios to all paths at one wavelength are told. Needs nothing
 but Python 3.9 and the program.
@@ -23,7 +24,10 @@ import tempfile
 import time
 
 # Scene, and the epochs and pixels that its noise asks for.
-SCENES = ["cornell/cornell", "statues/statues", "aircraft/aircraft", "conference/conference", "aircraft/aircraft-infrared"]
+SCENES = ["cornell/cornell", "statues/statues", "aircraft/aircraft", "conference/conference", "aircraft/aircraft-infrared", "aircraft/aircraft-lines"]
+# The infrared aircraft with a plume line by line: the scene that it is made of, and what is set there. Absorption at 1 atm in steps of 0.02
+# and 0.01 cm-1, 25,000 nodes at each of five temperatures; CO as of a poor combustion.
+LINES = ["lbl_co_2000-2300cm_1atm.csv", "lbl_h2o_2000-2100cm_1atm.csv"]
 EPOCH, EPOCHS = 16, 16
 SIZE = "32x20"
 
@@ -41,15 +45,15 @@ def choices(channels, sweep):
         Choice("roulette", {"evaluation": "roulette", "wavelengths_per_channel": 1}),
     ]
     if channels <= 32:
-        found += [Choice(f"m={m}", {"evaluation": "all", "wavelengths_per_channel": m}) for m in (2, 4, 16)]
+        found += [Choice(f"m={m}", {"evaluation": "all", "wavelengths_per_channel": m}) for m in (2, 4, 8, 16)]
     if sweep:
         found += [Choice(f"s x {factor:g}", {"evaluation": "roulette", "wavelengths_per_channel": 1}, factor) for factor in (0.125, 0.5, 2, 8)]
     return found
 
 
 class Program:
-    def __init__(self, path, scenes):
-        self.path, self.scenes = path, scenes
+    def __init__(self, path, scenes, gas):
+        self.path, self.scenes, self.gas = path, scenes, gas.resolve()
         adapter = next(event for event in self.run("devices", "--json") if event["event"] == "device")
         self.device, self.is_software = adapter["name"], adapter["is_software"]
         self.folder = pathlib.Path(tempfile.mkdtemp())
@@ -67,15 +71,28 @@ class Program:
         self.run(*arguments)
         return [after - before for after, before in zip(times(), before)][self.is_software]
 
+    def of_scene(self, scene):
+        """Its file, and what is set in it."""
+        if not scene.endswith("-lines"):
+            return self.scenes / f"{scene}.toml", []
+        tables = [self.gas / name for name in LINES]
+        missing = [str(table) for table in tables if not table.exists()]
+        if missing:
+            raise RuntimeError(f"{missing[0]} is not there (--gas)")
+        species = ", ".join(f'{{ table = "{table}", fraction = {fraction} }}' for table, fraction in zip(tables, (0.01, 0.034)))
+        settings = [f"media.plume.species=[{species}]", "channels.equal.from=4350", "channels.equal.to=4990"]
+        return self.scenes / "aircraft/aircraft-infrared.toml", settings
+
     def render(self, scene, channels, choice, seed):
         """Seconds a path, error of every channel, what was chosen."""
-        file = self.scenes / f"{scene}.toml"
+        file, set_in_scene = self.of_scene(scene)
         key = "wavenumber" if "\nwavenumber" in file.read_text() else "equal"
         cube = self.folder / "cube.zarr"
         shutil.rmtree(cube, ignore_errors=True)
         settings = {**choice.settings, "epoch": EPOCH}
         arguments = ["render", str(file), "-o", str(cube), "--size", SIZE, "--seed", str(seed), "--json"]
-        arguments += ["--set", f"channels.{key}.count={channels}"]
+        for setting in [*set_in_scene, f"channels.{key}.count={channels}"]:
+            arguments += ["--set", setting]
         if "false_colour" in file.read_text():
             arguments += ["--set", f"channels.false_colour=[{channels - 1},{channels // 2},0]"]
         for name, value in settings.items():
@@ -99,25 +116,78 @@ class Program:
         return seconds, errors, info["choices"]
 
 
-def measure(program, scenes, channel_counts, rounds):
-    rows = []
-    for scene in scenes:
-        for channels in channel_counts:
-            sweep = channels == max(channel_counts)
-            found = {}
-            for turn in range(rounds):
-                for choice in choices(channels, sweep):
-                    if isinstance(found.get(choice.name), str):
+class Measured:
+    """What is known, by scene, channels, choice and turn: kept in a file, a line for each."""
+
+    def __init__(self, file):
+        self.file, self.found = file, {}
+        for line in file.read_text().splitlines() if file.exists() else []:
+            render = json.loads(line)
+            self.found[tuple(render["what"])] = render["result"]
+
+    def add(self, what, result):
+        self.found[what] = result
+        with open(self.file, "a") as file:
+            file.write(json.dumps({"what": what, "result": result}) + "\n")
+
+    def turns(self, scene, channels, choice):
+        """All turns; or why there are none, or None where nobody has asked yet."""
+        found = [result for (s, k, c, _), result in self.found.items() if (s, k, c) == (scene, channels, choice)]
+        refused = [result for result in found if isinstance(result, str)]
+        return refused[0] if refused else found or None
+
+
+def measure(program, measured, scenes, channel_counts, wanted, rounds, until):
+    """Whatever is missing, turn by turn, while there is time."""
+    for turn in range(rounds):
+        for scene in scenes:
+            for channels in channel_counts:
+                for choice in choices(channels, channels == max(channel_counts)):
+                    if wanted and choice.name not in wanted:
                         continue
+                    what = (scene, channels, choice.name, turn)
+                    if what in measured.found or isinstance(measured.turns(scene, channels, choice.name), str):
+                        continue
+                    if time.monotonic() > until:
+                        return
                     try:
-                        found.setdefault(choice.name, []).append(program.render(scene, channels, choice, turn))
+                        result = program.render(scene, channels, choice, turn)
                     except RuntimeError as refused:
-                        found[choice.name] = str(refused)
-            base = found["all"]
-            for choice in choices(channels, sweep):
-                rows.append(row(scene, channels, choice, found[choice.name], base))
+                        result = str(refused)
+                    measured.add(what, result)
+                    print(*what, result if isinstance(result, str) else f"{1e6 * result[0]:.1f} us a path", flush=True)
+
+
+def table_of(measured):
+    """A row for each choice of each scene and number of channels of which all paths were measured too."""
+    rows = []
+    known = {(scene, channels) for scene, channels, _, _ in measured.found}
+    for scene, channels in sorted(known, key=lambda s: (SCENES.index(s[0]), s[1])):
+        base = measured.turns(scene, channels, "all")
+        for choice in choices(channels, True):
+            turns = measured.turns(scene, channels, choice.name)
+            if turns is not None and base is not None and (isinstance(turns, str) or not isinstance(base, str)):
+                rows.append(row(scene, channels, choice, turns, base))
                 print(rows[-1]["text"], flush=True)
     return rows
+
+
+def against_fixed(rows):
+    """Of each scene and number of channels: auto's gain, and the best fixed choice's. Where auto takes what that is, both are the same
+    render, measured twice."""
+    found = []
+    for scene, channels in dict.fromkeys((r["scene"], r["channels"]) for r in rows):
+        here = {r["choice"]: r for r in rows if (r["scene"], r["channels"]) == (scene, channels) and "gain" in r}
+        fixed = {name: r["gain"] for name, r in here.items() if name in ("all", "roulette") or name.startswith("m=")}
+        if "auto" not in here or not fixed:
+            continue
+        auto, best = here["auto"], max(fixed, key=fixed.get)
+        taken = "roulette" if auto["scale"] else "all"
+        taken = f"m={auto['wavelengths']}" + (", roulette" if auto["scale"] else "") if (auto["wavelengths"] or 1) > 1 else taken
+        found.append({"scene": scene, "channels": channels, "auto": taken, "expected": auto["predicted"], "gain": auto["gain"],
+                      "best": best, "best_gain": fixed[best], "of_best": auto["gain"] / fixed[best],
+                      "of_same": fixed.get(taken, auto["gain"]) / fixed[best]})
+    return found
 
 
 def row(scene, channels, choice, turns, base):
@@ -183,6 +253,14 @@ def page(rows, device):
     )
     parts.append("<h2>Fewer wavelengths than channels: n of K a path</h2><p>Efficiency over that of all K, from the measured times.</p>")
     parts.append(table(["scene", "n", "K", "efficiency"], [[f["scene"], f["n"], f["channels"], f["efficiency"]] for f in fewer(rows)]))
+    parts.append(
+        "<h2>Auto against the best fixed choice</h2><p>Gains over all paths at one wavelength; <i>over best</i>: auto's over that of the best "
+        "fixed choice, <i>of its kind</i>: that of the fixed choice that auto took, over the best, without the clock's noise between two "
+        "renders of the same.</p>"
+    )
+    names = ["scene", "channels", "auto", "expected", "gain", "best", "best_gain", "of_best", "of_same"]
+    heads = ["scene", "channels", "auto took", "expected", "gain", "best fixed", "its gain", "over best", "of its kind"]
+    parts.append(table(heads, [[f[name] for name in names] for f in against_fixed(rows)]))
     parts.append("<h2>Several wavelengths a channel, roulette on evaluation, auto</h2>")
     parts.append(table(FIELDS, [[r.get(field) for field in FIELDS] for r in rows]))
     parts.append("<h2>Gain against s</h2><p>Dots: measured. The first line of each scene's table above is all paths, gain 1.</p>")
@@ -227,14 +305,22 @@ def main():
     parser.add_argument("-o", "--output", type=pathlib.Path, default=pathlib.Path("out/tradeoff"))
     parser.add_argument("--scenes", default=",".join(SCENES))
     parser.add_argument("--channels", default="8,32,128,512")
-    parser.add_argument("--rounds", type=int, default=1)
+    parser.add_argument("--rounds", type=int, default=1, help="turns of every choice, with other seeds: medians of times")
+    parser.add_argument("--choices", help="only these, such as all,auto")
+    parser.add_argument("--minutes", type=float, default=math.inf, help="begins no render after these; the next call goes on")
+    parser.add_argument("--gas", type=pathlib.Path, default=pathlib.Path("../shared/data/gas"), help=f"where {' and '.join(LINES)} are")
     arguments = parser.parse_args()
-    program = Program(arguments.spectile, arguments.scene_folder)
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    measured = Measured(arguments.output / "measured.jsonl")
+    program = Program(arguments.spectile, arguments.scene_folder, arguments.gas)
+    until = time.monotonic() + 60 * arguments.minutes
     try:
-        rows = measure(program, arguments.scenes.split(","), [int(k) for k in arguments.channels.split(",")], arguments.rounds)
+        channels = [int(k) for k in arguments.channels.split(",")]
+        wanted = arguments.choices and arguments.choices.split(",")
+        measure(program, measured, arguments.scenes.split(","), channels, wanted, arguments.rounds, until)
     finally:
         shutil.rmtree(program.folder, ignore_errors=True)
-    arguments.output.mkdir(parents=True, exist_ok=True)
+    rows = table_of(measured)
     with open(arguments.output / "tradeoff.csv", "w", newline="") as file:
         writer = csv.DictWriter(file, FIELDS, extrasaction="ignore")
         writer.writeheader()

@@ -17,24 +17,34 @@
 #end
 #endif
 #if THINNED
-    // What is seen before scattering apart from the rest, which roulette has a say in.
-#repeat VECTORS v
-    var seen_$v = vec4<f32>(0.0);
-#end
-    var counts = 1.0;
+    // What is seen before scattering lies before this record; the rest roulette has a say in.
+    let first_behind = first_record + seen_records;
 #endif
     for (var r = first_record; r < first_record + used; r += 1u) {
         let record = records[r];
-#if THINNED
-        if (r == first_record + seen_records) {
-            counts = kept;
+#if THINS
+        // To be tried alone.
+        if (r == first_behind) {
 #repeat VECTORS v
-            seen_$v = radiance_$v;
             radiance_$v = vec4<f32>(0.0);
 #end
         }
 #endif
 #if GENERAL
+#if THINNED
+#if THINS
+#else
+        // It counts for more: all radiance has the factor of the throughput.
+        if (r == first_behind) {
+#repeat VECTORS v
+            throughput_$v *= kept;
+#if SCATTERS
+            saved_$v *= kept;
+#endif
+#end
+        }
+#endif
+#endif
 #if RAW_RECORDS
         var raw = vec4<f32>(0.0);
         if ((record.x & 0x3fu) >= FIRST_RAW_OP) {
@@ -188,7 +198,16 @@
 #else
         let factor_id = record.x & 0xffffu;
         let source_id = record.x >> 16u;
+#if THINNED
+#if THINS
         let weight = bitcast<f32>(record.y);
+#else
+        // One number for all channels: less than to scale what each brings.
+        let weight = bitcast<f32>(record.y) * select(1.0, kept, r >= first_behind);
+#endif
+#else
+        let weight = bitcast<f32>(record.y);
+#endif
 #repeat VECTORS v
 #if REGISTERS
         var factor_$v = vec4<f32>(1.0);
@@ -208,8 +227,3 @@
 #end
 #endif
     }
-#if THINNED
-#repeat VECTORS v
-    radiance_$v = seen_$v + counts * radiance_$v;
-#end
-#endif

@@ -37,7 +37,15 @@ fn table_index(stratum: u32, spectrum: u32, quad: u32) -> u32 {
 #else
 fn table_value(spectrum: u32, quad: u32, s: SpectralSample) -> vec4<f32> {
     let at = table_index(s.stratum, spectrum, quad);
+#if KINKS
+    var value = spectra[at] + s.place * spectra[at + 1u];
+#repeat KINKS j
+    value += spectra[at + 2u + KINKS + $ju] * max(s.place - spectra[at + 2u + $ju], vec4<f32>(0.0));
+#end
+    return max(value, vec4<f32>(0.0));
+#else
     return spectra[at] + s.place * spectra[at + 1u];
+#endif
 }
 
 #if KNOTS

@@ -35,12 +35,13 @@ fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
     for (var i = 0u; i < wave.samples; i += 1u) {
 #if THINNED
         // Paths of which nothing is evaluated, in a loop of their own: software devices go through all of a loop's body that is skipped.
+        var head: vec4<u32>;
         for (; i < wave.samples; i += 1u) {
-            let skipped = heads[local_slot * wave.samples + i];
-            if (evaluates(skipped)) {
+            head = heads[local_slot * wave.samples + i];
+            if (evaluates(head)) {
                 break;
             }
-            foreign |= (skipped.y ^ mark) | (skipped.z ^ mark);
+            foreign |= (head.y ^ mark) | (head.z ^ mark);
 #repeat VECTORS v
             mean_$v += (vec4<f32>(0.0) - mean_$v) / f32(wave.sample_begin + i + 1u);
 #end
@@ -50,7 +51,10 @@ fn evaluate_pixel(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
         }
 #endif
         let path = local_slot * wave.samples + i;
+#if THINNED
+#else
         let head = heads[path];
+#endif
 #if WAVELENGTHS
 #else
         let s = spectral_sample(head.x);

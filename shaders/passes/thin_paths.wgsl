@@ -35,7 +35,7 @@ fn thin_paths(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgro
 #include common/records.wgsl
         var brought = vec4<f32>(0.0);
 #repeat VECTORS v
-        brought = max(brought, abs(radiance_$v - seen_$v) * importances[$vu]);
+        brought = max(brought, abs(radiance_$v) * importances[$vu]);
 #end
         let slot = wave.pixel_begin + path / wave.samples;
         let in_tile = slot % wave.tile_pixels;

@@ -36,6 +36,16 @@ pub struct Choices {
     pub gain: f64,
     /// Variance of the channel that suffers most, over that with all paths, as expected.
     pub variance: f64,
+    /// Means over paths of the pilot: rays, records, those that look up an environment map, and voxels that are marched through; 0 where no
+    /// pilot was needed.
+    #[serde(default)]
+    pub rays: f64,
+    #[serde(default)]
+    pub records: f64,
+    #[serde(default)]
+    pub map_records: f64,
+    #[serde(default)]
+    pub voxels: f64,
     /// Samples of the pilot, all pixels together; 0 where none was needed.
     pub samples: u32,
     /// Mean radiance of the picture in every channel that devices render, W m⁻² sr⁻¹ nm⁻¹, as far as the pilot knows.

@@ -21,9 +21,9 @@ pub fn resolve(scene: &Scene, software: bool) -> Evaluator {
     }
 }
 
-/// What evaluating a path in all channels costs, over generating it: by the kind of device, never by a clock. Measured with `spectile
-/// bench` (docs/reports), geometric means over scenes of a channel's part of it: on an H200 from 128 channels on 4.4e-3, 1.3e-3, 5e-3
-/// and 1.5e-3 (four scenes); on llvmpipe 2.8e-3 in registers, else 1.7e-2, 3.9e-2 and 1.3e-2.
+/// What evaluating a path in all channels costs, over generating it, before it is known what paths take: by the kind of device, never by a
+/// clock. Measured with `spectile bench` (docs/reports), geometric means over scenes of a channel's part of it: on an H200 from 128
+/// channels on 4.4e-3, 1.3e-3, 5e-3 and 1.5e-3 (four scenes); on llvmpipe 2.8e-3 in registers, else 1.7e-2, 3.9e-2 and 1.3e-2.
 pub fn evaluation_cost(scene: &Prepared, software: bool) -> f64 {
     let per_channel = match software {
         false => 2.6e-3,
@@ -31,6 +31,78 @@ pub fn evaluation_cost(scene: &Prepared, software: bool) -> f64 {
         true => 2e-2,
     };
     per_channel * scene.channels as f64 * f64::from(scene.wavelengths_per_channel)
+}
+
+/// What parts of a path cost on a kind of device, nanoseconds: constants, never a clock's, so that what is decided by them is the same every
+/// time. Only their ratios matter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Costs {
+    /// To make it: its start, and each of its rays with what happens where it ends.
+    pub camera: f64,
+    pub ray: f64,
+    /// To evaluate it in one channel: by itself, and at all its wavelengths for each record, what one that looks up an environment map
+    /// takes more, and each voxel that is marched through.
+    pub path: f64,
+    pub record: f64,
+    pub map: f64,
+    pub cell: f64,
+    /// In one channel, where roulette leaves nothing of it.
+    pub skipped: f64,
+    /// What a channel costs in which roulette tries a path, over one of those in which it is evaluated: threads that have a path each read
+    /// records and tables more slowly than those that share one.
+    pub tried: f64,
+}
+
+impl Costs {
+    /// For a scene on a software device or a GPU.
+    pub fn of(scene: &Prepared, software: bool) -> Costs {
+        // Levels of the tree that a ray descends, were it binary; where all triangles are tested there is none.
+        let depth = if scene.features.few_triangles { 0.0 } else { (1.0 + scene.accel.nodes.len() as f64).log2() };
+        let in_registers = scene.features.registers;
+        let costs = match software {
+            // From paths a second at 8, 128 and 512 channels on an H200 (README), with what the pilot counts in these scenes. Voxels were
+            // not measured there: as much of a record as on software devices.
+            false => Costs {
+                camera: 0.0,
+                ray: 0.1 + 0.034 * depth,
+                path: 7e-4,
+                record: if in_registers { 1.4e-3 } else { 3e-3 },
+                map: 6e-3,
+                cell: 3e-3,
+                skipped: 2e-4,
+                tried: 2.5,
+            },
+            // llvmpipe, times of benches/tradeoff.
+            true => Costs {
+                camera: 200.0 + 80.0 * depth,
+                ray: 150.0 + 90.0 * depth,
+                path: if in_registers { 0.4 } else { 4.0 },
+                record: if in_registers { 0.9 } else { 20.0 },
+                map: 25.0,
+                cell: 20.0,
+                skipped: 0.3,
+                tried: if in_registers { 6.0 } else { 3.5 },
+            },
+        };
+        let apart = if software { apart(EvaluateShape::of(scene, true).lanes) } else { 1.0 };
+        let several = f64::from(scene.wavelengths_per_channel) * apart;
+        // Paths are tried at the first of their wavelengths, a thread for each in any case.
+        Costs {
+            path: apart * costs.path,
+            record: several * costs.record,
+            map: several * costs.map,
+            cell: several * costs.cell,
+            tried: costs.tried / several,
+            ..costs
+        }
+    }
+}
+
+/// Eight threads of a software device run as one. Where so few share a path that they have several, each waits for the longest, and they read
+/// different records: a channel then costs up to 2.6 times as much (conference, Cornell's box, a plume: 2.9, 2.6, 2.1 at 8 channels).
+fn apart(lanes: u32) -> f64 {
+    let paths = f64::from(8 / lanes.clamp(1, 8));
+    1.0 + 1.6 / 3.0 * paths.log2()
 }
 
 /// Threads of one workgroup of what evaluates: `lanes` threads for each of `pixels` pixels, `vectors` quads of channels
@@ -114,7 +186,12 @@ impl EvaluateShape {
 
 #[cfg(test)]
 mod tests {
-    use super::EvaluateShape;
+    use super::{EvaluateShape, apart};
+
+    #[test]
+    fn threads_that_share_a_path_cost_least() {
+        assert_eq!([1, 2, 8, 32].map(|lanes| (100.0 * apart(lanes)).round()), [260.0, 207.0, 100.0, 100.0]);
+    }
 
     #[test]
     fn evaluation_groups_cover_all_channels_with_few_idle_threads() {

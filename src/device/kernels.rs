@@ -102,7 +102,9 @@ impl OnDevice<'_> {
         };
         let mut try_paths = self.defines(Work::Evaluate);
         if let Some(thinning) = &self.thinning {
-            try_paths.constant("VECTORS", thinning.importances.len() as u32).set("THINS", true);
+            // A thread has one path, whose few records need few of the spectra that one with many paths holds in registers.
+            let quads = thinning.importances.len() as u32;
+            try_paths.constant("VECTORS", quads).set("THINS", true).set("REGISTERS", false);
         }
         let text = |last: &[Text], defines: &Defines| {
             compose(&[EVALUATING, last].map(|texts| self.modules(texts)).concat(), defines)

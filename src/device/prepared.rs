@@ -282,12 +282,11 @@ impl Prepared {
         if self.evaluator == Evaluator::Pt { 1 } else { self.frame.max_bounces }
     }
 
-    /// Iterations that evaluation may take for one path, at each of its wavelengths: its records, and the voxels on its ways with the
-    /// absorbers in each.
+    /// Iterations that evaluation may take for one path, at each of its wavelengths: its records, and the voxels on its ways from vertex
+    /// to vertex.
     pub fn path_iterations(&self) -> u32 {
-        let cells = self.media.as_ref().map_or(0, |media| media.marched.saturating_mul(1 + media.most_absorbers));
-        let ways = self.vertices_at_once().saturating_mul(2) + 1;
-        let walk = (self.frame.max_records + 1).saturating_add(ways.saturating_mul(cells));
+        let way = self.media.as_ref().map_or(0, Media::way_iterations);
+        let walk = (self.frame.max_records + 1).saturating_add((self.vertices_at_once() + 1).saturating_mul(way));
         walk.saturating_mul(self.wavelengths_per_channel)
     }
 

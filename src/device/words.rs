@@ -110,6 +110,10 @@ constants! {
     LOBE_THROUGH {
         LOBE_TRANSMITTED = 11;
     }
+    /// Above: facets of a metal whose further scattering has a lobe of its own, and which mirror hardly anything below the surface.
+    LOBE_AGAIN {
+        LOBE_BOUNDED = 0x2000;
+    }
     /// And the bits above it.
     LOBE_FLAGS {
         LOBE_OPAQUE = 0x100;

@@ -252,6 +252,18 @@ impl Worker {
         self.gpu.queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
     }
 
+    /// Heads and records of the first `paths` paths of the wave submitted last, once it was collected; words, as they lie there.
+    pub fn saved_paths(&self, paths: u32) -> Result<(Vec<u32>, Vec<u32>)> {
+        let (buffers, paths) = (&self.path_buffers, u64::from(paths.min(self.plan.paths)));
+        let [heads, records] =
+            [self.plan.head_bytes(), self.plan.record_bytes()].map(|all| all / u64::from(self.plan.paths));
+        let _watched = self.gpu.deadline.watch(self.limit());
+        Ok((
+            buffer::read(&self.gpu, &buffers.heads, heads * paths, self.limit())?,
+            buffer::read(&self.gpu, &buffers.records, records * paths, self.limit())?,
+        ))
+    }
+
     /// Ends the work of [`Worker::submit`] with an error as soon as `interrupt` is set.
     pub fn watch(&mut self, interrupt: &Arc<Interrupt>) {
         self.interrupt = Arc::clone(interrupt);

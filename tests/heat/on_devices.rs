@@ -150,6 +150,41 @@ fn hot_metals_and_plastics_in_a_cavity() {
     }
 }
 
+/// Within a rough ball of a metal that reflects 0.95, paths are scattered dozens of times: weights that differ a little each time would make
+/// noise without end. With energy compensation it is at most four times that of facets that keep what they would scatter again: they
+/// reflect less, and paths matter for less long. (Eleven times, when light scattered again was spread by the cosine and facets mirrored a
+/// fifth of all paths below the surface.)
+#[test]
+fn compensation_of_a_metal_that_reflects_nearly_everything() {
+    let bounces = 100;
+    let cavity = |compensated: bool| {
+        let ball = sphere(DVec3::ZERO, 1.0);
+        let mut scene = Builder::new()
+            .camera(look(DVec3::new(0.1, 0.2, 0.3), DVec3::new(0.3, 0.1, -0.4), DVec3::Y, narrow()))
+            .channels(infrared())
+            .bounces(bounces)
+            .conductor(ball, 24.0, 38.0, [0.6; 2])
+            .at_kelvin(300.0)
+            .build();
+        let spectile::scene::Bsdf::Conductor { energy_compensation, .. } = &mut scene.materials[0].bsdf else {
+            panic!()
+        };
+        *energy_compensation = compensated;
+        let rendered = render(&scene, 64, 64, Settings { seed: 480, ..Settings::default() });
+        rendered.assert_clean();
+        rendered.image_means()
+    };
+    let (with, without) = (cavity(true), cavity(false));
+    // What is left after 100 times 0.9536 at most; emittances are within 1e-4 of 0.05 or more.
+    let bound = Bound { resolution: 0.05, allowance: 0.9536f64.powi(bounces as i32) + 2e-3 };
+    for (what, found) in [("compensated", &with), ("single", &without)] {
+        assert_estimates(what, found, &means(&planck(300.0), &infrared()), bound);
+    }
+    let ratios: Vec<f64> = with.iter().zip(&without).map(|(a, b)| a.error / b.error).collect();
+    println!("standard errors with energy compensation, over those without: {ratios:.2?}");
+    assert!(ratios.iter().all(|ratio| *ratio < 4.0), "{ratios:?}");
+}
+
 /// Coarse meshes that light sees as balls emit by the angle to that normal: a mirror and a rough plastic that the camera sees, and
 /// a mirror with slanted normals above a cold floor, whose heat is aimed at.
 #[test]

@@ -15,6 +15,8 @@ fn march(record: vec4<u32>, start: vec3<f32>, to: vec3<f32>, quad: u32, s: Spect
         squares = index * index;
     }
     let list = volumes[first + 6u];
+    // Of every temperature once, not in each cell: spectra that are lines are searched, and a way has more cells than they have columns.
+    var terms = spectra_of_matter(list, quad, s);
     let temperature = field_at(first + 3u);
 #if ONE_KIND
     let density_of_all = field_at(list + 1u);
@@ -30,14 +32,16 @@ fn march(record: vec4<u32>, start: vec3<f32>, to: vec3<f32>, quad: u32, s: Spect
             let kelvin = field_value(temperature, voxel);
 #if ONE_KIND
             let density = field_value(density_of_all, voxel);
-            var taken = Taken(density * absorption(list + 5u, absorbers_of_all, kelvin, quad, s), vec4<f32>(0.0));
+            var at = list + 5u;
+            var term = 0u;
+            var taken = Taken(density * absorption(&at, absorbers_of_all, kelvin, &term, &terms), vec4<f32>(0.0));
 #if SCATTERS
             if (volumes[list + 3u] != NONE) {
-                taken.scattering = density * spectrum_value(volumes[list + 3u], quad, s);
+                taken.scattering = density * terms[term];
             }
 #endif
 #else
-            let taken = coefficients(list, voxel, kelvin, quad, s);
+            let taken = coefficients(list, voxel, kelvin, &terms);
 #endif
             let length = metres * (end - done);
 #if SCATTERS
@@ -65,47 +69,70 @@ struct Taken {
     scattering: vec4<f32>,
 }
 
-// Of so many absorbers from word `first` on, at density 1: linear in temperature between columns, the ends held.
-fn absorption(first: u32, absorbers: u32, kelvin: f32, quad: u32, s: SpectralSample) -> vec4<f32> {
+// The spectra of a volume's matter in the order of amounts: of each kind those of its absorbers at each temperature, then of what it
+// scatters.
+fn spectra_of_matter(list: u32, quad: u32, s: SpectralSample) -> array<vec4<f32>, MOST_TERMS> {
+    var terms = array<vec4<f32>, MOST_TERMS>();
+    var at = list + 1u;
+    var term = 0u;
+    for (var n = 0u; n < volumes[list]; n += 1u) {
+        let scattering = volumes[at + 2u];
+        let absorbers = volumes[at + 3u];
+        at += 4u;
+        for (var m = 0u; m < absorbers; m += 1u) {
+            let columns = volumes[at + 1u];
+            for (var c = 0u; c < columns; c += 1u) {
+                terms[term] = spectrum_value(volumes[at + 3u + 2u * c], quad, s);
+                term += 1u;
+            }
+            at += 2u + 2u * columns;
+        }
+        if (scattering != NONE) {
+            terms[term] = spectrum_value(scattering, quad, s);
+            term += 1u;
+        }
+    }
+    return terms;
+}
+
+// Of so many absorbers from word `at` on, at density 1: linear in temperature between columns, the ends held. Leads `at` and `term`
+// behind them. Without a loop: an invocation may have 32,768 iterations in all, and walks through cells take them.
+fn absorption(at: ptr<function, u32>, absorbers: u32, kelvin: f32, term: ptr<function, u32>, terms: ptr<function, array<vec4<f32>, MOST_TERMS>>) -> vec4<f32> {
     var sum = vec4<f32>(0.0);
-    var at = first;
-    for (var m = 0u; m < absorbers; m += 1u) {
-        let strength = bitcast<f32>(volumes[at]);
-        let columns = volumes[at + 1u];
-        let column = at + 2u;
-        at = column + 2u * columns;
-        let above = columns_below(column, columns, kelvin);
-        let high = min(above, columns - 1u);
-        let low = max(above, 1u) - 1u;
-        var value = spectrum_value(volumes[column + 2u * high + 1u], quad, s);
-        if (low != high) {
-            let a = bitcast<f32>(volumes[column + 2u * low]);
-            let b = bitcast<f32>(volumes[column + 2u * high]);
-            let under = spectrum_value(volumes[column + 2u * low + 1u], quad, s);
-            value = under + (kelvin - a) / (b - a) * (value - under);
+#repeat MOST_ABSORBERS m
+    if ($mu < absorbers) {
+        let strength = bitcast<f32>(volumes[*at]);
+        let columns = volumes[*at + 1u];
+        let between = between_columns(*at + 2u, columns, kelvin);
+        var value = (*terms)[*term + between.high];
+        if (between.low != between.high) {
+            let under = (*terms)[*term + between.low];
+            value = under + between.share * (value - under);
         }
         sum += strength * value;
+        *at += 2u + 2u * columns;
+        *term += columns;
     }
+#end
     return sum;
 }
 
 #if ONE_KIND
 #else
 // Of all kinds of matter in a voxel.
-fn coefficients(list: u32, voxel: u32, kelvin: f32, quad: u32, s: SpectralSample) -> Taken {
+fn coefficients(list: u32, voxel: u32, kelvin: f32, terms: ptr<function, array<vec4<f32>, MOST_TERMS>>) -> Taken {
     var sum = Taken(vec4<f32>(0.0), vec4<f32>(0.0));
     var at = list + 1u;
+    var term = 0u;
     for (var n = 0u; n < volumes[list]; n += 1u) {
         let density = value_in(at, voxel);
         let scattering = volumes[at + 2u];
         let absorbers = volumes[at + 3u];
         at += 4u;
+        sum.absorption += density * absorption(&at, absorbers, kelvin, &term, terms);
         if (scattering != NONE) {
-            sum.scattering += density * spectrum_value(scattering, quad, s);
-        }
-        sum.absorption += density * absorption(at, absorbers, kelvin, quad, s);
-        for (var m = 0u; m < absorbers; m += 1u) {
-            at += 2u + 2u * volumes[at + 1u];
+            sum.scattering += density * (*terms)[term];
+            term += 1u;
         }
     }
     return sum;

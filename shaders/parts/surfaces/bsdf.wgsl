@@ -132,6 +132,26 @@ fn spread_index(lobe: Lobe, which: u32) -> f32 {
 #endif
 #endif
 
+#if CONDUCTOR_AGAIN
+// Directions of what facets scatter more than once, by what single scattering loses there: a density over the square of the cosine that
+// is one number in each interval of the cosine. A table has its integral up to each of 257 cosines, then these numbers.
+fn again_direction(lobe: Lobe, u: vec2<f32>) -> vec3<f32> {
+    var i = 0u;
+    for (var step = COSINE_INTERVALS / 2u; step > 0u; step /= 2u) {
+        i += select(0u, step, tables[lobe.decision + i + step] <= u.x);
+    }
+    let from_z = f32(i) / f32(COSINE_INTERVALS);
+    let square = from_z * from_z + (u.x - tables[lobe.decision + i]) / tables[lobe.decision + COSINE_INTERVALS + 1u + i];
+    let z2 = clamp(square, 0.0, 1.0);
+    return vec3<f32>(unit_circle(u.y) * sqrt(1.0 - z2), sqrt(z2));
+}
+
+fn again_density(lobe: Lobe, z: f32) -> f32 {
+    let i = min(u32(max(z, 0.0) * f32(COSINE_INTERVALS)), COSINE_INTERVALS - 1u);
+    return max(z, 0.0) * INV_PI * tables[lobe.decision + COSINE_INTERVALS + 1u + i];
+}
+#endif
+
 // The density over solid angle with which a lobe chooses `i`; 0 for the only directions of mirrors and ideal refraction.
 fn lobe_density(lobe: Lobe, v: Vertex, i: vec3<f32>) -> f32 {
     switch (lobe.kind & 0xffu) {
@@ -145,7 +165,17 @@ fn lobe_density(lobe: Lobe, v: Vertex, i: vec3<f32>) -> f32 {
             if (i.z <= 0.0) {
                 return 0.0;
             }
+#if CONDUCTOR_AGAIN
+            if ((lobe.kind & LOBE_BOUNDED) != 0u) {
+                return ggx_bounded_density(lobe.alpha, v.o, normalize(v.o + i));
+            }
+#endif
             return ggx_reflected_density(lobe.alpha, v.o, normalize(v.o + i));
+        }
+#endif
+#if CONDUCTOR_AGAIN
+        case LOBE_CONDUCTOR_AGAIN: {
+            return again_density(lobe, i.z);
         }
 #endif
 #if ROUGH_GLASS

@@ -95,9 +95,19 @@ fn choose_direction(material: SurfaceMaterial, vertex: ptr<function, Vertex>, u_
 #endif
 #if MICROFACETS
         case LOBE_ROUGH_CONDUCTOR, LOBE_ROUGH_COAT: {
-            let h = ggx_visible_normal(lobe.alpha, v.o, u_bsdf);
+            var h = ggx_visible_normal(lobe.alpha, v.o, u_bsdf);
+#if CONDUCTOR_AGAIN
+            if ((lobe.kind & LOBE_BOUNDED) != 0u) {
+                h = ggx_bounded_normal(lobe.alpha, v.o, u_bsdf);
+            }
+#endif
             choice.direction = 2.0 * dot(v.o, h) * h - v.o;
             choice.goes_on = choice.direction.z > 0.0;
+        }
+#endif
+#if CONDUCTOR_AGAIN
+        case LOBE_CONDUCTOR_AGAIN: {
+            choice.direction = again_direction(lobe, u_bsdf);
         }
 #endif
 #if ROUGH_GLASS

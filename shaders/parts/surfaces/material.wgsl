@@ -21,7 +21,8 @@ struct Lobe {
     // Share of a blend.
     weight: f32,
     alpha: vec2<f32>,
-    // First values in `tables`: probabilities of choosing this lobe, and of reflection at a dielectric boundary.
+    // First values in `tables`: probabilities of choosing this lobe, and of reflection at a dielectric boundary; or the directions of
+    // what a metal's facets scatter again.
     picks: u32,
     decision: u32,
     // First value of the table of what single scattering loses, and its rows; or the number of 128 values before a table
@@ -38,6 +39,9 @@ struct Lobe {
 #constants LOBE_KINDS LOBE_FLAGS
 #if TRANSMITTED
 #constants LOBE_THROUGH
+#endif
+#if CONDUCTOR_AGAIN
+#constants LOBE_AGAIN
 #endif
 
 @group(0) @binding(12) var<storage, read> surface_materials: array<SurfaceMaterial>;

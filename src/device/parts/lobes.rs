@@ -7,7 +7,7 @@ use glam::DVec3;
 use crate::device::parts::surfaces::{INTERVALS, Kind, Surfaces, texture_records};
 use crate::device::parts::textures::{self, Share};
 use crate::device::prepared::LEAST_ALBEDO;
-use crate::device::words::{LOBE_DISPERSES, LOBE_NARROW, LOBE_TEXTURED, Lobe};
+use crate::device::words::{LOBE_BOUNDED, LOBE_DISPERSES, LOBE_NARROW, LOBE_TEXTURED, Lobe};
 use crate::scene::{Reflectance, SMOOTH, Scene, SpectrumId};
 use crate::spectral::Curve;
 use crate::spectral::hemisphere::fresnel::{self, mean_conductor, mean_dielectric};
@@ -85,9 +85,13 @@ impl Surfaces {
             let curve = Curve::derived(&[&scene.spectra[eta].curve, &scene.spectra[k].curve], &scene.channels, again);
             let means = means_of(scene, &curve);
             let rows: Vec<f32> = albedo.rows().iter().flatten().map(|v| *v as f32).collect();
+            // Both lobes together then send a white metal's light on with hardly differing weights. In a cavity of a metal that reflects
+            // nearly everything these are multiplied dozens of times, and their spread grows with each.
+            leaves[0].lobe.kind |= LOBE_BOUNDED;
             let lobe = Lobe {
                 ab: self.derived(format!("{name}, scattered again"), curve),
                 alpha: alpha.map(|a| a as f32),
+                decision: self.table(&again_directions(&albedo)),
                 loss: self.table(&rows),
                 rows: albedo.rows().len() as u32,
                 mean_loss: lost as f32,
@@ -300,6 +304,33 @@ fn means_of(scene: &Scene, curve: &Curve) -> Vec<f64> {
 
 fn channel_means(scene: &Scene, spectrum: SpectrumId) -> Vec<f64> {
     means_of(scene, &scene.spectra[spectrum].curve)
+}
+
+/// How directions are chosen of what facets scatter again: by what single scattering loses there, as Kulla and Conty's lobe has it.
+/// Over the square z² of the cosine, which Lambert's law spreads evenly: its integral up to each of [`INTERVALS`] + 1 even cosines, then
+/// the density over z² in each interval between them, of the very numbers before.
+fn again_directions(albedo: &ReflectionAlbedo) -> Vec<f32> {
+    const POINTS: usize = 4;
+    let square = |node: f64| (node / INTERVALS as f64).powi(2);
+    let lost = |interval: usize| {
+        let (from, to) = (square(interval as f64), square(interval as f64 + 1.0));
+        let at = |i: usize| from + (to - from) * (i as f64 + 0.5) / POINTS as f64;
+        // Never nothing, so that no direction in which anything is sent is left out.
+        let lost =
+            (0..POINTS).map(|i| mean_over_turns(albedo, at(i).sqrt()).max(1e-3 * albedo.mean_loss())).sum::<f64>();
+        lost / POINTS as f64 * (to - from)
+    };
+    let mut below = vec![0.0];
+    for interval in 0..INTERVALS {
+        below.push(below[interval] + lost(interval));
+    }
+    let whole = below[INTERVALS];
+    let below: Vec<f32> = below.into_iter().map(|sum| (sum / whole) as f32).collect();
+    let density = (0..INTERVALS).map(|i| {
+        let width = square(i as f64 + 1.0) - square(i as f64);
+        (f64::from(below[i + 1] - below[i]) / width) as f32
+    });
+    below.iter().copied().chain(density).collect()
 }
 
 /// What single scattering loses, the mean over a few azimuths: for decisions.

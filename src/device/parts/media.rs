@@ -98,7 +98,7 @@ pub const VOXELS: Part = Part {
     defines: |scene, _, defines| {
         let Some(media) = &scene.media else { return };
         defines.set("GRIDS", true).set("MOST_COLUMNS", media.most_columns).constant("MOST_TERMS", media.most_terms);
-        defines.set("ONE_KIND", media.most_kinds <= 1);
+        defines.set("MOST_ABSORBERS", media.most_absorbers).set("ONE_KIND", media.most_kinds <= 1);
     },
     example: Some(|exhibit| exhibit.add_voxels()),
     ..Part::NOTHING
@@ -127,12 +127,14 @@ pub struct Media {
     pub outer: u32,
     /// Whether camera rays start in different media.
     pub camera_is_cut: bool,
+    /// Gases of a kind of matter in a volume of voxels, and columns of their tables.
     pub most_absorbers: u32,
     pub most_columns: u32,
     /// Kinds of matter in a volume of voxels.
     pub most_kinds: u32,
-    /// Spectra of a volume of voxels whose amounts on a way tell its transmittance.
+    /// Spectra of a volume of voxels whose amounts on a way tell its transmittance; and iterations of going through their list.
     pub most_terms: u32,
+    pub most_listed: u32,
     /// Stretches of one way, voxels that it may go through, and those among them that evaluation marches through.
     pub stretches: u32,
     pub cells: u32,
@@ -247,6 +249,7 @@ impl Media {
             most_columns: 0,
             most_kinds: 0,
             most_terms: 1,
+            most_listed: 0,
             stretches: (2 * volumes.len() as u32 + 1).clamp(4, MOST_STRETCHES),
             cells: 0,
             marched: 0,
@@ -282,6 +285,16 @@ impl Media {
     pub fn way_records(&self) -> u32 {
         let marched = if self.marched > 0 { 3 } else { 1 };
         self.stretches * self.most_terms.div_ceil(2).max(marched)
+    }
+
+    /// Iterations that evaluation may take for one way of a path: cells of what emits, in each the kinds of matter where there are several;
+    /// and on each stretch the list of spectra. Ways to lights are not marched through.
+    pub fn way_iterations(&self) -> u32 {
+        if self.marched == 0 {
+            return 0;
+        }
+        let of_cell = if self.most_kinds > 1 { 1 + self.most_kinds } else { 1 };
+        self.marched.saturating_mul(of_cell).saturating_add(self.stretches * self.most_listed)
     }
 
     /// Puts voxels behind everything else in `volumes`, which is whole then.
@@ -403,7 +416,7 @@ impl Media {
     fn components(&mut self, scene: &Scene, medium: &Medium, densities: &[[u32; 2]]) -> u32 {
         self.volumes.push(medium.components.len() as u32);
         self.most_kinds = self.most_kinds.max(medium.components.len() as u32);
-        let (mut terms, mut absorbers) = (0, 0);
+        let mut terms = 0;
         for (component, density) in medium.components.iter().zip(densities) {
             self.note_voxels(self.volumes.len(), density[0]);
             self.volumes.extend(density);
@@ -424,9 +437,10 @@ impl Media {
                 self.most_columns = self.most_columns.max(absorber.columns.len() as u32);
                 terms += absorber.columns.len() as u32;
             }
-            absorbers += 1 + component.absorbers.len() as u32;
+            self.most_absorbers = self.most_absorbers.max(component.absorbers.len() as u32);
         }
-        self.most_absorbers = self.most_absorbers.max(absorbers);
+        let absorbers: usize = medium.components.iter().map(|component| component.absorbers.len()).sum();
+        self.most_listed = self.most_listed.max(terms + (absorbers + medium.components.len()) as u32);
         terms
     }
 

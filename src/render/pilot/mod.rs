@@ -5,10 +5,12 @@
 //! cost is known by the kind of device, how they vary is measured on paths that are never counted in the picture, so that the choice is
 //! the same every time.
 
+mod work;
+
 use std::sync::Arc;
 
 use crate::cube::Choices;
-use crate::device::evaluator::evaluation_cost;
+use crate::device::evaluator::{Costs, evaluation_cost};
 use crate::device::parts::paths::{Thinning, representatives, tried_channels};
 use crate::device::prepared::Prepared;
 use crate::device::words::{LOOP_LIMIT, MOST_WEIGHT};
@@ -18,6 +20,7 @@ use crate::render::wave::Budget;
 use crate::render::worker::{UnitRect, Worker};
 use crate::scene::{Evaluation, Evaluator, Film, MOST_WAVELENGTHS, Scene};
 use crate::{Error, Result};
+use work::{Means, Work};
 
 /// Pixels of the pilot, all over the film.
 const PIXELS: u32 = 256;
@@ -32,9 +35,6 @@ const FIRST_EPOCH: u32 = 1 << 31;
 /// Channels whose variance is predicted, at most: evenly among all.
 const MOST_CHANNELS: usize = 256;
 
-/// What a channel costs in which a path is tried, over one of those in which it is evaluated: threads that have a path each read records
-/// and tables more slowly than those that share one.
-const TRYING: f64 = 2.5;
 /// Variance that any channel may gain, over that of evaluating all paths.
 const MOST_VARIANCE: f64 = 1.1;
 /// What `auto` takes must be expected to bring so much.
@@ -43,11 +43,13 @@ const LEAST_GAIN: f64 = 1.1;
 /// the very most, and usually nothing.
 const LEAST_COST: f64 = 0.25;
 
-/// Wavelengths of a channel that the pilot compares with one.
+/// Wavelengths of a channel that the pilot compares with one, as far as a path may be evaluated at so many.
 const TRIED_WAVELENGTHS: u32 = 4;
-/// Where evaluating a path at one wavelength costs this share of generating it, `auto` takes one: there are so many channels that
-/// each is narrow, and two would cost half as much again.
-const MOST_COST_OF_ONE: f64 = 1.0;
+/// Samples of all the pilot's pixels that tell what paths take.
+const COUNTED: u32 = 8;
+/// Where evaluating a path at one wavelength costs this much of generating it, `auto` takes one: sixteen would bring a quarter more at the
+/// very most.
+const MOST_COST_OF_ONE: f64 = 4.0;
 /// Variance within a channel, over the square of the mean, that some spectrum must have for `auto` to ask samples.
 const LEAST_VARIATION: f64 = 0.05;
 
@@ -112,23 +114,32 @@ impl Pilot<'_> {
     /// At how many wavelengths of each channel paths are evaluated.
     fn wavelengths(&mut self, prepared: &mut Arc<Prepared>) -> Result<Several> {
         if let Some(count) = self.scene.integrator.wavelengths_per_channel {
-            return Ok(Several { count, gain: 1.0, reason: AS_ASKED.into() });
+            return Ok(Several::unasked(count, AS_ASKED.into()));
         }
-        let cost = evaluation_cost(prepared, self.gpus[0].is_software);
-        if let Some(reason) = one_by_rule(self.scene, prepared, cost) {
-            return Ok(Several { count: 1, gain: 1.0, reason });
+        if let Some(reason) = one_by_rule(self.scene, prepared, self.gpus[0].is_software) {
+            return Ok(Several::unasked(1, reason));
         }
         self.on_a_device(|pilot, gpu| {
-            let mut variances = |count| {
-                set_wavelengths(prepared, count)?;
-                let mut worker = worker(gpu, prepared, pilot.memory, pilot.interrupt)?;
-                net_variances(&mut worker, prepared.channels, pilot.scene)
-            };
-            let (one, tried) = (variances(1)?, variances(TRIED_WAVELENGTHS)?);
-            let each = prepared.path_iterations() / TRIED_WAVELENGTHS;
-            let counts =
-                (0..=MOST_WAVELENGTHS.ilog2()).map(|bits| 1 << bits).filter(|count| each * count <= LOOP_LIMIT);
-            Ok(Several::of(counts, &one, &tried, cost))
+            let start = |prepared: &Arc<Prepared>| worker(gpu, prepared, pilot.memory, pilot.interrupt);
+            set_wavelengths(prepared, 1)?;
+            let each = prepared.path_iterations();
+            let mut worker = start(prepared)?;
+            let units = pixels(&pilot.scene.film);
+            let costs = Costs::of(prepared, gpu.is_software);
+            let means = work::means(&mut worker, prepared, &units, COUNTED)?;
+            let cost = means.evaluation(&costs, prepared.channels);
+            if cost >= MOST_COST_OF_ONE {
+                return Ok(Several { means, ..Several::unasked(1, costs_so_much(cost)) });
+            }
+            let one = net_variances(&mut worker, prepared.channels, pilot.scene)?;
+            drop(worker);
+            let tried = TRIED_WAVELENGTHS.min(most_wavelengths(each));
+            set_wavelengths(prepared, tried)?;
+            let several = net_variances(&mut start(prepared)?, prepared.channels, pilot.scene)?;
+            let counts = (0..=most_wavelengths(each).ilog2()).map(|bits| 1 << bits);
+            let time = |count| means.whole(&costs, prepared.channels, count);
+            let found = Several::of(counts, time, [&one, &several], tried, costs_so_much(cost));
+            Ok(Several { means, ..found })
         })
     }
 
@@ -177,8 +188,9 @@ pub fn choose(
     interrupt: &Arc<Interrupt>,
 ) -> Result<Choices> {
     let trial = Trial::run(&mut worker(gpu, prepared, memory, interrupt)?, prepared, scene)?;
-    let cost = evaluation_cost(prepared, gpu.is_software);
-    Ok(trial.choose(cost, scene.integrator.evaluation == Evaluation::Roulette))
+    let costs = Costs::of(prepared, gpu.is_software);
+    let means = trial.means_of_work;
+    Ok(with_means(trial.choose(&costs, scene.integrator.evaluation == Evaluation::Roulette), &means))
 }
 
 /// The reason for what a scene has chosen itself.
@@ -194,16 +206,29 @@ struct Several {
     count: u32,
     gain: f64,
     reason: String,
+    /// Of the paths that were asked.
+    means: Means,
 }
 
 impl Several {
-    /// The one among `counts` that is expected to bring most, by variances of each channel with one wavelength and with
-    /// [`TRIED_WAVELENGTHS`]; evaluating at one costs `cost` of generating a path. Of m the noise within a channel falls as 1/m at
-    /// least: V(m) = V_p + V_l / m (docs/METHOD.md, Several wavelengths a channel).
-    fn of(counts: impl Iterator<Item = u32>, one: &[f64], tried: &[f64], cost: f64) -> Several {
+    /// One, or as many as were asked for.
+    fn unasked(count: u32, reason: String) -> Several {
+        Several { count, gain: 1.0, reason, means: Means::default() }
+    }
+
+    /// The one among `counts` that is expected to bring most, by variances of each channel with one wavelength and with `tried`; a path
+    /// with so many takes `time`. Of m the noise within a channel falls as 1/m at least: V(m) = V_p + V_l / m (docs/METHOD.md,
+    /// Several wavelengths a channel).
+    fn of(
+        counts: impl Iterator<Item = u32>,
+        time: impl Fn(u32) -> f64,
+        [one, several]: [&[f64]; 2],
+        tried: u32,
+        costs: String,
+    ) -> Several {
         let lit: Vec<(f64, f64)> =
-            one.iter().copied().zip(tried.iter().copied()).filter(|(one, _)| *one > 0.0).collect();
-        let tried = f64::from(TRIED_WAVELENGTHS);
+            one.iter().copied().zip(several.iter().copied()).filter(|(one, _)| *one > 0.0).collect();
+        let tried = f64::from(tried);
         let gain = |count: u32| {
             let m = f64::from(count);
             let grown = lit.iter().map(|&(one, several)| {
@@ -212,36 +237,39 @@ impl Several {
             });
             let mean = grown.sum::<f64>() / lit.len() as f64;
             // To whole percents: so that what differs in the last bits chooses the same.
-            ((1.0 + cost) / (1.0 + m * cost) / mean.max(1e-3) * 100.0).round() / 100.0
+            (time(1) / time(count) / mean.max(1e-3) * 100.0).round() / 100.0
         };
         // Of equal gains the fewest.
         let best = counts.filter(|_| !lit.is_empty()).map(|count| (count, gain(count)));
         let best = best.fold((1, 1.0), |best, found| if found.1 > best.1 { found } else { best });
         match best {
             (count, gain) if count > 1 && gain >= LEAST_GAIN => {
-                Several { count, gain, reason: format!("evaluating a path once costs {cost:.2} of generating it") }
+                Several { count, gain, reason: costs, means: Means::default() }
             }
-            (_, gain) => Several { count: 1, gain: 1.0, reason: format!("several would bring {gain:.2}, too little") },
+            (_, gain) => Several::unasked(1, format!("several would bring {gain:.2}, too little")),
         }
     }
 
     /// What both choices are together.
     fn and(self, paths: Choices) -> Choices {
-        let Several { count, gain, reason } = self;
+        let Several { count, gain, reason, means } = self;
+        let paths = if paths.rays > 0.0 { paths } else { with_means(paths, &means) };
         Choices { wavelengths_per_channel: count, wavelengths_gain: gain, wavelengths_reason: reason, ..paths }
     }
 }
 
 /// Why one wavelength a channel is enough, where no sample needs to be asked.
-fn one_by_rule(scene: &Scene, prepared: &Prepared, cost: f64) -> Option<String> {
+fn one_by_rule(scene: &Scene, prepared: &Prepared, software: bool) -> Option<String> {
     if prepared.disperses() {
         return Some("behind dispersion a path counts at its own wavelength only".into());
     }
-    if prepared.path_iterations().saturating_mul(TRIED_WAVELENGTHS) > LOOP_LIMIT {
+    if most_wavelengths(prepared.path_iterations()) == 1 {
         return Some("one evaluation of a path is as long as a loop may be".into());
     }
+    // Of scenes whose paths take as much as others' do; else it is counted.
+    let cost = evaluation_cost(prepared, software);
     if cost >= MOST_COST_OF_ONE {
-        return Some(format!("evaluating a path once costs {cost:.2} of generating it"));
+        return Some(costs_so_much(cost));
     }
     // Wavelengths that are drawn by emission make that even.
     let drawn = if prepared.warp.bits() > 0 { sources(scene) } else { Vec::new() };
@@ -252,6 +280,16 @@ fn one_by_rule(scene: &Scene, prepared: &Prepared, cost: f64) -> Option<String> 
     };
     let none = !curves.into_iter().any(varies);
     none.then(|| "no spectrum varies by much within a channel".into())
+}
+
+fn costs_so_much(cost: f64) -> String {
+    format!("evaluating a path once costs {cost:.2} of generating it")
+}
+
+/// At how many wavelengths a path may be evaluated at all, each of which takes so many iterations.
+fn most_wavelengths(each: u32) -> u32 {
+    let most = (LOOP_LIMIT / each).clamp(1, MOST_WAVELENGTHS);
+    1 << most.ilog2()
 }
 
 /// Spectra of what emits.
@@ -276,7 +314,7 @@ fn net_samples(scene: &Scene) -> u32 {
 /// Two nets of `net` samples of the first of `units`, as [`values`].
 fn nets(worker: &mut Worker, units: &[UnitRect], net: u32) -> Result<[Vec<f32>; 2]> {
     let some = &units[..units.len().min((NET_SAMPLES / net) as usize)];
-    let mut of = |i: u32| values(worker, some, FIRST_EPOCH + SINGLES + i, net);
+    let mut of = |i: u32| Ok::<_, Error>(values(worker, some, FIRST_EPOCH + SINGLES + i, net)?.radiance);
     Ok([of(0)?, of(1)?])
 }
 
@@ -308,9 +346,18 @@ fn all(reason: String, samples: u32, mean_radiance: Vec<f64>) -> Choices {
         evaluated: 1.0,
         gain: 1.0,
         variance: 1.0,
+        rays: 0.0,
+        records: 0.0,
+        map_records: 0.0,
+        voxels: 0.0,
         samples,
         mean_radiance,
     }
+}
+
+fn with_means(choices: Choices, means: &Means) -> Choices {
+    let Means { rays, work: Work { records, maps, cells } } = *means;
+    Choices { rays, records, map_records: maps, voxels: cells, ..choices }
 }
 
 /// The pilot's pixels, in the coordinates of the full film: all where they are few, else points of Roberts' R2 sequence
@@ -338,8 +385,12 @@ struct Trial {
     scattered: Vec<f32>,
     /// Of each path: the most that its scattered light brings to a representative channel, over that one's mean.
     energy: Vec<f64>,
-    /// What trying a path costs, over evaluating it in all channels.
-    trying: f64,
+    /// Of each path: what there is to evaluate of it, and of what is seen before it is scattered.
+    work: Vec<[Work; 2]>,
+    means_of_work: Means,
+    /// Channels in all, and those in which a path is tried.
+    channels: usize,
+    tried: usize,
     samples: u32,
 }
 
@@ -361,17 +412,26 @@ impl Trial {
                 means.iter_mut().zip(pixel).for_each(|(mean, &value)| *mean += f64::from(value));
             }
         };
-        let (mut radiance, mut scattered) = (Vec::new(), Vec::new());
+        let (mut radiance, mut scattered, mut work) = (Vec::new(), Vec::new(), Vec::new());
+        let mut means_of_work = Means::default();
         for epoch in 0..SINGLES {
-            let values = values(worker, &units, FIRST_EPOCH + epoch, 1)?;
+            let (values, works, rays) = work::sample(worker, prepared, &units, FIRST_EPOCH + epoch)?;
             add(&values);
             radiance.extend(kept(&values));
+            means_of_work.rays += rays as f64;
+            work.extend(works);
         }
+        let paths = work.len() as f64;
+        means_of_work.rays /= paths;
+        means_of_work.work = work.iter().fold(Work::default(), |sum, &work| sum + work) * (1.0 / paths);
         let [first, second] = nets(worker, &units, net)?.map(|values| kept(&values));
         // The same paths, ended where they are scattered first.
         worker.limit_bounces(0);
+        let mut of_seen = Vec::new();
         for epoch in 0..SINGLES {
-            let seen = kept(&values(worker, &units, FIRST_EPOCH + epoch, 1)?);
+            let (values, works, _) = work::sample(worker, prepared, &units, FIRST_EPOCH + epoch)?;
+            of_seen.extend(works);
+            let seen = kept(&values);
             let all = &radiance[epoch as usize * seen.len()..];
             scattered.extend(all.iter().zip(&seen).map(|(all, seen)| all - seen));
         }
@@ -391,14 +451,16 @@ impl Trial {
             variances: singles.variances(units.len()).into_iter().map(|variance| variance * share).collect(),
             scattered,
             energy,
-            trying: TRYING * tried_channels(prepared) as f64 / count as f64,
+            work: work.into_iter().zip(of_seen).map(|(all, seen)| [all, seen]).collect(),
+            means_of_work,
+            channels: count,
+            tried: tried_channels(prepared),
             samples: units.len() as u32 * SINGLES + 2 * (first.len() / channels.len()) as u32 * net,
         })
     }
 
-    /// The scale that is expected to bring most, where evaluating a path in all channels costs `cost` of generating it. All paths are
-    /// evaluated where nothing brings enough, unless it `must` be.
-    fn choose(self, cost: f64, must: bool) -> Choices {
+    /// The scale that is expected to bring most. All paths are evaluated where nothing brings enough, unless it `must` be.
+    fn choose(self, costs: &Costs, must: bool) -> Choices {
         if let Some(dark) = self.means.iter().position(|mean| mean.is_nan() || *mean <= 0.0) {
             // Its light may come along paths that bring nothing elsewhere.
             let reason = format!("channel {dark} was dark in all samples of the pilot, and roulette could starve it");
@@ -406,7 +468,8 @@ impl Trial {
         }
         // Powers of the square root of two: so that what differs in the last bits chooses the same.
         let scales = (-24..=24).map(|i| 2f64.powf(0.5 * f64::from(i)));
-        let expected = scales.map(|scale| (scale, self.expect(scale, cost)));
+        let expected = scales.map(|scale| (scale, self.expect(scale, costs)));
+        let cost = self.means_of_work.evaluation(costs, self.channels);
         let fair = expected.filter(|(_, expected)| expected.variance <= MOST_VARIANCE);
         let best = fair.max_by(|(_, a), (_, b)| a.rounded_gain().total_cmp(&b.rounded_gain()));
         match best {
@@ -425,18 +488,27 @@ impl Trial {
     }
 
     /// What roulette with `scale` is expected to do. Dropping a path with the chance 1 - p and counting it for 1/p adds
-    /// (1/p - 1) S² to the variance of what it scatters.
-    fn expect(&self, scale: f64, cost: f64) -> Expected {
+    /// (1/p - 1) S² to the variance of what it scatters. What it saves is the evaluation of what comes behind what is seen; a path is
+    /// tried wherever there is something behind.
+    fn expect(&self, scale: f64, costs: &Costs) -> Expected {
         let kept = self.variances.len();
         let paths = self.energy.len() as f64;
-        let (mut evaluated, mut added) = (0.0, vec![0.0; kept]);
-        for (path, energy) in self.scattered.chunks(kept).zip(&self.energy) {
-            // What scatters nothing is not evaluated either way.
-            if path.iter().all(|x| *x == 0.0) {
+        let (channels, tried) = (self.channels as f64, self.tried as f64);
+        let (mut evaluated, mut added, mut time) = (0.0, vec![0.0; kept], 0.0);
+        for ((path, energy), [work, seen]) in self.scattered.chunks(kept).zip(&self.energy).zip(&self.work) {
+            let p = (scale * energy).clamp(1.0 / f64::from(MOST_WEIGHT), 1.0);
+            let dropped = if seen.records > 0.0 { seen.cost(costs) } else { costs.skipped };
+            let behind = work.records > seen.records;
+            let p = if behind { p } else { 0.0 };
+            time += channels * (p * work.cost(costs) + (1.0 - p) * dropped) / paths;
+            if behind {
+                time += tried * costs.tried * work.cost(costs) / paths;
+            }
+            evaluated += p / paths;
+            // What scatters nothing adds none.
+            if !behind || path.iter().all(|x| *x == 0.0) {
                 continue;
             }
-            let p = (scale * energy).clamp(1.0 / f64::from(MOST_WEIGHT), 1.0);
-            evaluated += p / paths;
             if p < 1.0 {
                 let more = (1.0 / p - 1.0) / paths;
                 added.iter_mut().zip(path).for_each(|(sum, &x)| *sum += more * f64::from(x).powi(2));
@@ -450,7 +522,8 @@ impl Trial {
         let (sum, variance) =
             grown.fold((0.0, 1.0), |(sum, most): (f64, f64), grown| (sum + grown - 1.0, most.max(grown)));
         let mean = 1.0 + sum / kept as f64;
-        Expected { evaluated, variance, gain: (1.0 + cost) / (1.0 + cost * (evaluated + self.trying)) / mean }
+        let whole = self.means_of_work.whole(costs, self.channels, 1);
+        Expected { evaluated, variance, gain: whole / (self.means_of_work.making(costs) + time) / mean }
     }
 }
 
@@ -518,19 +591,31 @@ pub fn channel_sums(worker: &mut Worker, film: &Film, channels: usize, epochs: u
     let units = pixels(film);
     let mut sums = vec![0.0; channels];
     for epoch in 0..epochs {
-        for pixel in values(worker, &units, FIRST_EPOCH + epoch, 1)?.chunks(channels) {
+        for pixel in values(worker, &units, FIRST_EPOCH + epoch, 1)?.radiance.chunks(channels) {
             sums.iter_mut().zip(pixel).for_each(|(sum, value)| *sum += f64::from(*value));
         }
     }
     Ok(sums)
 }
 
-/// [unit][channel]: means of `samples` samples of every pixel in `units`.
-fn values(worker: &mut Worker, units: &[UnitRect], epoch: u32, samples: u32) -> Result<Vec<f32>> {
-    let mut values = Vec::new();
+/// What a pilot's samples brought back.
+#[derive(Default)]
+struct Values {
+    /// [unit][channel]: means.
+    radiance: Vec<f32>,
+    /// Of all paths together.
+    rays: u64,
+}
+
+/// Of `samples` samples of every pixel in `units`.
+fn values(worker: &mut Worker, units: &[UnitRect], epoch: u32, samples: u32) -> Result<Values> {
+    let mut values = Values::default();
     for units in units.chunks(worker.plan.units_at_once(samples)) {
         worker.submit(units, epoch, samples)?;
-        values.extend(worker.collect()?.iter().flat_map(|collected| collected.means().to_vec()));
+        if let Some(collected) = worker.collect()? {
+            values.radiance.extend(collected.means());
+            values.rays += collected.counters.rays();
+        }
     }
     Ok(values)
 }
