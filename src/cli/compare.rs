@@ -49,7 +49,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, output: &Output) -> Result<()> {
-    let (cube, reference) = (Cube::open(&args.a)?, Cube::open(&args.b)?);
+    let (cube, reference) = (Cube::open_to_read(&args.a)?, Cube::open_to_read(&args.b)?);
     let comparison = compare(&cube, &reference)?;
     let verdict = args.tolerance.map(|tolerance| judge(&comparison, tolerance));
     output.event("done", facts(args, &cube, &comparison, verdict.as_ref().map(|v| v.is_ok())))?;

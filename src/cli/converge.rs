@@ -122,7 +122,7 @@ fn reference(
 ) -> Result<Reference> {
     output.say(&format!("reference for {} channels", scene.channels.len()));
     if let Some(path) = &args.reference {
-        return Reference::of_cube(&Cube::open(path)?, scene);
+        return Reference::of_cube(&Cube::open_to_read(path)?, scene);
     }
     // Its noise is known from two epochs on.
     let least = 2 * scene.integrator.epoch;

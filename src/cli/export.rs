@@ -205,7 +205,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         return Err(Error::Usage("--json and -o -: only one of them can have the standard output".into()));
     }
     let output = &Said { output, aside: to_standard_output };
-    let cube = Cube::open(&args.cube)?;
+    let cube = Cube::open_to_read(&args.cube)?;
     if args.temperature && args.bands.is_none() {
         refuse_without_heat(&args.cube, &cube)?;
     }
@@ -221,7 +221,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     if let Some(written) = &args.reflectance {
         let path = Path::new(written);
         let white = if path.is_dir() || path.extension().is_some_and(|e| e == "zarr") {
-            white_cube = Cube::open(path)?;
+            white_cube = Cube::open_to_read(path)?;
             White::Cube(&white_cube)
         } else {
             White::Irradiance(irradiances(written, cube.channels(), output)?)

@@ -62,7 +62,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, output: &Output) -> Result<()> {
-    let cube = Cube::open(&args.cube)?;
+    let cube = Cube::open_to_read(&args.cube)?;
     refuse_itself(&args.cube, &args.output, "relit")?;
     let basis = cube.basis()?;
     let keys: Vec<(String, String)> =

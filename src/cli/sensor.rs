@@ -92,7 +92,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
 }
 
 fn expose(args: &Args, file: &Path, output: &Output) -> Result<()> {
-    let cube = Cube::open(&args.cube)?;
+    let cube = Cube::open_to_read(&args.cube)?;
     let model = load_sensor(file, cube.channels())?;
     for warning in &model.warnings {
         output.warn(warning)?;
@@ -167,7 +167,7 @@ pub(super) fn refuse_itself(cube: &Path, output: &Path, done: &str) -> Result<()
 }
 
 fn integrate_with(args: &Args, file: &Path, output: &Output) -> Result<()> {
-    let cube = Cube::open(&args.cube)?;
+    let cube = Cube::open_to_read(&args.cube)?;
     let responses = response::read_responses(file).map_err(|problem| Error::Input(vec![*problem]))?;
     for warning in &responses.warnings {
         output.warn(warning)?;

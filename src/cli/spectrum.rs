@@ -45,7 +45,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
             return Err(Error::Usage(what.into()));
         }
     }
-    let cube = Cube::open(&args.cube)?;
+    let cube = Cube::open_to_read(&args.cube)?;
     let Some(spectrum) = cube.spectrum(args.x, args.y)? else {
         let what = format!("pixel {} {} has no samples yet; try again when its tile is rendered", args.x, args.y);
         return Err(Error::Usage(format!("{}: {what}", args.cube.display())));

@@ -60,7 +60,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     use crate::preview::{Feed, follow, web};
 
     let interrupt = output.interrupt()?;
-    let feed = Feed::of_cube(Cube::open(&args.cube)?);
+    let feed = Feed::of_cube(Cube::open_to_read(&args.cube)?);
     follow(Cube::open(&args.cube)?, &feed)?;
     let about = web::About { name: name_of(&args.cube), exposure: args.exposure, controls: false };
     let server = web::Server::start_behind(&args.public_host, args.listen, feed, about)?;

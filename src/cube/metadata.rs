@@ -520,14 +520,56 @@ impl Header {
         }
         // And mean what it means by them.
         for (name, array) in &arrays {
-            if let Some(what) = other_meaning(&array["attributes"], &stored[*name]["attributes"]) {
-                let what = format!("is a copy of a cube in which somebody gave `{name}` {what}");
-                let help = "values are read as Spectile writes them: put that right, or open the copy with xarray";
+            check_meaning(path, name, array, &stored[*name])?;
+        }
+        header.check_wavelengths(path)?;
+        Ok((header, layout))
+    }
+
+    /// Refuses the cube at `path`, known by its record, where somebody has since given its arrays attributes by which their numbers
+    /// are others, or other wavelengths: in their own metadata or in those of the group. What cannot be read is left to who verifies.
+    pub(super) fn check_in_place(&self, path: &Path) -> Result<()> {
+        let json = |file: &Path| -> Option<Value> { serde_json::from_slice(&std::fs::read(file).ok()?).ok() };
+        let group = json(&path.join("zarr.json")).unwrap_or_default();
+        let consolidated = &group["consolidated_metadata"]["metadata"];
+        for (name, array) in arrays(self, Layout::Columns) {
+            let own = json(&path.join(name).join("zarr.json")).unwrap_or_default();
+            check_meaning(path, name, &array, &own)?;
+            check_meaning(path, name, &array, &consolidated[name])?;
+        }
+        self.check_wavelengths(path)
+    }
+
+    /// Refuses wavelengths, and their bounds, other than the cube's, where they lie as Spectile writes them.
+    fn check_wavelengths(&self, path: &Path) -> Result<()> {
+        let channels = &self.channels;
+        let centres = (0..channels.len()).map(|k| channels.centre(k)).collect();
+        let bounds = channels.bounds.iter().flatten().copied().collect();
+        let ours: [(&str, &str, Vec<f64>); 2] =
+            [("wavelength", "wavelength/c/0", centres), ("wavelength_bounds", "wavelength_bounds/c/0/0", bounds)];
+        for (name, file, ours) in ours {
+            let Ok(bytes) = std::fs::read(path.join(file)) else { continue };
+            // Bytes of another number are no plain list: another program has stored it anew.
+            if bytes.len() != 8 * ours.len() {
+                continue;
+            }
+            let found = bytes.as_chunks().0.iter().map(|bytes| f64::from_le_bytes(*bytes));
+            if let Some((found, ours)) = found.zip(ours).find(|(found, ours)| (found - ours).abs() > 1e-9 * ours) {
+                let what =
+                    format!("somebody has changed `{name}`: it has {found} nm where the channel is at {ours} nm");
+                let help = "put that back, as `spectile render … --resume` does, or open the cube with xarray";
                 return Err(Error::storage(path, format!("{what}; {help}")));
             }
         }
-        Ok((header, layout))
+        Ok(())
     }
+}
+
+/// Refuses an array whose stored metadata make other numbers of it than `ours`.
+fn check_meaning(path: &Path, name: &str, ours: &Value, stored: &Value) -> Result<()> {
+    let Some(what) = other_meaning(&ours["attributes"], &stored["attributes"]) else { return Ok(()) };
+    let help = "values are read as Spectile writes them: put that right, or open the cube with xarray";
+    Err(Error::storage(path, format!("somebody has given `{name}` {what}; {help}")))
 }
 
 /// The error of an array that another program has stored anew.
@@ -547,8 +589,33 @@ fn other_meaning(ours: &Value, stored: &Value) -> Option<String> {
         }
         _ => {}
     }
-    let packed = ["scale_factor", "add_offset"].into_iter().find(|name| !stored[*name].is_null());
-    packed.map(|name| format!("a `{name}` of {}", stored[name]))
+    /// What words attributes hold that change numbers, and the number with which they do not.
+    const CHANGES: [(&str, f64); 8] = [
+        ("scale", 1.0),
+        ("factor", 1.0),
+        ("gain", 1.0),
+        ("slope", 1.0),
+        ("multipl", 1.0),
+        ("offset", 0.0),
+        ("intercept", 0.0),
+        ("bias", 0.0),
+    ];
+    /// That say which numbers are none. xarray gives floats a `_FillValue` that is NaN, in base64.
+    const MISSING: [&str; 6] = ["fillvalue", "fill value", "missing value", "nodata", "ignore value", "valid "];
+    const NAN: [&str; 3] = ["NaN", "nan", "AAAAAAAA+H8="];
+    let changed = stored.as_object()?.iter().find(|(name, value)| {
+        if &ours[name.as_str()] == *value || value.is_null() {
+            return false;
+        }
+        let lower = name.to_lowercase().replace(['_', '-'], " ");
+        if let Some((_, neutral)) = CHANGES.iter().find(|(word, _)| lower.split(' ').any(|part| part.starts_with(word)))
+        {
+            return value.as_f64() != Some(*neutral);
+        }
+        MISSING.iter().any(|word| lower.trim().starts_with(word))
+            && !value.as_str().is_some_and(|text| NAN.contains(&text))
+    });
+    changed.map(|(name, value)| format!("a `{name}` of {value}"))
 }
 
 /// What [`Header::from_record`] finds.

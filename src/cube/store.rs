@@ -182,6 +182,15 @@ impl Cube {
         Ok(Cube::new(path, header, layout, origin))
     }
 
+    /// The same for whoever takes its numbers: not where somebody has changed what they mean.
+    pub fn open_to_read(path: &Path) -> Result<Cube> {
+        let cube = Cube::open(path)?;
+        if cube.layout == Layout::Columns {
+            cube.header.check_in_place(path)?;
+        }
+        Ok(cube)
+    }
+
     pub(super) fn new(path: &Path, header: Header, layout: Layout, origin: Origin) -> Cube {
         let projection = Projection::new(&header.channels);
         let layers = header.layers();

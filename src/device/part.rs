@@ -82,6 +82,7 @@ pub const PARTS: &[&Part] = &[
     &media::MEDIA,
     &media::VACUUM,
     &opacity::OPACITY,
+    &opacity::OF_LAMPS,
     &opacity::IN_VACUUM,
     &media::CAMERA_CUT,
     &media::VOXELS,

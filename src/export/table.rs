@@ -39,16 +39,35 @@ fn is_table(path: &Path) -> std::result::Result<(), String> {
     let Some([left, mut y]) = next()?.as_deref().and_then(pixel) else {
         return Err("does not have a pixel on its second line".into());
     };
-    let mut x = left;
+    let (mut x, first) = (left, y);
+    let mut row_ends = None;
     for number in 3..SEEN_LINES {
         let Some(line) = next()? else { break };
         match pixel(&line) {
-            Some([left_again, below]) if left_again == left && below == y + 1 => (x, y) = (left, below),
+            Some([left_again, below])
+                if left_again == left && below == y + 1 && row_ends.is_none_or(|end| end == x) =>
+            {
+                row_ends = Some(x);
+                (x, y) = (left, below);
+            }
             Some(place) if place == [x + 1, y] => x += 1,
             _ => return Err(format!("does not go on with the next pixel on line {number}")),
         }
     }
+    // Bands of sensors have names of people's choice, as the columns of their own tables have.
+    if !has_names_of_bands(&header) && (y == first || row_ends == Some(left)) {
+        return Err("has columns beside x and y that are called by no wavelength, and is no picture".into());
+    }
     Ok(())
+}
+
+/// Whether all columns but the first two are called as channels are that have no name of their own, or as X, Y and Z.
+fn has_names_of_bands(header: &str) -> bool {
+    let is_band = |name: &str| {
+        let name = name.trim_matches('"');
+        name.strip_suffix(" nm").is_some_and(|nm| nm.parse::<f64>().is_ok()) || ["X", "Y", "Z"].contains(&name)
+    };
+    header.split(',').skip(2).all(is_band)
 }
 
 /// Lines by which a table is known.
@@ -117,4 +136,30 @@ fn write_row(
         table.write_field(&*cell)?;
     }
     table.write_record(None::<&[u8]>)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tables_of_others_are_not_taken_for_pictures() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("t.csv");
+        for (text, is_ours) in [
+            ("x,y,550.000 nm\n0,0,1\n", true),
+            ("x,y,550.000 nm,560.5 nm\n4,2,1,\n5,2,1,2\n", true),
+            ("x,y,X,Y,Z\n0,0,1,1,1\n", true),
+            ("x,y,red\n0,0,1\n1,0,2\n0,1,3\n1,1,4\n", true),
+            ("x,y,temperature\n0,0,1\n", false),
+            ("x,y,z\n0,0,1.5\n", false),
+            ("x,y,z,label\n0,0,1.5,7\n1,0,2,7\n2,0,2,7\n", false),
+            ("x,y,z\n0,0,1.5\n0,1,2\n0,2,3\n", false),
+            ("x,y,z\n0,0,1\n1,0,1\n0,1,1\n0,2,1\n1,2,1\n", false),
+            ("nm,v\n400,1\n", false),
+        ] {
+            std::fs::write(&path, text).expect("written");
+            assert_eq!(is_table(&path).is_ok(), is_ours, "{text}");
+        }
+    }
 }

@@ -169,13 +169,8 @@ pub fn read(bytes: &[u8], path: &Path, column: Column) -> Read<SpectrumTable> {
     let mut found = match (file.data_type, white) {
         // Counts of both are of the same exposure: RS3 takes a new reference whenever it changes that.
         (0 | 1 | 6, Some(white)) => {
-            pick(
-                &[if file.data_type == 6 { "transmittance" } else { "reflectance" }.to_owned()],
-                column,
-                None,
-                2,
-                path,
-            )?;
+            let name = if file.data_type == 6 { "transmittance" } else { "reflectance" };
+            pick(&[name.to_owned()], column, None, 2, path)?;
             let highest = file.spectrum.iter().copied().fold(0.0, f64::max);
             if highest <= 2.0 && white.iter().any(|v| *v > MOST_POWER) {
                 let message = format!(
@@ -193,12 +188,12 @@ pub fn read(bytes: &[u8], path: &Path, column: Column) -> Read<SpectrumTable> {
             if file.data_type == 0 {
                 found.notes.push("holds counts, and those of a white reference: their quotient is taken".to_owned());
             }
-            found
+            found.called(name)
         }
         // What the first version keeps is the quotient itself.
         (1 | 6, None) if bytes.starts_with(VERSIONS[0]) || bytes.starts_with(VERSIONS[1]) => {
             pick(&["reflectance".to_owned()], column, None, 2, path)?;
-            file.table(&file.spectrum, "")
+            file.table(&file.spectrum, "").called(if file.data_type == 6 { "transmittance" } else { "reflectance" })
         }
         (0 | 1 | 6, None) => {
             let what = if file.data_type == 0 { "counts" } else { "a spectrum to be divided by a white reference" };
@@ -217,7 +212,7 @@ pub fn read(bytes: &[u8], path: &Path, column: Column) -> Read<SpectrumTable> {
                 );
                 return wrong(path, None, message, as_text);
             }
-            file.table(values, unit)
+            file.table(values, unit).called(name)
         }
         (other, _) => {
             let what = match other {

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
+use super::said::Said;
 use super::table::shown;
 use super::unit::{self, FACTORS, Meaning, Stated, Unit};
 use crate::error::Problem;
@@ -229,6 +230,12 @@ impl Header {
     }
 
     /// A number, where the key is there.
+    /// What `data units`, or else the second of `z plot titles`, call the values.
+    pub fn called(&self) -> Option<&str> {
+        let of_plot = || self.list("z plot titles").and_then(|titles| titles.get(1).copied());
+        self.get("data units").filter(|text| Said::in_name(text).is_some()).or_else(of_plot)
+    }
+
     pub fn number(&self, key: &str) -> Result<Option<f64>, Box<Problem>> {
         let Some(text) = self.get(key) else { return Ok(None) };
         text.parse()
@@ -540,7 +547,8 @@ impl Header {
     fn find_unit(&mut self) -> Result<(), Box<Problem>> {
         let of_data = self.get("data units").map(str::trim).filter(|text| !text.is_empty());
         let unknown = |text: &str| Stated { meaning: Meaning::Unknown, text: text.to_owned(), certain: true };
-        let of_data = of_data.map(|text| Stated::of(text).unwrap_or_else(|| unknown(text)));
+        let in_name = |text: &str| Stated::in_name(text).filter(|stated| stated.meaning != Meaning::Unknown);
+        let of_data = of_data.map(|text| Stated::of(text).or_else(|| in_name(text)).unwrap_or_else(|| unknown(text)));
         let of_plot = self.list("z plot titles").and_then(|titles| Stated::in_name(titles.get(1)?));
         if let (Some(data), Some(plot)) = (&of_data, &of_plot)
             && let (Meaning::Unit(a), Meaning::Unit(b)) = (data.meaning, plot.meaning)

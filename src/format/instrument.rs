@@ -9,6 +9,7 @@ use quick_xml::events::Event;
 use serde_json::Value;
 
 use super::asd;
+use super::said::Said;
 use super::table::{self, shown};
 use super::text::{Column, SpectrumTable, ascending, named};
 use super::unit::{self, Stated, Unit};
@@ -276,13 +277,19 @@ fn spdx(bytes: &[u8], path: &Path, column: Column) -> Read<SpectrumTable> {
     // The quantities of the standard; the others are relative, or numbers.
     let of = match quantity.as_str() {
         "irradiance" | "exitance" => Some("W m-2 nm-1"),
+        "r-factor" => return ascending(found.called("reflectance"), path, ""),
+        "t-factor" => return ascending(found.called("transmittance"), path, ""),
         "radiance" => Some("W m-2 sr-1 nm-1"),
         "intensity" => Some("W sr-1 nm-1"),
         "flux" => Some("W nm-1"),
         _ => None,
     };
     found.unit = of.and_then(Stated::of);
-    ascending(found, path, "")
+    if quantity == "absorbance" {
+        let help = "write the values themselves, as CSV: `nm,value`";
+        return wrong(path, None, "says that its quantity is absorbance, a logarithm", help);
+    }
+    ascending(found.called(&quantity), path, "")
 }
 
 fn json(bytes: &[u8], path: &Path) -> Read<Value> {
@@ -318,6 +325,13 @@ fn rawtoaces(bytes: &[u8], path: &Path, column: Column) -> Read<SpectrumTable> {
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (nm, value) = pairs.into_iter().unzip();
     let unit = data["units"].as_str().unwrap_or("");
+    let axis = ["wavelength_units", "wavelength units"]
+        .iter()
+        .find_map(|key| data[*key].as_str().or(document["header"][*key].as_str()));
+    if let Some(axis) = axis.filter(|axis| Unit::named(axis) != Some(Unit::NANOMETRE)) {
+        let message = format!("gives its wavelengths in `{}`, where rawtoaces has nm", shown(axis));
+        return wrong(path, None, message, "write them in nm");
+    }
     ascending(SpectrumTable { nm, value, unit: Stated::of(unit), ..SpectrumTable::default() }, path, "")
 }
 
@@ -381,7 +395,10 @@ fn radis(bytes: &[u8], path: &Path, column: Column) -> Read<SpectrumTable> {
     if in_air {
         found.notes.push("gives wavelengths in air, as RADIS has them in nm: they are converted to vacuum".to_owned());
     }
-    ascending(found, path, "")
+    if Stated::in_name(name).is_some_and(|stated| stated.meaning == unit::Meaning::Logarithm) {
+        return wrong(path, None, format!("gives {}, which is a logarithm", named(name)), "take another array");
+    }
+    ascending(found.called(name), path, "")
 }
 
 /// Spectra Vista: lines `key= value` up to `data=`, then wavelength in nm, reference, target and reflectance in percent.
@@ -415,13 +432,15 @@ fn svc(bytes: &[u8], path: &Path, column: Column) -> Read<SpectrumTable> {
     }
     if index < 2 {
         // Counts are of one detector at one exposure; radiance is in 1e-10 W cm-2 sr-1 nm-1.
-        if !units.to_lowercase().contains("radiance") {
-            let message = format!("holds {} in `{}`, which is no radiance", names[index], shown(&units));
+        let units_of_it = units.split(',').nth(index).unwrap_or(&units).trim();
+        if Said::in_name(units_of_it) != Some(Said::Radiance) {
+            let message = format!("holds {} in `{}`, which is no radiance", names[index], shown(units_of_it));
             return wrong(path, None, message, "export radiance, or take the reflectance");
         }
         found.value.iter_mut().for_each(|value| *value *= 1e-6);
         found.unit = Stated::of("W m-2 sr-1 nm-1");
     }
+    found = found.called(if index == 2 { "reflectance" } else { "radiance" });
     if let Some(i) = (1..found.nm.len()).find(|&i| found.nm[i] <= found.nm[i - 1]) {
         let line = found.line[i];
         return wrong(
@@ -466,6 +485,8 @@ fn spectral_evolution(bytes: &[u8], path: &Path, column: Column) -> Read<Spectru
     let (name, lower) = (&names[index], &lower[index]);
     let unit = if lower.contains('%') {
         Stated::of("%")
+    } else if let Some(stated) = Stated::in_name(name).filter(|stated| stated.meaning == unit::Meaning::Logarithm) {
+        Some(stated)
     } else if lower.contains("rad") {
         match Stated::of(&units) {
             Some(stated) => Some(stated),
@@ -489,6 +510,15 @@ fn spectral_evolution(bytes: &[u8], path: &Path, column: Column) -> Read<Spectru
         None
     };
     let mut found = SpectrumTable { unit, ..SpectrumTable::default() };
+    let noun = [
+        ("reflect", "reflectance"),
+        ("tgt./ref", "reflectance"),
+        ("transmit", "transmittance"),
+        ("irrad", "irradiance"),
+        ("rad", "radiance"),
+    ];
+    let noun = noun.into_iter().find(|(part, _)| lower.contains(part)).map(|(_, noun)| noun);
+    found = found.called(noun.unwrap_or(name));
     for row in &table.rows {
         table.check_row(row)?;
         if let (Some(nm), Some(value)) = (table.number(row, 0)?, table.number(row, index + 1)?) {

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use super::envi;
 use super::instrument::wrong;
 use super::text::{Column as Wanted, SpectrumTable, ascending, named, only_one, read};
-use super::unit::Unit;
+use super::unit::{Stated, Unit};
 use crate::error::Problem;
 
 type Read<T> = Result<T, Box<Problem>>;
@@ -82,6 +82,9 @@ pub fn parse_envi(
     let data = header.data(data, data_path)?;
     let mut table =
         SpectrumTable { unit: header.unit().cloned(), notes: header.notes.clone(), ..SpectrumTable::default() };
+    if let Some(name) = header.called() {
+        table = table.called(name);
+    }
     table.notes.extend(surplus);
     let mut missing = 0usize;
     for (i, nm) in nm.into_iter().enumerate() {
@@ -121,7 +124,7 @@ pub fn is_ecostress(bytes: &[u8]) -> bool {
     first.is_some_and(|line| line.starts_with(b"Name:"))
 }
 
-/// An ECOSTRESS spectrum: lines `Key: value`, an empty one, then pairs of numbers. Percent become fractions.
+/// An ECOSTRESS spectrum: lines `Key: value`, an empty one, then pairs of numbers.
 pub fn parse_ecostress(bytes: &[u8], path: &Path) -> Read<SpectrumTable> {
     // Latin-1: every byte is the character of that number.
     let text: String = bytes.iter().map(|&byte| char::from(byte)).collect();
@@ -131,7 +134,7 @@ pub fn parse_ecostress(bytes: &[u8], path: &Path) -> Read<SpectrumTable> {
         words.next().is_none().then_some(pair)
     };
     let mut unit: Option<Unit> = None;
-    let (mut percent, mut y_first, mut promised) = (false, false, None);
+    let (mut y_first, mut promised) = (false, None);
     let mut table = SpectrumTable::default();
     let mut pairs = 0usize;
     for (number, line) in (1..).zip(text.lines()) {
@@ -142,7 +145,7 @@ pub fn parse_ecostress(bytes: &[u8], path: &Path) -> Read<SpectrumTable> {
             let (x, y) = if y_first { (b, a) } else { (a, b) };
             pairs += 1;
             if x > 0.0 {
-                table.push(unit.to_nm(x), if percent { y / 100.0 } else { y }, number);
+                table.push(unit.to_nm(x), y, number);
             }
             continue;
         }
@@ -172,7 +175,10 @@ pub fn parse_ecostress(bytes: &[u8], path: &Path) -> Read<SpectrumTable> {
                     }
                 });
             }
-            "y units" => percent = value.contains("percent"),
+            "y units" => {
+                table.unit = Stated::in_name(raw);
+                table = table.called(raw);
+            }
             "first column" => y_first = value == "y",
             "number of x values" => promised = value.parse::<usize>().ok().map(|n| (number, n)),
             _ => {}
@@ -185,6 +191,11 @@ pub fn parse_ecostress(bytes: &[u8], path: &Path) -> Read<SpectrumTable> {
             format!("promises {promised} values, but {pairs} follow"),
             "the file may be cut",
         );
+    }
+    // Percent of any spelling become fractions here, whatever the spectrum is for.
+    if table.unit.as_ref().is_some_and(Stated::is_percent) {
+        table.value.iter_mut().for_each(|value| *value /= 100.0);
+        table.unit = None;
     }
     ascending(table, path, "")
 }
@@ -300,6 +311,8 @@ pub fn no_columns(path: &Path, wanted: Wanted) -> Read<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::format::said::Said;
+    use crate::format::unit::{Density, Kind, Meaning};
 
     const ECOSTRESS: &str = "Name: Construction Concrete\nType: manmade\nOwner: caf\u{e9}: none\nFirst Column: X\n\
         X Units: Wavelength (micrometers)\nY Units:Reflectance (percent)\nNumber of X Values:4\n\
@@ -316,6 +329,25 @@ mod tests {
         let table = parse_ecostress(&bytes, Path::new("c.spectrum.txt")).unwrap();
         assert_eq!((table.nm, table.value), (vec![400.0, 2500.0, 14_000.0], vec![0.1, 0.2, 0.055]));
         assert_eq!(table.line, [12, 11, 10]);
+    }
+
+    /// What its `Y Units` say is what it is of, and in what.
+    #[test]
+    fn ecostress_says_what_it_is_of() {
+        for (units, said, first) in [
+            ("Reflectance (percent)", Said::Reflectance, 0.1),
+            ("Transmittance (percent)", Said::Transmittance, 0.1),
+            ("Emissivity", Said::Emissivity, 10.0),
+            ("Radiance (W/m2/sr/um)", Said::Radiance, 10.0),
+        ] {
+            let text = ECOSTRESS.replace("Reflectance (percent)", units);
+            let table = parse_ecostress(&latin1(&text), Path::new("c.txt")).unwrap();
+            assert_eq!((table.said.map(|(said, _)| said), table.value[0]), (Some(said), first), "{units}");
+        }
+        let text = ECOSTRESS.replace("Reflectance (percent)", "Radiance (W/m2/sr/um)");
+        let unit = parse_ecostress(&latin1(&text), Path::new("c.txt")).unwrap().unit.expect("a unit");
+        let Meaning::Unit(measure) = unit.meaning else { panic!("{unit:?}") };
+        assert_eq!(measure.to(Kind::Radiance), Some(Density::Plain(1e-3)));
     }
 
     #[test]

@@ -20,6 +20,7 @@ pub mod polygon;
 pub mod primaries;
 pub mod refractive;
 pub mod response;
+pub mod said;
 pub mod stl;
 pub mod table;
 pub mod text;

@@ -122,7 +122,7 @@ fn angle_unit(table: &Table) -> Read<f64> {
         let message = format!("gives cosines (`{}`), not angles", table.names[0]);
         return Err(table.problem(Some(table.line), message, "write degrees from 0 to 180"));
     }
-    if let Some(Stated { meaning: Meaning::Unknown, text, .. }) = Stated::in_name(&table.names[0])
+    if let Some(Stated { meaning: Meaning::Unknown | Meaning::Factor, text, .. }) = Stated::in_name(&table.names[0])
         && !words(&["deg", "degree", "degrees", "angle", "theta"])
     {
         let message = format!("the unit of its angles, `{text}`, is not known");

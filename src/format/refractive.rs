@@ -54,16 +54,6 @@ pub fn parse(bytes: &[u8], path: &Path, needed: Option<[f64; 2]>) -> Result<Inde
 struct Document {
     #[serde(rename = "DATA")]
     data: Vec<Block>,
-    /// Of the database's pages of glasses.
-    #[serde(rename = "SPECS")]
-    specs: Option<Specs>,
-}
-
-/// What n and wavelengths are relative to; without a word that is the vacuum.
-#[derive(Deserialize, Default)]
-struct Specs {
-    n_is_absolute: Option<Spanned<String>>,
-    wavelength_is_vacuum: Option<Spanned<String>>,
 }
 
 /// One entry of `DATA`. Numbers are kept as text: rows and lists are separated by blanks.
@@ -75,6 +65,18 @@ struct Block {
     #[serde(alias = "range")]
     wavelength_range: Option<Spanned<String>>,
     coefficients: Option<Spanned<String>>,
+    /// What would change the numbers, and no page has.
+    #[serde(
+        alias = "factor",
+        alias = "scale_factor",
+        alias = "multiplier",
+        alias = "offset",
+        alias = "unit",
+        alias = "units",
+        alias = "wavelength_unit",
+        alias = "wavelength_units"
+    )]
+    scale: Option<Spanned<String>>,
 }
 
 struct Yaml<'a> {
@@ -105,6 +107,17 @@ impl Yaml<'_> {
         for block in &document.data {
             let kind = block.kind.value.split_whitespace().collect::<Vec<_>>();
             let line = line_of(&block.kind);
+            if let Some(scale) = &block.scale {
+                let message = format!(
+                    "has a key beside `type` and `data` that is not applied: it says `{}`",
+                    table::shown(&scale.value)
+                );
+                return Err(self.at(
+                    line_of(scale),
+                    message,
+                    "write the numbers so, with wavelengths in um, and remove it",
+                ));
+            }
             let (n, k) = match kind[..] {
                 ["tabulated", "nk"] => {
                     let (n, k) = match self.columns(block, line) {
@@ -140,25 +153,33 @@ impl Yaml<'_> {
                 |(_, kind): &(Option<usize>, &str)| format!("has a block of type `{}`, left out", table::shown(kind));
             table.notes.extend(others.iter().map(left_out));
         }
-        self.bring_to_vacuum(&mut index, &document.specs.unwrap_or_default())?;
+        self.bring_to_vacuum(&mut index, text)?;
         Ok(index)
     }
 
     /// Makes wavelengths in air those in vacuum, and n relative to air absolute, where the page says that they are such.
-    fn bring_to_vacuum(&self, index: &mut Index, specs: &Specs) -> Result<(), Box<Problem>> {
-        let denied = |flag: &Option<Spanned<String>>, name: &str| match flag {
-            None => Ok(false),
-            Some(flag) => match flag.value.trim().to_lowercase().as_str() {
-                "true" => Ok(false),
-                "false" => Ok(true),
-                other => {
-                    let message = format!("`{name}` must be true or false, but is `{}`", table::shown(other));
-                    Err(self.at(line_of(flag), message, ""))
+    fn bring_to_vacuum(&self, index: &mut Index, text: &str) -> Result<(), Box<Problem>> {
+        // The database has had these words under SPECS, PROPERTIES and CONDITIONS; without them that is the vacuum.
+        let denied = |names: [&str; 2]| {
+            for (number, line) in (1..).zip(text.lines()) {
+                let Some((key, value)) = line.trim().split_once(':') else { continue };
+                if !line.starts_with([' ', '\t']) || !names.contains(&key.trim_matches(['"', '\'', ' '])) {
+                    continue;
                 }
-            },
+                let value = value.split('#').next().unwrap_or("").trim().trim_matches(['"', '\'']).to_lowercase();
+                return match value.as_str() {
+                    "true" | "yes" => Ok(false),
+                    "false" | "no" => Ok(true),
+                    other => {
+                        let message = format!("`{}` must be true or false, but is `{}`", names[0], table::shown(other));
+                        Err(self.at(Some(number), message, ""))
+                    }
+                };
+            }
+            Ok(false)
         };
-        let in_air = denied(&specs.wavelength_is_vacuum, "wavelength_is_vacuum")?;
-        let is_relative = denied(&specs.n_is_absolute, "n_is_absolute")?;
+        let in_air = denied(["wavelength_is_vacuum", "wavelength_vacuum"])?;
+        let is_relative = denied(["n_is_absolute", "n_absolute"])?;
         if in_air {
             for table in [&mut index.n, &mut index.k].into_iter().flatten().flatten() {
                 table.nm.iter_mut().for_each(|nm| *nm = unit::vacuum_nm(*nm));
@@ -239,8 +260,8 @@ impl Yaml<'_> {
             nm: rows.iter().map(|row| row.1[0] * 1e3).collect(),
             value: rows.iter().map(|row| row.1[column + 1]).collect(),
             line: rows.iter().map(|row| row.0.or(line).unwrap_or(1)).collect(),
-            unit: None,
             notes: notes.clone(),
+            ..SpectrumTable::default()
         }))
     }
 
@@ -293,7 +314,7 @@ impl Yaml<'_> {
             notes.push(format!("has a formula without a real value at {um} um, within the range of its page: it is read within the channels only"));
         }
         let (nm, value): (Vec<f64>, Vec<f64>) = nodes.into_iter().map(|(um, n)| (um * 1e3, n)).unzip();
-        Ok(SpectrumTable { line: vec![line.unwrap_or(1); nm.len()], nm, value, unit: None, notes })
+        Ok(SpectrumTable { line: vec![line.unwrap_or(1); nm.len()], nm, value, notes, ..SpectrumTable::default() })
     }
 
     fn numbers(&self, text: &str, line: Option<usize>) -> Result<Vec<f64>, Box<Problem>> {
@@ -413,6 +434,24 @@ mod tests {
         let [Some(n), Some(k)] = yaml(apart).unwrap() else { panic!("both are given") };
         assert_eq!((n.nm, k.nm, k.value), (vec![300.0, 500.0], vec![400.0, 500.0], vec![1.0, 2.0]));
         assert_eq!(k.line, [5, 4]);
+    }
+
+    /// The database has said what wavelengths are relative to in several places.
+    #[test]
+    fn what_changes_numbers_is_applied_or_refused() {
+        let rows = "DATA:\n  - type: tabulated n\n    data: |\n        0.4 1.5\n        0.5 1.6\n";
+        for place in ["SPECS", "Specs", "PROPERTIES", "CONDITIONS"] {
+            for key in ["wavelength_is_vacuum", "wavelength_vacuum"] {
+                let [Some(n), _] = yaml(&format!("{rows}{place}:\n    {key}: false\n")).unwrap() else { panic!("n") };
+                assert_eq!(n.nm, [400.0, 500.0].map(unit::vacuum_nm), "{place}: {key}");
+                let [Some(n), _] = yaml(&format!("{rows}{place}:\n    {key}: true\n")).unwrap() else { panic!("n") };
+                assert_eq!(n.nm, [400.0, 500.0]);
+            }
+        }
+        for key in ["scale: 2", "unit: nm", "offset: 0.1"] {
+            let problem = yaml(&rows.replace("    data:", &format!("    {key}\n    data:"))).unwrap_err();
+            assert!(problem.message.contains("not applied") && problem.line == Some(3), "{key}: {problem}");
+        }
     }
 
     /// Sellmeier's formula with Schott's coefficients of N-BK7 (data sheet, 2017) and its published indices; Malitson's

@@ -6,7 +6,7 @@ use std::path::Path;
 use super::instrument::Format;
 use super::noise::{self, Range};
 use super::table;
-use super::text::{SpectrumTable, ascending, read};
+use super::text::{self, SpectrumTable, ascending, read};
 use super::unit::{self, Density, Kind, Meaning, Stated, Unit};
 use crate::error::Problem;
 use crate::spectral::Response;
@@ -45,15 +45,23 @@ pub fn parse_responses(bytes: &[u8], path: &Path) -> Result<Responses, Box<Probl
     }
     let name = |column: usize| table.names.get(column).map_or("", String::as_str);
     let is_long = count == 3 && name(0).eq_ignore_ascii_case("band");
+    // pandas writes the numbers of its rows first.
+    let is_numbered = !is_long && count > 2 && text::is_row_number(name(0)) && unit::is_axis(name(1));
     if !is_long && table.names.iter().any(|name| name.eq_ignore_ascii_case("band")) {
         let help = "write the three columns `band,wavelength_nm,response`, in this order";
         return Err(wrong(Some(table.line), "has a column `band`, but not the columns of long responses".into(), help));
     }
-    let axis = usize::from(is_long);
+    let axis = usize::from(is_long || is_numbered);
+    let first = axis + 1;
     let unit = Unit::from_header(name(axis)).map_err(|other| {
         let message = format!("gives its wavelengths as {other}, from which none follows");
         wrong(Some(table.line), message, "name wavelength and unit: nm, um, angstrom, cm-1, THz, eV")
     })?;
+    if !is_long {
+        text::check_intervals(&table, axis)?;
+        refuse_axes_of_their_own(&table, axis, unit)?;
+    }
+    notes.extend(is_numbered.then(|| "begins with a column of row numbers, which is left out".to_owned()));
     let in_air = unit::is_in_air(name(axis));
     notes.extend(in_air.then(|| unit::FROM_AIR.to_owned()));
 
@@ -63,7 +71,7 @@ pub fn parse_responses(bytes: &[u8], path: &Path) -> Result<Responses, Box<Probl
         notes
             .push("names no channels: they are called after their columns, and wavelengths are taken as nm".to_owned());
     } else if !is_long {
-        tables.extend(table.names[1..].iter().map(|name| (name.clone(), SpectrumTable::default())));
+        tables.extend(table.names[first..].iter().map(|name| (name.clone(), SpectrumTable::default())));
     }
     for row in &table.rows {
         table.check_row(row)?;
@@ -73,9 +81,11 @@ pub fn parse_responses(bytes: &[u8], path: &Path) -> Result<Responses, Box<Probl
         }
         let nm = if in_air { unit::vacuum_nm(unit.to_nm(x)) } else { unit.to_nm(x) };
         if !is_long {
-            for column in 1..count {
+            for column in first..count {
                 if let Some(value) = table.number(row, column)? {
-                    tables[column - 1].1.push(nm, value, row.line);
+                    let is_twice = table.is_percent(row, column) && says_percent(name(column));
+                    let value = if is_twice { value * 100.0 } else { value };
+                    tables[column - first].1.push(nm, value, row.line);
                 }
             }
             continue;
@@ -103,10 +113,28 @@ pub fn parse_responses(bytes: &[u8], path: &Path) -> Result<Responses, Box<Probl
             return Err(wrong(None, "holds no responses".into(), ""));
         }
     }
+    let of_photons = table.comments.iter().find(|text| {
+        let lower = text.to_lowercase();
+        lower.contains("quantum efficienc") && !["from", "convert", "divided"].iter().any(|word| lower.contains(word))
+    });
+    let of_photons = of_photons.cloned();
     let value_name = |name: &str| if is_long { table.names[2].clone() } else { name.to_owned() };
     for (name, table) in &mut tables {
         let named = value_name(name);
         apply_unit(&named, table);
+        let is_factor = |stated: &Stated| stated.meaning == Meaning::Factor;
+        if let Some(stated) = Stated::in_name(&named).filter(is_factor) {
+            notes.push(format!("says `{}` of its responses: they are taken as written", table::shown(&stated.text)));
+        }
+        if let Some(comment) = &of_photons
+            && !is_per_photon(&named)
+        {
+            per_photon("quantum", table);
+            notes.push(format!(
+                "has the comment `{}`, so that its responses are per photon: they are multiplied by the wavelength",
+                table::shown(comment)
+            ));
+        }
         notes.extend(per_photon(&named, table).then(|| {
             format!(
                 "gives quantum efficiencies as \"{}\", per photon: they are multiplied by the wavelength, as responses are \
@@ -133,7 +161,55 @@ pub fn parse_responses(bytes: &[u8], path: &Path) -> Result<Responses, Box<Probl
 fn is_no_response(name: &str) -> bool {
     let lower = name.to_lowercase();
     let first = lower.split(|c: char| !c.is_alphabetic()).find(|word| !word.is_empty()).unwrap_or("");
-    ["wavelength", "wavenumber", "frequency", "stdev", "stddev", "sd", "uncertainty", "sigma"].contains(&first)
+    let last = lower.split(|c: char| !c.is_alphabetic()).rfind(|word| !word.is_empty()).unwrap_or("");
+    const SPREADS: [&str; 10] =
+        ["stdev", "stddev", "std", "sd", "uncertainty", "unc", "uncert", "sigma", "err", "error"];
+    unit::is_axis(name)
+        || ["wavelength", "wavenumber", "frequency"].contains(&first)
+        || SPREADS.contains(&first)
+        || (last != lower && SPREADS.contains(&last))
+        || lower.replace(' ', "").contains("(k=")
+}
+
+/// Refuses wavelengths that stand between two responses, as those of each band beside it, unless they are those of the first
+/// column.
+fn refuse_axes_of_their_own(table: &table::Table, axis: usize, unit: Unit) -> Result<(), Box<Problem>> {
+    let name = |column: usize| table.names.get(column).map_or("", String::as_str);
+    let is_value = |column: usize| !name(column).is_empty() && !is_no_response(name(column));
+    let columns = table.columns();
+    let own = |column: &usize| {
+        unit::is_axis(name(*column)) && (axis + 1..*column).any(is_value) && (*column + 1..columns).any(is_value)
+    };
+    for column in (axis + 1..columns).filter(own) {
+        let of_column = Unit::stated(name(column)).ok().flatten().unwrap_or(unit);
+        for row in &table.rows {
+            let same = match (table.number(row, axis)?, table.number(row, column)?) {
+                (Some(first), Some(here)) => {
+                    (unit.to_nm(first) - of_column.to_nm(here)).abs() <= 1e-9 * unit.to_nm(first)
+                }
+                (first, here) => first == here,
+            };
+            if !same {
+                let message = format!(
+                    "gives the responses after column {} over wavelengths of their own, which differ from the first column's here",
+                    column + 1
+                );
+                let help = "write them long, under the header `band,wavelength_nm,response`";
+                return Err(table.problem(Some(row.line), message, help));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn says_percent(name: &str) -> bool {
+    Stated::in_name(name).is_some_and(|stated| stated.is_percent())
+}
+
+fn is_per_photon(name: &str) -> bool {
+    let lower = name.to_lowercase();
+    let mut words = lower.split(|c: char| !c.is_alphanumeric());
+    words.any(|word| ["qe", "eqe", "iqe", "ipce", "quantum", "quantal", "quanta", "photon", "photons"].contains(&word))
 }
 
 /// Percent become shares.
@@ -149,9 +225,7 @@ fn apply_unit(name: &str, table: &mut SpectrumTable) {
 fn per_photon(name: &str, table: &mut SpectrumTable) -> bool {
     // Of a quantum efficiency of 1 each photon gives one charge: λ / 1239.84 nm amperes a watt (h c / e).
     const NM_VOLT: f64 = PLANCK * LIGHT_SPEED / CHARGE * 1e9;
-    let lower = name.to_lowercase();
-    let mut words = lower.split(|c: char| !c.is_alphanumeric());
-    let is = words.any(|word| ["qe", "eqe", "iqe", "ipce", "quantum", "photon", "photons"].contains(&word));
+    let is = is_per_photon(name);
     if is {
         table.value.iter_mut().zip(&table.nm).for_each(|(value, nm)| *value *= nm / NM_VOLT);
     }
@@ -247,6 +321,53 @@ mod tests {
         let oli = parse("Wavelength,BA RSR [watts],STDEV[+/-]\n500,0.1,0.01\n510,1,0.02\n520,0.1,0.01\n").unwrap();
         assert_eq!((oli.named.len(), oli.warnings.len()), (1, 1));
         assert!(parse("nm,wavenumber\n500,20000\n510,19607\n").unwrap_err().message.contains("no responses"));
+    }
+
+    #[test]
+    fn axes_of_single_bands_are_refused() {
+        for text in [
+            "Wavelength (nm),B1,Wavelength (nm),B2\n400,0,500,0\n500,1,600,1\n600,0,700,0\n",
+            "Wavelength,B1,Wavelength,B2\n400,0,500,0\n500,1,600,1\n600,0,700,0\n",
+            "a nm,a,b nm,b\n400,0,500,0\n500,1,600,1\n600,0,700,0\n",
+            "Wavelength (nm),B1,Wavelength (um),B2\n400,0,0.5,0\n500,1,0.6,1\n600,0,0.7,0\n",
+        ] {
+            let problem = parse(text).unwrap_err();
+            assert!(
+                problem.message.contains("wavelengths of their own") && problem.line == Some(2),
+                "{text}: {problem}"
+            );
+        }
+        // The same places, once more, are left out as before; so is what follows the last response.
+        let same = parse("nm,B1,um,B2\n400,0,0.4,0\n500,1,0.5,1\n600,0,0.6,0\n").unwrap();
+        assert_eq!((same.named.len(), same.warnings.len()), (2, 1), "{:?}", same.warnings);
+        let behind = parse("nm,B1,Wavenumber (cm-1)\n400,0,25000\n500,1,20000\n600,0,16667\n").unwrap();
+        assert_eq!((behind.named.len(), behind.warnings.len()), (1, 1));
+        assert!(parse("from (nm),to (nm),v\n400,500,1\n500,600,1\n").unwrap_err().message.contains("intervals"));
+        let numbered = parse(",wavelength (nm),a\n0,400,0\n1,500,1\n2,600,0\n").unwrap();
+        assert_eq!((numbered.named.len(), numbered.named[0].1.integral()), (1, 100.0));
+        assert!(numbered.warnings[0].contains("row numbers"), "{:?}", numbered.warnings);
+    }
+
+    #[test]
+    fn what_is_no_response_or_of_photons_is_known_by_more_names() {
+        for text in [
+            "nm,RSR,RSR_err\n400,0,.01\n500,1,.01\n600,0,.01\n",
+            "nm,RSR,uncertainty,U(k=2)\n400,0,.01,.01\n500,1,.01,.01\n600,0,.01,.01\n",
+        ] {
+            let found = parse(text).unwrap();
+            assert_eq!(found.named.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), ["RSR"], "{text}");
+        }
+        // Made responses per energy by their wavelength: means are weighted by it, whatever the factor.
+        for text in ["nm,L cone (quantal)\n400,0\n500,1\n600,0\n", "# quantum efficiency\nnm,a\n400,0\n500,1\n600,0\n"]
+        {
+            let found = parse(text).unwrap();
+            let per_photon = parse("nm,QE\n400,0\n500,1\n600,0\n").unwrap();
+            assert_eq!(found.named[0].1, per_photon.named[0].1, "{text}");
+            assert!(found.warnings[0].contains("multiplied by the wavelength"), "{:?}", found.warnings);
+        }
+        assert!(parse("nm,log energy L\n400,1\n500,2\n").unwrap_err().message.contains("logarithms"));
+        let twice = parse("nm,red (%)\n400,0%\n500,50%\n600,0%\n").unwrap();
+        assert_eq!(twice.named[0].1.integral(), 50.0);
     }
 
     #[test]

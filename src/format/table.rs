@@ -5,6 +5,7 @@ use std::path::Path;
 
 use csv::{ReaderBuilder, StringRecord, Trim};
 
+use super::said::Said;
 use super::unit::{self, FACTORS, Stated, Unit};
 use crate::error::Problem;
 
@@ -23,6 +24,8 @@ pub struct Table<'p> {
     pub notes: Vec<String>,
     /// The unit of power that the comments before the numbers speak of, and the line of the first that does.
     pub unit_in_comment: Option<(usize, Stated)>,
+    /// The lines that are about the table.
+    pub comments: Vec<String>,
     decimal: Decimal,
 }
 
@@ -38,6 +41,8 @@ pub struct Row {
 struct Header {
     names: Vec<String>,
     row: usize,
+    /// Of names and units the row that stands first.
+    first: usize,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -106,6 +111,10 @@ fn without_comment(line: &str) -> &str {
         let rest = &line[i..];
         let quoted = line[..i].matches('"').count() % 2 == 1;
         let is_cell = NOT_GIVEN.iter().any(|cell| cell.starts_with('#') && lower_starts(rest, cell));
+        // What Windows prints of what is no number: 1.#QNAN, -1.#INF.
+        let is_cell = is_cell
+            || (line[..i].ends_with('.')
+                && ["#QNAN", "#SNAN", "#INF", "#IND", "#J"].iter().any(|cell| lower_starts(rest, cell)));
         if !quoted && !is_cell && (numbers || rest[1..].starts_with([' ', '\t']) || rest.len() == 1) {
             return line[..i].trim_end();
         }
@@ -241,8 +250,16 @@ pub fn parse<'p>(text: &str, first_line: usize, path: &'p Path) -> Read<Table<'p
     if rows.is_empty() {
         return Err(wrong(path, None, "holds no data".to_owned(), "write lines of `nm,value`"));
     }
-    let mut table =
-        Table { path, names: Vec::new(), line: rows[0].line, rows, notes: Vec::new(), unit_in_comment: None, decimal };
+    let mut table = Table {
+        path,
+        names: Vec::new(),
+        line: rows[0].line,
+        rows,
+        notes: Vec::new(),
+        unit_in_comment: None,
+        comments: comments.iter().map(|(_, text)| (*text).to_owned()).collect(),
+        decimal,
+    };
     table.find_header(separator, &comments)?;
     Ok(table)
 }
@@ -330,6 +347,11 @@ impl Table<'_> {
         }
     }
 
+    /// Whether a cell says by itself that its number is percent.
+    pub fn is_percent(&self, row: &Row, column: usize) -> bool {
+        row.cells.get(column).is_some_and(|cell| cell.ends_with('%'))
+    }
+
     fn is_missing(&self, cell: &str) -> bool {
         let lower = cell.to_lowercase();
         NOT_GIVEN.contains(&lower.as_str())
@@ -362,7 +384,7 @@ impl Table<'_> {
         let width = self.rows.get(start).map_or(usual, |row| row.cells.len());
         let header = (self.header_of_cells(start, width))
             .or_else(|| self.header_of_words(start, width).filter(|_| separator == Separator::Space));
-        let preamble = header.as_ref().map_or(start, |header| header.row);
+        let mut preamble = header.as_ref().map_or(start, |header| header.first);
         let mut names = Vec::new();
         if let Some(header) = header {
             (names, self.line) = (header.names, self.rows[header.row].line);
@@ -373,6 +395,9 @@ impl Table<'_> {
                 self.notes.push(format!("names its columns in the comment on line {line}, the first one `{shown}`"));
             }
             (names, self.line) = (found, line);
+        } else if let Some(unit) = self.unit_over_optical_constants(start, width) {
+            (names, self.line) = (vec![unit, "n".to_owned(), "k".to_owned()], self.rows[start - 2].line);
+            preamble = start - 2;
         } else if start > 0 {
             self.refuse_names_of_other_columns(start - 1, width)?;
         }
@@ -413,23 +438,48 @@ impl Table<'_> {
             return None;
         }
         let cells = |row: usize| self.rows[row].cells.iter().map(str::to_owned).collect::<Vec<_>>();
-        let units = (head + 1..start).find(|&row| self.is_line_of_units(row));
+        let whole = |row: usize| self.rows[row].cells.iter().collect::<Vec<_>>().join(" ");
+        let units =
+            (head + 1..start).find(|&row| self.is_line_of_units(row) && !unit::states_a_factor(&whole(row - 1)));
         let row = units.unwrap_or(start) - 1;
         let mut names = cells(row);
+        // Some write the units first.
+        let before = row.checked_sub(1).filter(|before| {
+            units.is_none()
+                && *before >= head
+                && self.is_nothing_but_units(*before)
+                && Unit::stated(&names[0]) == Ok(None)
+        });
+        let units = units.or(before);
         for (name, unit) in names.iter_mut().zip(units.map(cells).unwrap_or_default()) {
             let bare = unit.trim_matches(['(', ')', '[', ']', ' ']);
             if !bare.is_empty() && *bare != *name {
                 *name = format!("{name} ({bare})");
             }
         }
-        Some(Header { names, row })
+        Some(Header { names, row, first: before.unwrap_or(row) })
+    }
+
+    /// Whether every cell of a row can be nothing but a unit, the first that of a spectral axis.
+    fn is_nothing_but_units(&self, row: usize) -> bool {
+        let bare = |cell: &str| cell.trim_matches(['(', ')', '[', ']', ' ']).to_owned();
+        let mut cells = self.rows[row].cells.iter().map(bare);
+        cells.next().is_some_and(|cell| Unit::named(&cell).is_some()) && cells.all(|cell| unit::parse(&cell).is_some())
+    }
+
+    /// The unit of the first column where three lines, a title, the unit and `NK`, stand before n and k, as WVASE writes them.
+    fn unit_over_optical_constants(&self, start: usize, width: usize) -> Option<String> {
+        let row =
+            |back: usize| Some(&self.rows[start.checked_sub(back)?].cells).filter(|cells| cells.len() == 1)?.get(0);
+        let is_such = width == 3 && row(1)?.eq_ignore_ascii_case("nk");
+        row(2).filter(|unit| is_such && Unit::named(unit).is_some()).map(str::to_owned)
     }
 
     /// Names between blanks, which hold blanks themselves, so that they seem to be more than there are columns.
     fn header_of_words(&self, start: usize, width: usize) -> Option<Header> {
         let row = start.checked_sub(1)?;
         let words: Vec<&str> = self.rows[row].cells.iter().collect();
-        Some(Header { names: join_names(&words, width)?, row })
+        Some(Header { names: join_names(&words, width)?, row, first: row })
     }
 
     /// A line before the numbers that names columns, but not these.
@@ -491,8 +541,10 @@ impl Table<'_> {
             let has_value =
                 row.cells.iter().flat_map(|cell| cell.split([':', '=', ' '])).any(|word| self.is_number(word));
             let scales = FACTORS.iter().chain(["offset"].iter()).any(|word| key.contains(word));
-            let of_units = key.contains("unit") && Unit::stated(&whole) != Ok(None);
-            if (scales && has_value) || of_units {
+            let of_units =
+                key.contains("unit") && (Unit::stated(&whole) != Ok(None) || unit::speaks_of_percent(&whole));
+            let is_unit = row.cells.len() == 1 && Unit::named(&whole).is_some_and(|unit| unit != Unit::NANOMETRE);
+            if (scales && has_value) || of_units || is_unit || unit::states_a_factor(&whole) || says_an_axis(&whole) {
                 let message = format!("says `{}`, which is not applied", shown(&whole));
                 let help = "apply it, put units into the header (`wavelength (um)`), and begin the line with `# `";
                 return Err(self.problem(Some(row.line), message, help));
@@ -561,6 +613,18 @@ impl Table<'_> {
         });
         self.notes.extend(factor.into_iter().chain(air));
     }
+}
+
+/// Whether a line such as `XAxis mode: Raman Shifts` or `Y-axis: % Reflectance` says of an axis what is not so without it.
+fn says_an_axis(line: &str) -> bool {
+    let Some((key, value)) = line.split_once([':', '=']) else { return false };
+    let key: String = key.to_lowercase().chars().filter(char::is_ascii_alphabetic).collect();
+    let value = value.trim();
+    if key.starts_with("xaxis") {
+        let is_plain = value.is_empty() || value.to_lowercase().contains("wavelength") || Unit::named(value).is_some();
+        return !(is_plain && matches!(Unit::stated(value), Ok(None | Some(Unit::NANOMETRE))));
+    }
+    key.starts_with("yaxis") && (Stated::in_name(value).is_some() || Said::in_name(value) == Some(Said::Counts))
 }
 
 /// Names that hold blanks, where columns are separated by blanks: those in brackets belong to the word before, and of two

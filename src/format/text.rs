@@ -4,6 +4,7 @@
 use std::fmt::Debug;
 use std::path::Path;
 
+use super::said::Said;
 use super::table::{self, Table};
 use super::unit::{self, Meaning, Stated, Unit};
 use super::{csv_table, instrument, library, modtran};
@@ -19,11 +20,18 @@ pub struct SpectrumTable {
     pub line: Vec<usize>,
     /// The unit of the values, where the file says one that has not been applied yet.
     pub unit: Option<Stated>,
+    /// What the file calls them, and in which words.
+    pub said: Option<(Said, String)>,
     /// What was left out or mended, in words that go on after the file's name.
     pub notes: Vec<String>,
 }
 
 impl SpectrumTable {
+    /// The same, called `name` by its file.
+    pub(super) fn called(self, name: &str) -> SpectrumTable {
+        SpectrumTable { said: Said::in_name(name).map(|said| (said, name.to_owned())), ..self }
+    }
+
     /// Adds a value, and the line it stands on.
     pub(super) fn push(&mut self, nm: f64, value: f64, line: usize) {
         self.nm.push(nm);
@@ -185,7 +193,7 @@ impl Axis {
         }
         let name = |column: usize| table.names.get(column).map_or("", String::as_str);
         // pandas writes the numbers of its rows first.
-        let is_index = ["", "index", "unnamed: 0", "no", "nr", "row"].contains(&name(0).to_lowercase().as_str());
+        let is_index = is_row_number(name(0));
         let second_is_axis =
             || !matches!(Unit::stated(name(1)), Ok(None)) || name(1).to_lowercase().starts_with("wave");
         let column = usize::from(is_index && table.columns() > 2 && second_is_axis());
@@ -212,6 +220,7 @@ impl Axis {
                 table.problem(Some(table.line), message, help)
             })?,
         };
+        check_intervals(table, column)?;
         let mut notes = table.notes.clone();
         if column > 0 {
             let axis = table::shown(name(column));
@@ -281,20 +290,31 @@ impl Axis {
             self.check_axis_of(table, *column)?;
         }
         let mut found: Vec<SpectrumTable> = vec![SpectrumTable::default(); wanted.len()];
+        // Cells that say percent by themselves, in columns that say it too.
+        let stated = |column: &usize| Stated::in_name(table.names.get(*column).map_or("", String::as_str));
+        let in_percent: Vec<bool> =
+            wanted.iter().map(|column| stated(column).is_some_and(|stated| stated.is_percent())).collect();
         for row in &table.rows {
             table.check_row(row)?;
             let Some(x) = table.number(row, self.column)? else { continue };
             let nm = self.nm(table, row.line, x)?;
-            for (column, found) in wanted.iter().zip(&mut found) {
+            for ((column, found), in_percent) in wanted.iter().zip(&mut found).zip(&in_percent) {
                 if let Some(value) = table.number(row, *column)? {
-                    found.push(nm, value, row.line);
+                    let is_twice = *in_percent && table.is_percent(row, *column);
+                    found.push(nm, if is_twice { value * 100.0 } else { value }, row.line);
                 }
             }
         }
         let finish = |(column, mut found): (&usize, SpectrumTable)| {
             let name = table.names.get(*column).map_or("", String::as_str);
             found.unit = Stated::in_name(name);
+            found = found.called(name);
             found.notes.clone_from(&self.notes);
+            if let (None, 3.., Some((_, stated))) = (&found.unit, table.columns(), &table.unit_in_comment)
+                && stated.is_percent()
+            {
+                found.unit = Some(Stated { meaning: Meaning::Factor, certain: true, text: stated.text.clone() });
+            }
             if let (None, 2, Some((line, stated))) = (&found.unit, table.columns(), &table.unit_in_comment) {
                 if !matches!(stated.meaning, Meaning::Unit(measure) if measure.is_own()) {
                     let text = table::shown(&stated.text);
@@ -315,10 +335,23 @@ impl Axis {
     /// they are the same.
     fn check_axis_of(&self, table: &Table, column: usize) -> Result<(), Box<Problem>> {
         let name = |column: usize| table.names.get(column).map_or("", String::as_str);
-        let begins_as_axis = |other: &usize| !name(*other).is_empty() && name(*other) == name(self.column);
+        let begins_as_axis = |other: &usize| {
+            let is_same = !name(*other).is_empty() && name(*other) == name(self.column);
+            // Right after the first axis another one is of the same places.
+            let after_values = (self.column + 1..*other).any(|between| !unit::is_axis(name(between)));
+            is_same || (after_values && unit::is_axis(name(*other)))
+        };
         let Some(other) = (self.column + 1..column).rev().find(begins_as_axis) else { return Ok(()) };
+        let unit = Unit::stated(name(other)).ok().flatten().unwrap_or(self.unit);
+        let is_same = |here: Option<f64>, first: Option<f64>| match (here, first) {
+            (Some(here), Some(first)) => {
+                let (here, first) = (unit.to_nm(here), self.unit.to_nm(first));
+                (here - first).abs() <= 1e-9 * first
+            }
+            (here, first) => here == first,
+        };
         for row in &table.rows {
-            if table.number(row, other)? != table.number(row, self.column)? {
+            if !is_same(table.number(row, other)?, table.number(row, self.column)?) {
                 let message = format!(
                     "gives column {} over wavelengths of its own, those of column {}, which differ from the first column's here",
                     column + 1,
@@ -349,6 +382,29 @@ impl Axis {
         let nm = self.unit.to_nm(x);
         Ok(if self.in_air { unit::vacuum_nm(nm) } else { nm })
     }
+}
+
+/// Whether a column is called as that of row numbers is.
+pub(super) fn is_row_number(name: &str) -> bool {
+    ["", "index", "unnamed: 0", "no", "nr", "row"].contains(&name.to_lowercase().as_str())
+}
+
+/// Refuses a table whose columns from `column` on are the two ends of intervals.
+pub(super) fn check_intervals(table: &Table, column: usize) -> Result<(), Box<Problem>> {
+    let name = |column: usize| table.names.get(column).map_or("", String::as_str);
+    let word = |column: usize| name(column).split(|c: char| !c.is_alphabetic()).next().unwrap_or("").to_lowercase();
+    let is_interval = matches!(word(column).as_str(), "from" | "start" | "begin" | "lower" | "min")
+        && matches!(word(column + 1).as_str(), "to" | "end" | "stop" | "upper" | "max");
+    if !is_interval {
+        return Ok(());
+    }
+    let message = format!(
+        "gives values of intervals, from `{}` to `{}`",
+        table::shown(name(column)),
+        table::shown(name(column + 1))
+    );
+    let help = "write the value at each end: two lines of one wavelength make a step";
+    Err(table.problem(Some(table.line), message, help))
 }
 
 /// The column called `wanted`, which no other must be.

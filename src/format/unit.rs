@@ -6,8 +6,8 @@ mod spelling;
 mod tests;
 
 use spelling::{
-    bracketed, has_factor, is_about_the_medium, is_logarithm, is_percent, is_wavenumber, looks_like_unit, plain,
-    spectral_power_at_end, spells_power,
+    begins_with_factor, bracketed, has_factor, is_about_the_medium, is_logarithm, is_percent, is_power_of_ten,
+    is_wavenumber, looks_like_unit, plain, spectral_power_at_end, spells_power, words,
 };
 
 use crate::spectral::planck::{CHARGE, LIGHT_SPEED, PLANCK};
@@ -41,15 +41,21 @@ const LUMEN: usize = 8;
 pub struct Measure {
     pub factor: f64,
     pub powers: [i8; DIMENSIONS],
+    /// How many powers of lengths stand above and below the line: of W/(m2 cm-1) one and two. W m-2 per m-1 and W per m are of one
+    /// dimension, and not of one quantity.
+    lengths: [i8; 2],
+    /// Whether a length shorter than a millimetre stands above the line by itself, as in W/m2*nm.
+    is_odd: bool,
 }
 
 impl Measure {
-    const ONE: Measure = Measure { factor: 1.0, powers: [0; DIMENSIONS] };
+    const ONE: Measure = Measure { factor: 1.0, powers: [0; DIMENSIONS], lengths: [0; 2], is_odd: false };
 
     const fn of(dimension: usize, factor: f64) -> Measure {
         let mut powers = [0; DIMENSIONS];
         powers[dimension] = 1;
-        Measure { factor, powers }
+        let lengths = if dimension == METRE { [1, 0] } else { [0; 2] };
+        Measure { factor, powers, lengths, is_odd: false }
     }
 
     fn times(self, other: Measure, power: i8) -> Option<Measure> {
@@ -58,7 +64,13 @@ impl Measure {
             *mine = mine.checked_add(theirs.checked_mul(power)?)?;
         }
         let factor = self.factor * other.factor.powi(power.into());
-        (factor.is_finite() && factor > 0.0).then_some(Measure { factor, powers })
+        let mut lengths = self.lengths;
+        for (side, mine) in lengths.iter_mut().enumerate() {
+            let theirs = other.lengths[if power < 0 { 1 - side } else { side }];
+            *mine = mine.checked_add(theirs.checked_mul(power.checked_abs()?)?)?;
+        }
+        let is_odd = self.is_odd || (other.is_odd && power > 0);
+        (factor.is_finite() && factor > 0.0).then_some(Measure { factor, powers, lengths, is_odd })
     }
 
     fn is(self, dimensions: &[(usize, i8)]) -> bool {
@@ -139,6 +151,13 @@ impl Unit {
     /// As [`Unit::from_header`]; `None` where the name states no unit.
     pub fn stated(name: &str) -> Result<Option<Unit>, String> {
         let text = plain(name);
+        // `wavelength (x10 nm)` and `tenths of nm` say two things at once.
+        let lower = text.to_lowercase();
+        if has_factor(&text)
+            || words(&lower).any(|word| ["tenths", "tenth", "hundreds", "hundredths", "tens"].contains(&word))
+        {
+            return Err(format!("`{text}`"));
+        }
         // A letter by itself is a name as often as an ångström; ν is a frequency to some and a wavenumber to others.
         if ["A", "nu", "\u{3bd}", "Nu", "hv", "h\u{3bd}", "hnu"].contains(&text.as_str()) {
             return Err(format!("`{text}`"));
@@ -185,7 +204,9 @@ impl Unit {
                 }
             }
         }
-        if words.iter().any(|word| is_wavenumber(word)) || spaced.to_lowercase().contains("wave number") {
+        let is_wavenumber = words.iter().any(|word| is_wavenumber(word)) || lower.contains("wave number");
+        // `wavenumber (kcm-1)` says more than `wavenumber (measured)`.
+        if is_wavenumber && !lower.contains("cm") {
             return Ok(Some(Unit::WAVENUMBER));
         }
         if let Some(bracketed) = bracketed(&text)
@@ -193,6 +214,9 @@ impl Unit {
             && bracketed.chars().any(char::is_alphabetic)
         {
             return Err(format!("`{}`", bracketed.trim()));
+        }
+        if is_wavenumber {
+            return Err(format!("`{text}`"));
         }
         // What is no length and says not in what it is.
         let lower = spaced.to_lowercase();
@@ -242,7 +266,17 @@ pub enum Kind {
 impl Measure {
     /// What numbers in this unit are to be multiplied by to be of `kind` in Spectile's unit; `None` if they are something else.
     pub fn to(self, kind: Kind) -> Option<Density> {
+        // A unit over a spectral axis names that axis: per nm all lengths stand below the line, per cm-1 one stands above it.
+        let below = if kind == Kind::Intensity { 0 } else { 2 };
+        let named = match self.lengths {
+            [0, all] => all == below + 1 || (all == below && self.powers[SECOND] != 0),
+            [1, all] => all == below && !self.is_odd,
+            _ => false,
+        };
         let spectral = |per_metre_cubed: &[(usize, i8)]| {
+            if !named {
+                return None;
+            }
             let with = |dimension: usize, change: i8| {
                 let mut powers = per_metre_cubed.to_vec();
                 match powers.iter_mut().find(|(known, _)| *known == dimension) {
@@ -285,9 +319,16 @@ impl Measure {
         is_area.then(|| self.factor * ATMOSPHERE_PA / (BOLTZMANN * kelvin))
     }
 
-    /// Whether this is a spectral radiance, irradiance or intensity.
+    /// Whether this has the dimension of a spectral radiance, irradiance, intensity or power.
     fn is_spectral_power(self) -> bool {
-        [Kind::Radiance, Kind::Irradiance, Kind::Intensity].iter().any(|kind| self.to(*kind).is_some())
+        let mut others = self.powers;
+        let [metre, watt, second, steradian] = [METRE, WATT, SECOND, STERADIAN].map(|i| std::mem::take(&mut others[i]));
+        watt == 1
+            && others == [0; DIMENSIONS]
+            && matches!(
+                (metre, second, steradian),
+                (-3 | -1 | 1, 0, -1) | (-2 | 0, 1, -1) | (-3 | -1, 0, 0) | (-2, 1, 0)
+            )
     }
 
     /// Whether numbers in this unit are those of Spectile's.
@@ -341,8 +382,10 @@ pub enum Meaning {
     Unit(Measure),
     /// That of something else than the values themselves: their logarithms, or K/S.
     Logarithm,
-    /// A unit or a factor that is not known here.
+    /// A unit that is not known here.
     Unknown,
+    /// A factor, or percent, of which it is not plain whether it is applied already.
+    Factor,
 }
 
 impl Stated {
@@ -353,10 +396,16 @@ impl Stated {
     }
 
     /// The unit of spectral power that a sentence speaks of, if there is just one: what stands in its brackets, or a run of its
-    /// words.
+    /// words; or that values are in percent.
     pub fn in_sentence(text: &str) -> Option<Stated> {
-        let measure = spelling::spectral_power_within(&plain(text))?;
+        let measure = spelling::spectral_power_within(&plain(text))
+            .or_else(|| speaks_of_percent(text).then_some(Measure { factor: 0.01, ..Measure::ONE }))?;
         Some(Stated { meaning: Meaning::Unit(measure), text: text.trim().to_owned(), certain: false })
+    }
+
+    /// Whether values are said to be percent.
+    pub fn is_percent(&self) -> bool {
+        self.meaning == Meaning::Unit(Measure { factor: 0.01, ..Measure::ONE })
     }
 
     /// The unit in the name of a column of values: in brackets, at the end of its words, after a comma (where W may as well
@@ -370,15 +419,28 @@ impl Stated {
         if let Some(inner) = bracketed(&text).map(str::trim).filter(|inner| !inner.is_empty()) {
             // A number by itself is that of a sample, or a factor that is or is not applied.
             if inner.starts_with(|c: char| c.is_ascii_digit()) && parse(inner).is_some_and(Measure::is_number) {
-                return if inner.contains(['e', 'E', '^']) { stated(Meaning::Unknown, true) } else { None };
+                let is_factor = inner.contains(['e', 'E', '^']) || is_power_of_ten(inner);
+                return if is_factor { stated(Meaning::Factor, true) } else { None };
+            }
+            // A number within the unit belongs to it: (10^-6 W m-2).
+            if parse(inner).is_none() && states_a_factor(inner) || has_factor(&text.replacen(inner, "", 1)) {
+                return stated(Meaning::Factor, true);
+            }
+            // No factor makes degrees Celsius anything else than a temperature.
+            if inner.starts_with(['°', 'º']) && is_celsius(inner) {
+                return stated(Meaning::Unit(Measure::of(KELVIN, 1.0)), true);
             }
             return match parse(inner) {
                 Some(measure) => stated(Meaning::Unit(measure), true),
-                None if looks_like_unit(&text[..text.rfind(inner).unwrap_or(0)], inner) || has_factor(&text) => {
-                    stated(Meaning::Unknown, true)
+                None if looks_like_unit(&text[..text.rfind(inner).unwrap_or(0)], inner) => {
+                    stated(if has_factor(&text) { Meaning::Factor } else { Meaning::Unknown }, true)
                 }
+                None if has_factor(&text) => stated(Meaning::Factor, true),
                 None => None,
             };
+        }
+        if has_factor(&text) || begins_with_factor(&text) {
+            return stated(Meaning::Factor, true);
         }
         // Nothing but a unit, and one of so many parts that no name is like it: photons/s/m2/nm/sr.
         if let Some(measure) =
@@ -398,8 +460,24 @@ impl Stated {
         if let Some(measure) = text.rsplit_once(", ").and_then(|(_, after)| parse(after)) {
             return stated(Meaning::Unit(measure), false);
         }
-        if has_factor(&text) || spells_power(&text) { stated(Meaning::Unknown, true) } else { None }
+        if spells_power(&text) { stated(Meaning::Unknown, true) } else { None }
     }
+}
+
+/// Whether the name of a column is that of a spectral axis: by its first word, or as nothing but a unit of one after a name.
+pub fn is_axis(name: &str) -> bool {
+    let lower = plain(name).to_lowercase();
+    let first = words(&lower).find(|word| word.chars().any(char::is_alphabetic)).unwrap_or("");
+    let begins = ["wavelength", "wavenumber", "wavelen", "wvl", "frequency"].iter().any(|axis| first.starts_with(axis));
+    let is_symbol = ["wl", "nu", "lambda", "\u{3bb}", "nm", "um", "cm", "ev", "thz"].contains(&first);
+    // A band over `b nm`.
+    let ends = words(&lower).last().is_some_and(|word| ["nm", "um"].contains(&word));
+    let is_of_values = Stated::in_name(name).is_some_and(|stated| match stated.meaning {
+        Meaning::Unit(measure) => Unit::of(measure).is_none(),
+        Meaning::Unknown => false,
+        Meaning::Logarithm | Meaning::Factor => true,
+    });
+    !is_of_values && (begins || ((is_symbol || ends) && matches!(Unit::stated(name), Ok(Some(_)))))
 }
 
 /// Whether the name of a column says that its wavelengths are those in air.
@@ -411,8 +489,9 @@ pub fn is_in_air(name: &str) -> bool {
 pub fn speaks_of_air(text: &str) -> bool {
     let lower = text.to_lowercase();
     let of_axis = ["wave", "lambda", "\u{3bb}"].iter().any(|word| lower.contains(word));
-    let in_air =
-        lower.split("in air").skip(1).any(|after| !after.starts_with(|c: char| c.is_alphanumeric() || c == '-'));
+    let in_air = ["in air", "in standard air", "in dry air", "in the air"].iter().any(|words| {
+        lower.split(words).skip(1).any(|after| !after.starts_with(|c: char| c.is_alphanumeric() || c == '-'))
+    });
     let said = in_air || ["air wave", "(air)", "[air]", ": air", "= air"].iter().any(|words| lower.contains(words));
     of_axis && said && !lower.contains("vac")
 }
@@ -421,6 +500,11 @@ pub fn speaks_of_air(text: &str) -> bool {
 /// `values x 1000`.
 pub fn states_a_factor(text: &str) -> bool {
     spelling::states_a_factor(&plain(text))
+}
+
+/// Whether a sentence says that the values are in percent: `Reflectance in percent`, `column 2: reflectance (%)`, `units: percent`.
+pub fn speaks_of_percent(text: &str) -> bool {
+    spelling::speaks_of_percent(&plain(text))
 }
 
 /// What is said of wavelengths in air, after the name of their file.

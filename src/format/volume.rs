@@ -92,7 +92,13 @@ fn flipped(path: &Path, array: &Variable) -> Result<[bool; 3], Box<Problem>> {
             let message = format!("has coordinates along {name} that are not evenly spaced");
             return Err(array.problem(message, "resample it: the voxels of a grid have one size"));
         }
-        flipped[dimension] = step < 0.0;
+        // CF's depth grows downward, as z does upward.
+        let is_down = coordinate
+            .attributes
+            .get("positive")
+            .and_then(|value| value.as_str())
+            .is_some_and(|positive| positive.eq_ignore_ascii_case("down"));
+        flipped[dimension] = (step < 0.0) != is_down;
     }
     Ok(flipped)
 }

@@ -231,7 +231,7 @@ impl Variable {
         let changes = |(key, value): &(&String, &Value)| {
             let lower = key.to_lowercase().replace(['_', '-'], " ");
             let has = |words: &[&str]| words.iter().any(|word| lower.contains(word));
-            let neutral = match (has(&FACTORS), has(&["offset"])) {
+            let neutral = match (has(&FACTORS) || has(&["slope"]), has(&["offset", "intercept"])) {
                 (true, _) => 1.0,
                 (false, true) => 0.0,
                 (false, false) => return has(&NO_VALUE) && !value.is_null(),

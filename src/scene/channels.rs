@@ -68,7 +68,10 @@ fn warn_of_far_channels(kind: &Item, channels: &Channels) {
     let Some(hull) = spectral::hull(found.iter().copied()) else { return };
     let all = channels.bounds.iter().flatten().copied();
     let hint = if all.fold(0.0, f64::max) < MICROMETRES_BELOW {
-        "; the numbers look like micrometres: write unit = \"um\""
+        match channels.responses.is_empty() {
+            true => "; the numbers look like micrometres: write unit = \"um\"",
+            false => "; the numbers look like micrometres: say so in the name of the file's column, `wavelength (um)`",
+        }
     } else {
         ""
     };

@@ -435,15 +435,20 @@ fn blend<'a>(fields: &Fields<'a>, textures: &mut Textures) -> Option<Kind<'a>> {
 }
 
 fn reflects<'a>(fields: &Fields<'a>, spectra: &mut Spectra<'a>, textures: &mut Textures) -> Option<Reflects> {
-    share_of_light(&fields.require("reflectance", REFLECTANCE)?, spectra, textures)
+    share_of_light(&fields.require("reflectance", REFLECTANCE)?, Quantity::Reflectance, spectra, textures)
 }
 
 /// A spectrum or texture of what becomes of light.
-fn share_of_light<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>, textures: &mut Textures) -> Option<Reflects> {
+fn share_of_light<'a>(
+    item: &Item<'a>,
+    quantity: Quantity,
+    spectra: &mut Spectra<'a>,
+    textures: &mut Textures,
+) -> Option<Reflects> {
     if is_texture(item) {
-        return textures.reflectance(item, spectra).map(Reflects::Texture);
+        return textures.share_of_light(item, quantity, spectra).map(Reflects::Texture);
     }
-    spectra.resolve(item, Quantity::Reflectance).map(Reflects::Spectrum)
+    spectra.resolve(item, quantity).map(Reflects::Spectrum)
 }
 
 /// A surface that scatters by Lambert's law, on one side or on both.
@@ -452,7 +457,7 @@ fn diffuse<'a>(fields: &Fields<'a>, spectra: &mut Spectra<'a>, textures: &mut Te
     let Some(item) = fields.get("transmittance") else {
         return reflectance.map(|reflectance| Kind::Diffuse { reflectance });
     };
-    let transmittance = share_of_light(&item, spectra, textures);
+    let transmittance = share_of_light(&item, Quantity::Transmittance, spectra, textures);
     if let Some(emissivity) = fields.get("emissivity") {
         emissivity.error_help(
             "does not say how much is reflected beside `transmittance`",

@@ -16,8 +16,17 @@ use crate::format::noise::{self, Range};
 use crate::format::unit::{self, Measure};
 use crate::format::volume::{self, Volume};
 
-/// Strength, and columns of a temperature and a spectrum each.
-type Term = (f64, Vec<(f64, Handle)>);
+/// An absorption, or a gas by its table.
+struct Term {
+    strength: f64,
+    /// Each of a temperature and a spectrum.
+    columns: Vec<(f64, Handle)>,
+    /// Whether its table has cross sections: it absorbs by molecules, p / (k T) in a volume.
+    by_molecule: bool,
+}
+
+/// At which cross sections are made absorptions per atmosphere where the gas has many temperatures, K.
+const REFERENCE: f64 = 300.0;
 
 /// Voxels of a medium whose grids of several shapes are divided until they have one.
 const MOST_VOXELS: u64 = 1 << 27;
@@ -102,7 +111,7 @@ impl<'a> Media<'a> {
 
 impl Kind {
     fn take(&self, spectra: &mut Spectra) -> Component {
-        let absorbers = self.absorbers.iter().map(|(strength, columns)| {
+        let absorbers = self.absorbers.iter().map(|Term { strength, columns, .. }| {
             let columns = columns.iter().map(|(kelvin, handle)| (*kelvin, spectra.take(*handle))).collect();
             Absorber { strength: *strength, columns }
         });
@@ -120,15 +129,58 @@ fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>, grids: &mut Grids) -> 
     let mut temperature = field(&fields, "temperature", grids, kelvin, Describes::Temperature)?;
     let density = field(&fields, "density", grids, Item::not_negative, Describes::Density)?;
     let density = density.unwrap_or(Field::Constant(1.0));
+    let gas_at = temperature.as_ref().map(|field| match field {
+        Field::Constant(kelvin) => *kelvin,
+        Field::Grid(_) => REFERENCE,
+    });
     let mut components = match fields.get("components") {
-        None => vec![kind(&fields, density, spectra, ", or several `components`")?],
-        Some(item) => several(&fields, &item, &density, spectra, grids)?,
+        None => vec![kind(&fields, density, gas_at, spectra, ", or several `components`")?],
+        Some(item) => several(&fields, &item, &density, gas_at, spectra, grids)?,
     };
     let fields_of_all = temperature.iter_mut().chain(components.iter_mut().map(|kind| &mut kind.density));
     one_shape(&fields, fields_of_all.collect())?;
     let absorbers: Vec<&Term> = components.iter().flat_map(|kind| &kind.absorbers).collect();
     check_temperatures(&fields, temperature.as_ref(), &absorbers)?;
+    if let Some(Field::Grid(grid)) = &temperature {
+        let each = components.into_iter().map(|kind| with_molecules(&fields, kind, grid)).collect::<Option<Vec<_>>>();
+        components = each?.into_iter().flatten().collect();
+    }
     Some(Declared { components, temperature, taken: None })
+}
+
+/// A kind of matter whose gases by cross sections have p / (k T) molecules in a volume: in voxels of many temperatures their density
+/// goes by that, which is not that of all else.
+fn with_molecules(fields: &Fields, kind: Kind, kelvin: &Grid) -> Option<Vec<Kind>> {
+    let Kind { absorbers, scattering, density } = kind;
+    let (by_molecule, others): (Vec<Term>, Vec<Term>) = absorbers.into_iter().partition(|term| term.by_molecule);
+    if by_molecule.is_empty() {
+        return Some(vec![Kind { absorbers: others, scattering, density }]);
+    }
+    let relative = |i: usize| match &density {
+        Field::Constant(density) => *density,
+        Field::Grid(grid) => f64::from(grid.values[i]),
+    };
+    let mut values = Vec::with_capacity(kelvin.values.len());
+    for (i, at) in kelvin.values.iter().enumerate() {
+        let value = match relative(i) {
+            0.0 => 0.0,
+            relative => relative * REFERENCE / f64::from(*at),
+        };
+        if !(value as f32).is_finite() {
+            fields.error_help(
+                format!("has a grid of temperatures with {at} K, where a gas by cross sections, p / (k T) molecules, has no density"),
+                "correct the temperature, or write density 0 there",
+            );
+            return None;
+        }
+        values.push(value as f32);
+    }
+    let molecules = Field::Grid(Arc::new(Grid { size: kelvin.size, values }));
+    let gas = Kind { absorbers: by_molecule, scattering: None, density: molecules };
+    if others.is_empty() && scattering.is_none() {
+        return Some(vec![gas]);
+    }
+    Some(vec![Kind { absorbers: others, scattering, density }, gas])
 }
 
 /// The keys of a kind of matter, which a medium may have itself or in `components`.
@@ -138,6 +190,7 @@ fn several<'a>(
     fields: &Fields<'a>,
     item: &Item<'a>,
     density: &Field,
+    gas_at: Option<f64>,
     spectra: &mut Spectra<'a>,
     grids: &mut Grids,
 ) -> Option<Vec<Kind>> {
@@ -153,14 +206,20 @@ fn several<'a>(
     let one = |item: &Item<'a>| {
         let fields = item.table(&keys::COMPONENT)?;
         let own = field(&fields, "density", grids, Item::not_negative, Describes::Density)?;
-        kind(&fields, own.unwrap_or_else(|| density.clone()), spectra, "")
+        kind(&fields, own.unwrap_or_else(|| density.clone()), gas_at, spectra, "")
     };
     // All of them, so that all mistakes are told at once.
     items.iter().map(one).collect::<Vec<_>>().into_iter().collect()
 }
 
 /// `instead`: what else a table may have that has none of these keys.
-fn kind<'a>(fields: &Fields<'a>, density: Field, spectra: &mut Spectra<'a>, instead: &str) -> Option<Kind> {
+fn kind<'a>(
+    fields: &Fields<'a>,
+    density: Field,
+    gas_at: Option<f64>,
+    spectra: &mut Spectra<'a>,
+    instead: &str,
+) -> Option<Kind> {
     let (absorption, gases, scattering) = (fields.get("absorption"), fields.get("species"), fields.get("scattering"));
     if absorption.is_none() && gases.is_none() && scattering.is_none() {
         fields.error_help(
@@ -195,12 +254,14 @@ fn kind<'a>(fields: &Fields<'a>, density: Field, spectra: &mut Spectra<'a>, inst
         }
     };
     let absorbers = match (absorption, gases) {
-        (Some(item), _) => spectra.resolve(&item, Quantity::Absorption).map(|handle| vec![(1.0, vec![(0.0, handle)])]),
-        (None, Some(item)) => species(&item, spectra),
+        (Some(item), _) => spectra
+            .resolve(&item, Quantity::Absorption)
+            .map(|handle| vec![Term { strength: 1.0, columns: vec![(0.0, handle)], by_molecule: false }]),
+        (None, Some(item)) => species(&item, gas_at, spectra),
         (None, None) => Some(Vec::new()),
     };
     let (scattering, pressure, mut absorbers) = (scattering?, pressure?, absorbers?);
-    absorbers.iter_mut().for_each(|(strength, _)| *strength *= pressure);
+    absorbers.iter_mut().for_each(|term| term.strength *= pressure);
     Some(Kind { absorbers, scattering, density })
 }
 
@@ -268,7 +329,7 @@ fn least_common_multiple(a: u64, b: u64) -> u64 {
 /// What tables over temperature say about the medium's: one is needed to choose a column, and where it lies beyond them,
 /// the last column is held, which is said.
 fn check_temperatures(fields: &Fields, temperature: Option<&Field>, absorbers: &[&Term]) -> Option<()> {
-    for (i, (_, columns)) in absorbers.iter().enumerate().filter(|(_, (_, columns))| columns.len() > 1) {
+    for (i, Term { columns, .. }) in absorbers.iter().enumerate().filter(|(_, term)| term.columns.len() > 1) {
         let (first, last) = (columns[0].0, columns[columns.len() - 1].0);
         let [low, high] = match temperature {
             None => {
@@ -303,7 +364,7 @@ fn check_temperatures(fields: &Fields, temperature: Option<&Field>, absorbers: &
     Some(())
 }
 
-fn species<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Vec<Term>> {
+fn species<'a>(item: &Item<'a>, gas_at: Option<f64>, spectra: &mut Spectra<'a>) -> Option<Vec<Term>> {
     const EXAMPLE: &str = "[{ table = \"co2.csv\", fraction = 0.05 }]";
     let items = item.array()?;
     if items.is_empty() {
@@ -314,13 +375,14 @@ fn species<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Vec<Term>> 
     let mut total = 0.0;
     for item in &items {
         let one = item.table(&keys::SPECIES).and_then(|fields| {
-            let table = fields.require("table", "table = \"co2.csv\"").and_then(|item| spectra.species(&item));
+            let table = fields.require("table", "table = \"co2.csv\"").and_then(|item| spectra.species(&item, gas_at));
             let fraction = fields.require("fraction", "fraction = 0.05, the share of volume").and_then(|item| {
                 item.number_where(|share| (0.0..=1.0).contains(&share), "a share of volume in [0, 1]")
             });
-            Some((fraction?, table?))
+            let (columns, by_molecule) = table?;
+            Some(Term { strength: fraction?, columns, by_molecule })
         });
-        total += one.as_ref().map_or(0.0, |(fraction, _)| *fraction);
+        total += one.as_ref().map_or(0.0, |term| term.strength);
         all.push(one);
     }
     let all: Option<Vec<_>> = all.into_iter().collect();

@@ -88,6 +88,7 @@ pub fn relight(basis: &Basis, channels: &Channels, sets: &[(String, String)], wa
         return Err(Error::Input(problems));
     }
     warnings.extend(more);
+    warnings.extend(dark(&relit, &channels));
     let changed = spectra.iter().map(|name| format!("spectra.{name}"));
     let changed = changed.chain(hot.iter().map(|name| format!("materials.{name}.temperature"))).collect();
     Ok(Relit { basis: relit, channels, changed, warnings })
@@ -206,6 +207,16 @@ fn decode<'a>(
             }
         }
     }
+}
+
+/// Sources that shine in none of the channels, as of scenes.
+fn dark<'b>(basis: &'b Basis, channels: &'b Channels) -> impl Iterator<Item = String> + use<'b> {
+    let shines = |curve: &Curve| channels.bounds.iter().any(|&[a, b]| curve.mean(a, b) >= f64::from(f32::MIN_POSITIVE));
+    let is_dark = move |leaf: &&Leaf| quantity(leaf).is_some_and(Quantity::is_light) && !shines(&leaf.curve);
+    let [first, last] = channels.hull().unwrap_or_default();
+    basis.spectra.iter().filter(is_dark).map(move |leaf| {
+        format!("the spectrum `{}` of a source shines in none of the channels, {first} and {last} nm", leaf.name)
+    })
 }
 
 fn quantity(leaf: &Leaf) -> Option<Quantity> {

@@ -169,7 +169,7 @@ type WithSpectrum<T> = Option<(T, Option<usize>)>;
 fn optics<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> WithSpectrum<Optics> {
     let fields = item.table(&keys::OPTICS)?;
     let transmittance = match fields.get("transmittance") {
-        Some(item) => spectra.resolve(&item, Quantity::Reflectance).map(|handle| Some(spectra.take(handle))),
+        Some(item) => spectra.resolve(&item, Quantity::Transmittance).map(|handle| Some(spectra.take(handle))),
         None => Some(None),
     };
     let temperature = positive(&fields, "temperature");
@@ -223,7 +223,7 @@ fn refuse(fields: &Fields, kind: &str, keys: &[&str]) {
 fn photon<'a>(fields: &Fields<'a>, spectra: &mut Spectra<'a>) -> WithSpectrum<Detector> {
     refuse(fields, "photon", &["responsivity", "noise_equivalent_power", "absorptance"]);
     let efficiency = fields.require("quantum_efficiency", "quantum_efficiency = 0.6, or a table");
-    let efficiency = efficiency.and_then(|item| spectra.resolve(&item, Quantity::Reflectance));
+    let efficiency = efficiency.and_then(|item| spectra.resolve(&item, Quantity::Efficiency));
     let time = fields.require("integration_time", "integration_time = 0.01 (s)").and_then(|item| item.positive());
     let gain = fields.require("gain", "gain = 2.5 (electrons a count)").and_then(|item| item.positive());
     let dark = number(fields, "dark_current", 0.0, |v| v >= 0.0, "0 or greater");
@@ -244,7 +244,7 @@ fn thermal<'a>(fields: &Fields<'a>, spectra: &mut Spectra<'a>) -> WithSpectrum<D
     let of_photons = ["integration_time", "quantum_efficiency", "dark_current", "full_well", "read_noise", "gain"];
     refuse(fields, "thermal", &of_photons);
     let absorptance = match fields.get("absorptance") {
-        Some(item) => spectra.resolve(&item, Quantity::Reflectance).map(|handle| Some(spectra.take(handle))),
+        Some(item) => spectra.resolve(&item, Quantity::Absorptance).map(|handle| Some(spectra.take(handle))),
         None => Some(None),
     };
     let responsivity =

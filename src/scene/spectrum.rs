@@ -17,6 +17,7 @@ use super::{Definition, Spectrum, SpectrumId};
 use crate::error::{Error, Problem};
 use crate::format::noise;
 use crate::format::refractive;
+use crate::format::table::shown;
 use crate::format::text::{self, SpectrumTable};
 use crate::format::unit::{Density, Meaning, Stated};
 use crate::spectral::{Channels, Curve, Outside, SOLAR, columns, hull, upsample};
@@ -171,7 +172,8 @@ impl<'a> Spectra<'a> {
         let (n, k) = (given("n", index.n), given("k", index.k));
         let mut part = |name: &str, table: SpectrumTable, quantity: Quantity| {
             let data = table_data(table, path.clone());
-            let source = Source { data, scale: 1.0, outside: None, path: item.path.clone(), at: item.at };
+            let source =
+                Source { data, scale: 1.0, is_scaled: false, outside: None, path: item.path.clone(), at: item.at };
             self.check(&source, &format!("{} ({name})", item.text()?), item, quantity)
         };
         let (n, k) = (n?, k?);
@@ -179,12 +181,14 @@ impl<'a> Spectra<'a> {
         n.zip(k)
     }
 
-    /// The columns of the file that `item` names, absorption of a species at temperatures: K, ascending, and a spectrum.
-    pub fn species(&mut self, item: &Item<'a>) -> Option<Vec<(f64, Handle)>> {
+    /// The columns of the file that `item` names, absorption of a species at temperatures: K, ascending, and a spectrum. And whether
+    /// they are cross sections, which are made absorptions per atmosphere of a gas of `gas_at` kelvins, by default the column's own.
+    pub fn species(&mut self, item: &Item<'a>, gas_at: Option<f64>) -> Option<(Vec<(f64, Handle)>, bool)> {
         let written = item.text()?;
         let path = item.cx.path(written);
         let columns = text::read_columns(&path).map_err(|problem| report_in_file(item, *problem)).ok()?;
         let mut found = Vec::new();
+        let mut cross_sections = 0;
         for (name, table) in columns {
             let kelvin = column_kelvin(&name);
             if kelvin.is_none() {
@@ -195,8 +199,11 @@ impl<'a> Spectra<'a> {
                 return None;
             }
             let kelvin = kelvin?;
-            let data = table_data(per_atmosphere(table, kelvin), path.clone());
-            let source = Source { data, scale: 1.0, outside: None, path: item.path.clone(), at: item.at };
+            let (table, is_cross_section) = per_atmosphere(table, gas_at.unwrap_or(kelvin));
+            cross_sections += usize::from(is_cross_section);
+            let data = table_data(table, path.clone());
+            let source =
+                Source { data, scale: 1.0, is_scaled: false, outside: None, path: item.path.clone(), at: item.at };
             found.push((kelvin, self.check(&source, &format!("{written} ({kelvin} K)"), item, Quantity::Absorption)?));
         }
         found.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -204,7 +211,14 @@ impl<'a> Spectra<'a> {
             item.error_help(format!("{} has two columns for {} K", path.display(), same[0].0), "remove one");
             return None;
         }
-        Some(found)
+        if cross_sections != 0 && cross_sections != found.len() {
+            item.error_help(
+                format!("{} has {cross_sections} columns of cross sections among {}", path.display(), found.len()),
+                "write all of a species in one unit",
+            );
+            return None;
+        }
+        Some((found, cross_sections != 0))
     }
 
     /// The index of a checked spectrum in the scene. Equal curves of one definition share one.
@@ -491,16 +505,47 @@ impl<'a> Spectra<'a> {
         warnings: &mut Vec<String>,
     ) -> Option<()> {
         let Some(file) = table.file else { return Some(()) };
-        let Some(Stated { meaning, text, certain }) = &file.unit else { return Some(()) };
         let path = file.path.display();
+        let is_scaled = table.source.is_scaled;
+        if let Some((said, text)) = file.said.as_ref().filter(|(said, _)| !quantity.may_be(*said)) {
+            let text = shown(text);
+            let (noun, wanted) = (said.noun(), quantity.noun());
+            if !is_scaled {
+                user.error_help(
+                    format!("{path} calls its values `{text}`, {noun}, and is to be {wanted}"),
+                    format!("take another column or file; if they make {wanted} as they are, say so: `scale = 1`"),
+                );
+                return None;
+            }
+            warnings.push(format!("{path} calls its values `{text}`: times `scale` they are taken as {wanted}"));
+        }
+        let Some(Stated { meaning, text, certain }) = &file.unit else { return Some(()) };
         let taken_as =
             if quantity.unit().is_empty() { "as they are".to_owned() } else { format!("in {}", quantity.unit()) };
         let measure = match meaning {
+            Meaning::Unit(_) if !certain && is_scaled && file.unit.as_ref().is_some_and(Stated::is_percent) => {
+                warnings.push(format!("{path} says `{}`: it is taken that `scale` sees to that", shown(text)));
+                return Some(());
+            }
             Meaning::Unit(measure) => measure,
             Meaning::Logarithm => {
                 user.error_help(
                     format!("{path} gives logarithms, or K/S, as its values (`{text}`)"),
                     "write the values themselves",
+                );
+                return None;
+            }
+            Meaning::Factor if is_scaled => {
+                warnings.push(format!(
+                    "{path} says `{}` of its values: they are taken as written, times `scale`",
+                    shown(text)
+                ));
+                return Some(());
+            }
+            Meaning::Factor => {
+                user.error_help(
+                    format!("{path} says `{}` of its values, which is not applied", shown(text)),
+                    "say in the scene what they are to be multiplied by, `scale = …` (1 if nothing), or write the values so",
                 );
                 return None;
             }
@@ -516,8 +561,8 @@ impl<'a> Spectra<'a> {
             Some(density) => {
                 value.iter_mut().zip(table.nm).for_each(|(value, nm)| *value = density.apply(*value, *nm));
             }
-            // A share of anything is what reflectances, tabulated beside other things, are without a unit.
-            None if measure.is_number() => {}
+            // What is relative has no unit.
+            None if measure.is_number() && measure.factor == 1.0 => {}
             None => {
                 let message =
                     format!("gives its values in the unit of `{text}`, which is not that of {}", quantity.noun());
@@ -586,15 +631,16 @@ impl<'a> Spectra<'a> {
     }
 }
 
-/// The table of a species at `kelvin` in m⁻¹ atm⁻¹, if it has cross sections.
-fn per_atmosphere(mut table: SpectrumTable, kelvin: f64) -> SpectrumTable {
+/// The table of a species at `kelvin` in m⁻¹ atm⁻¹, if it has cross sections; and whether it has.
+fn per_atmosphere(mut table: SpectrumTable, kelvin: f64) -> (SpectrumTable, bool) {
     if let Some(Stated { meaning: Meaning::Unit(measure), .. }) = &table.unit
         && let Some(factor) = measure.cross_section_per_atmosphere(kelvin)
     {
         table.value.iter_mut().for_each(|value| *value *= factor);
         table.unit = None;
+        return (table, true);
     }
-    table
+    (table, false)
 }
 
 /// A value as it is written, with what it is multiplied by.

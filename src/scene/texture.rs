@@ -92,13 +92,18 @@ pub fn is_texture(item: &Item) -> bool {
 }
 
 impl Textures {
-    /// The reflectance that `item` spells: `{ texture, endmembers }`, a mixture of spectra, or `{ texture }`, colours.
-    pub fn reflectance<'a>(&mut self, item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<Handle> {
+    /// The reflectance or transmittance that `item` spells: `{ texture, endmembers }`, a mixture of spectra, or `{ texture }`, colours.
+    pub fn share_of_light<'a>(
+        &mut self,
+        item: &Item<'a>,
+        quantity: Quantity,
+        spectra: &mut Spectra<'a>,
+    ) -> Option<Handle> {
         let fields = item.table(&keys::TEXTURE)?;
         let file = fields.require("texture", "texture = \"abundance.exr\"");
         let endmembers = match fields.get("endmembers") {
             None => None,
-            Some(list) => Some((resolve_endmembers(&list, Quantity::Reflectance, spectra)?, list)),
+            Some(list) => Some((resolve_endmembers(&list, quantity, spectra)?, list)),
         };
         let (file, placement) = (file?, placement(&fields)?);
         match endmembers {

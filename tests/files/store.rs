@@ -189,6 +189,55 @@ fn what_is_written_once_is_put_back() {
     assert_eq!(metadata["radiance"]["shape"], json!([5, 12, 20]));
 }
 
+/// What would make other numbers of a cube is refused by who takes its numbers, in place as in a copy, and by its name.
+#[test]
+fn other_meanings_are_refused_by_name() {
+    type Change = fn(&Path);
+    const RADIANCE: &str = "radiance/zarr.json";
+    let both = |cube: &Path, name: &str, value: Value| {
+        edit(&cube.join(RADIANCE), |array| array["attributes"][name] = value.clone());
+        edit(&cube.join("zarr.json"), |group| {
+            group["consolidated_metadata"]["metadata"]["radiance"]["attributes"][name] = value;
+        });
+    };
+    let cases: [(&str, fn(&Path, &dyn Fn(&Path, &str, Value))); 8] = [
+        ("the units `W m-2 sr-1 um-1`", |cube, both| both(cube, "units", json!("W m-2 sr-1 um-1"))),
+        ("a `scale_factor` of 2.0", |cube, both| both(cube, "scale_factor", json!(2.0))),
+        ("a `gain` of 2.0", |cube, both| both(cube, "gain", json!(2.0))),
+        ("a `slope` of 0.5", |cube, both| both(cube, "slope", json!(0.5))),
+        ("a `missing_value` of 1.0", |cube, both| both(cube, "missing_value", json!(1.0))),
+        ("a `valid_max` of 1.0", |cube, both| both(cube, "valid_max", json!(1.0))),
+        ("a `_FillValue` of 0.0", |cube, both| both(cube, "_FillValue", json!(0.0))),
+        ("somebody has changed `wavelength`", |cube, _| {
+            let file = cube.join("wavelength/c/0");
+            let mut bytes = fs::read(&file).expect("read");
+            bytes[..8].copy_from_slice(&401.0f64.to_le_bytes());
+            fs::write(file, bytes).expect("written");
+        }),
+    ];
+    let nothing: Change = |_| {};
+    let copy: Change = |cube| fs::remove_dir_all(cube.join(".spectile")).expect("removed");
+    for (words, change) in cases {
+        for after in [nothing, copy] {
+            let folder = tempdir().expect("folder");
+            let path = rendered(folder.path());
+            change(&path, &both);
+            after(&path);
+            let error = Cube::open_to_read(&path).map(|_| ()).expect_err(words).to_string();
+            assert!(error.contains(words), "{words}: {error}");
+        }
+    }
+    // What xarray adds, and words, change nothing.
+    let folder = tempdir().expect("folder");
+    let path = rendered(folder.path());
+    for (name, value) in
+        [("_FillValue", json!("AAAAAAAA+H8=")), ("comment", json!("x 2")), ("scale_factor", json!(1.0))]
+    {
+        both(&path, name, value);
+    }
+    Cube::open_to_read(&path).expect("as it was");
+}
+
 /// A bit that flips in the record is noticed, whatever it is.
 #[test]
 fn the_record_is_checked() {

@@ -193,6 +193,24 @@ fn groups_are_placed() {
 }
 
 #[test]
+fn what_is_clipped_or_left_out_is_told() {
+    let found = imported(
+        r#"<medium type="homogeneous" id="fog"><float name="scale" value="1"/></medium>
+        <shape type="sphere"><ref name="interior" id="fog"/><bsdf type="null"/></shape>
+        <shape type="sphere"><bsdf type="difftrans">
+            <rgb name="reflectance" value="0.8, 0.8, 0.8"/><rgb name="transmittance" value="0.8, 0.8, 0.8"/>
+        </bsdf></shape>"#,
+    );
+    let told = &found.page;
+    assert!(told.contains("and the medium that it bounds"), "{told}");
+    assert!(told.contains("of 1.600 in all, both scaled to 1 in all"), "{told}");
+    let both = scene("").replace("<film", "<string name=\"focal_length\" value=\"50mm\"/><film");
+    let (_folder, path) = written("scene.xml", &both);
+    let error = spectile::import::import(&path, &path.with_extension("out")).expect_err("both").to_string();
+    assert!(error.contains("both `fov` and `focal_length`"), "{error}");
+}
+
+#[test]
 fn mistakes_have_file_and_line() {
     let said = |text: &str| {
         let (folder, path) = written("scene.xml", text);

@@ -212,6 +212,31 @@ fn fronts_are_pbrts() {
 }
 
 #[test]
+fn what_is_clipped_is_told() {
+    let sphere = "Shape \"sphere\"";
+    for (inner, words) in [
+        (
+            format!("Material \"diffuse\" \"rgb reflectance\" [1.5 .2 .2]\n{sphere}"),
+            "a reflectance above 1, which is 1",
+        ),
+        (
+            format!("Material \"diffuse\" \"rgb reflectance\" [-.5 .2 .2]\n{sphere}"),
+            "`reflectance` with negative values, which are 0",
+        ),
+        ("LightSource \"infinite\" \"rgb L\" [-1 1 1]".to_owned(), "`L` with negative values, which are 0"),
+        (
+            format!(
+                "Material \"diffusetransmission\" \"rgb reflectance\" [.8 .8 .8] \"rgb transmittance\" [.8 .8 .8]\n{sphere}"
+            ),
+            "of 1.600 in all, both scaled to 1 in all",
+        ),
+    ] {
+        let page = imported(&inner).page;
+        assert!(page.contains(words), "{inner}: {page}");
+    }
+}
+
+#[test]
 fn mistakes_have_file_and_line() {
     let said = |text: &str| {
         let (folder, path) = written("scene.pbrt", text);

@@ -256,14 +256,30 @@ fn general_scenes() -> Vec<(String, Scene)> {
     scenes.extend(light_scenes());
     scenes.extend(media_scenes());
     scenes.extend(hot_scenes());
-    // Each row of the table by itself, and each with the one after it.
-    let with_example: Vec<_> = PARTS.iter().copied().filter(|part| part.example.is_some()).collect();
-    for (i, part) in with_example.iter().enumerate() {
-        let pair = [*part, with_example[(i + 1) % with_example.len()]];
-        scenes.push((part.name.to_owned(), with_parts(&plain_scene(), &pair[..1])));
-        scenes.push((format!("{} and {}", pair[0].name, pair[1].name), with_parts(&plain_scene(), &pair)));
-    }
+    scenes.extend(pairs_of_parts());
     scenes.push(("everything".to_owned(), with_everything(&plain_scene())));
+    scenes
+}
+
+/// Each row of the table by itself, and each with every other: all of them in a scene without any light, and those next to each
+/// other in one with a lamp.
+fn pairs_of_parts() -> Vec<(String, Scene)> {
+    let unlit =
+        Builder::new().channels(Channels::equal(400.0, 700.0, 4)).diffuse(quad(DVec3::ZERO, DVec3::X, DVec3::Y), 0.5);
+    let (unlit, lit) = (unlit.build(), plain_scene());
+    let rows: Vec<_> = PARTS.iter().copied().filter(|part| part.example.is_some()).collect();
+    let mut scenes = Vec::new();
+    for (i, part) in rows.iter().enumerate() {
+        scenes.push((part.name.to_owned(), with_parts(&lit, &[*part])));
+        scenes.push((format!("{}, unlit", part.name), with_parts(&unlit, &[*part])));
+        for (j, other) in rows.iter().enumerate().skip(i + 1) {
+            let pair = [*part, *other];
+            scenes.push((format!("{} and {}, unlit", part.name, other.name), with_parts(&unlit, &pair)));
+            if j == i + 1 {
+                scenes.push((format!("{} and {}", part.name, other.name), with_parts(&lit, &pair)));
+            }
+        }
+    }
     scenes
 }
 

@@ -411,6 +411,8 @@ fn zarr_attributes_that_are_not_applied_are_refused() {
     };
     for attribute in [
         r#""gain": 2.0"#,
+        r#""slope": 2.0"#,
+        r#""intercept": 1.0"#,
         r#""multiplier": 2"#,
         r#""offset": 1.0"#,
         r#""scale": "0.5""#,
@@ -428,8 +430,27 @@ fn zarr_attributes_that_are_not_applied_are_refused() {
 }
 
 #[test]
+fn zarr_arrays_of_other_quantities_are_refused_by_name() {
+    for (attribute, what) in [
+        (r#""standard_name": "toa_brightness_temperature""#, "a temperature"),
+        (r#""standard_name": "toa_bidirectional_reflectance""#, "a reflectance"),
+        (r#""long_name": "log10 of radiance""#, "logarithms"),
+        (r#""long_name": "spectral irradiance""#, "an irradiance"),
+    ] {
+        let attributes = format!("{{{attribute}}}");
+        let array = zarr_array(&[4, 2, 3], "float32", &OVER_SKY, &attributes);
+        zarr_with(&[("s.zarr/sky/zarr.json", array)]).refused("map = \"s.zarr\"", &["says that `sky` is", what]);
+    }
+    let named = r#"{"standard_name": "toa_outgoing_radiance_per_unit_wavelength", "long_name": "sky"}"#;
+    let array = zarr_array(&[4, 2, 3], "float32", &OVER_SKY, named);
+    assert_spectral(&zarr_with(&[("s.zarr/sky/zarr.json", array)]).map("map = \"s.zarr\"").0);
+}
+
+#[test]
 fn zarr_wavelengths_in_air_are_converted() {
-    for attribute in [r#""long_name": "wavelength in air""#, r#""standard_name": "air_wavelength""#] {
+    for attribute in
+        [r#""long_name": "wavelength in air""#, r#""standard_name": "air_wavelength""#, r#""medium": "air""#]
+    {
         let axis = zarr_array(&[4], "float64", &["wavelength"], &format!(r#"{{"units": "nm", {attribute}}}"#));
         let (map, warnings) = zarr_with(&[("s.zarr/wavelength/zarr.json", axis)]).map("map = \"s.zarr\"");
         let Texels::Spectral { nm, .. } = &map.texels else { panic!("{map:?}") };

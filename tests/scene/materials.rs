@@ -277,3 +277,52 @@ fn the_digest_covers_every_material() {
     digests.dedup();
     assert_eq!(digests.len(), count);
 }
+
+/// What a file calls its values is what they are taken for, unless the scene says by `scale` that it knows better.
+#[test]
+fn what_files_call_their_values_counts() {
+    let scene = |key: &str, header: &str, more: &str| {
+        let text =
+            with_material(&format!("[materials.m.diffuse]\nreflectance = 0.1\n{key} = {{ file = \"a.csv\"{more} }}"));
+        let text = if key == "transmittance" { text } else { text.replace("reflectance = 0.1\n", "") };
+        let table = format!("nm,{header}\n300,0.25\n900,0.25\n");
+        parse_with(&text, &[("a.csv", &table)], &[])
+    };
+    for (key, header, noun) in [
+        ("reflectance", "Transmittance", "a transmittance"),
+        ("reflectance", "emissivity", "an emissivity"),
+        ("reflectance", "absorptance", "an absorptance"),
+        ("reflectance", "radiance", "a radiance"),
+        ("reflectance", "DN", "counts of a detector"),
+        ("transmittance", "reflectance", "a reflectance"),
+        ("emissivity", "Reflectance", "a reflectance"),
+    ] {
+        let error = scene(key, header, "").map(|_| ()).expect_err(header).to_string();
+        assert!(
+            error.contains(&format!("calls its values `{header}`, {noun}")) && error.contains("scale = 1"),
+            "{error}"
+        );
+        let found = scene(key, header, ", scale = 1").unwrap_or_else(|error| panic!("{error}"));
+        assert!(
+            found.warnings.iter().any(|warning| warning.contains(&format!("`{header}`: times `scale`"))),
+            "{header}"
+        );
+    }
+    for (key, header) in [
+        ("reflectance", "reflectance"),
+        ("reflectance", "albedo of snow"),
+        ("reflectance", "oak"),
+        ("transmittance", "leaf transmission"),
+        ("emissivity", "emissivity"),
+    ] {
+        let found = scene(key, header, "").unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(found.warnings, Vec::<String>::new(), "{header}");
+    }
+    // A factor that may or may not be applied is the scene's to say; percent of a comment is applied, but where the scene scales.
+    let error = scene("reflectance", "reflectance x 100", "").map(|_| ()).expect_err("a factor").to_string();
+    assert!(
+        error.contains("`reflectance x 100`") && error.contains("not applied") && error.contains("`scale = "),
+        "{error}"
+    );
+    scene("reflectance", "reflectance x 100", ", scale = 0.01").expect("the scene says it");
+}

@@ -80,19 +80,45 @@ fn absorption_resolves() {
     assert_ne!(scene.digest, good(&text, &[], &[("camera.perspective.medium", "unused")]).digest);
 }
 
-/// Molecules per volume are p / (k T): at 273.15 K and 1 atm Loschmidt's number, 2.686 780 111e25 m⁻³ (CODATA 2018), and half of
-/// it at twice that.
+/// Molecules per volume are p / (k T), T the gas's own, whatever the columns are of: at 273.15 K and 1 atm Loschmidt's number,
+/// 2.686 780 111e25 m⁻³ (CODATA 2018), and half of it at twice that.
 #[test]
-fn cross_sections_of_a_species_are_absorptions_at_its_temperatures() {
+fn cross_sections_count_the_molecules_of_the_gas() {
     let table =
         "wavenumber (cm-1),273.15 K (cm2/molecule),546.3 K [cm2/molecule]\n14000,1e-21,2e-21\n26000,3e-21,4e-21\n";
     let media = "[media.gas]\nspecies = [{ table = \"gas.csv\", fraction = 1.0 }]\ntemperature = 300";
-    let scene = good(&filled(BALL, media), &[("gas.csv", table)], &[]);
-    for ((kelvin, spectrum), expected) in
-        scene.media[0].components[0].absorbers[0].columns.iter().zip([2.686_780_111, 2.686_780_111])
-    {
-        let found = scene.spectra[*spectrum].curve.eval(1e7 / 14_000.0);
-        assert!((found / expected - 1.0).abs() < 1e-9, "{kelvin} K: {found}");
+    let at_14000 = |scene: &Scene, component: usize| -> Vec<f64> {
+        let columns = &scene.media[0].components[component].absorbers[0].columns;
+        columns.iter().map(|(_, spectrum)| scene.spectra[*spectrum].curve.eval(1e7 / 14_000.0)).collect()
+    };
+    let close = |found: &[f64], expected: &[f64]| {
+        assert_eq!(found.len(), expected.len());
+        found.iter().zip(expected).for_each(|(a, b)| assert!((a / b - 1.0).abs() < 1e-9, "{found:?}, {expected:?}"));
+    };
+    const LOSCHMIDT: f64 = 2.686_780_111;
+    for (kelvin, share) in [("273.15", 1.0), ("546.3", 0.5)] {
+        let scene = good(&filled(BALL, media), &[("gas.csv", table)], &[("media.gas.temperature", kelvin)]);
+        close(&at_14000(&scene, 0), &[LOSCHMIDT * share, 2.0 * LOSCHMIDT * share]);
+    }
+    // Of one column without a temperature its own is all that is known.
+    let one = "nm,300 K (cm2/molecule)\n400,1e-21\n800,1e-21\n";
+    let media = "[media.gas]\nspecies = [{ table = \"gas.csv\", fraction = 1.0 }]";
+    let scene = good(&filled(BALL, media), &[("gas.csv", one)], &[]);
+    close(&at_14000(&scene, 0), &[LOSCHMIDT * 273.15 / 300.0]);
+    // In voxels the density of the gas goes by their temperatures, and that of what scatters beside it does not.
+    let media = "[media.gas]\nspecies = [{ table = \"gas.csv\", fraction = 1.0 }]\nscattering = 2.0\ndensity = 0.5\n\
+        temperature = { grid = \"t.zarr\" }";
+    let dir = folder(&[("gas.csv", one)]);
+    write_grid(&dir.path().join("t.zarr"), &[1, 1, 2], data_type::float64(), &[273.15, 546.3]);
+    let scene = scene::parse(&filled(BALL, media), &dir.path().join("scene.toml"), &overrides(&[])).unwrap();
+    let [cloud, gas] = &scene.media[0].components[..] else { panic!("{:?}", scene.media[0].components) };
+    assert!(cloud.absorbers.is_empty() && cloud.scattering.is_some() && cloud.density == Field::Constant(0.5));
+    let Field::Grid(density) = &gas.density else { panic!("{:?}", gas.density) };
+    let reference = at_14000(&scene, 1)[0];
+    for (density, expected) in density.values.iter().zip([0.5 * LOSCHMIDT, 0.25 * LOSCHMIDT]) {
+        let found = reference * f64::from(*density);
+        // The grid has f32.
+        assert!((found / expected - 1.0).abs() < 2e-7, "{found}, {expected}");
     }
     // Without a temperature nothing follows.
     let alone = "[media.gas]\nabsorption = { file = \"one.csv\" }";

@@ -1,6 +1,7 @@
 //! Surfaces that let some rays pass as if they were not there.
 
 use crate::device::part::{Part, Place};
+use crate::device::parts::lights;
 use crate::device::text::module;
 
 pub const OPACITY: Part = Part {
@@ -12,15 +13,21 @@ pub const OPACITY: Part = Part {
         (Place::Generate, module!("parts/opacity/opacity.wgsl")),
         (Place::Stage, module!("parts/opacity/way.wgsl")),
     ],
-    lines: &[
-        ("LIGHT_WEIGHT", "begin_way(path.number, SALT_TO_LIGHT);"),
-        ("AIMED_AT_SURFACE", "(*aim).strength *= opacity_aimed_at(emitter, point);"),
-    ],
+    lines: &[("LIGHT_WEIGHT", "begin_way(path.number, SALT_TO_LIGHT);")],
     defines: |scene, _, defines| {
         let textured = scene.surfaces.as_ref().is_some_and(|surfaces| surfaces.masks);
         defines.set("OPACITY", true).set("MASKS", textured).set("LONG_WAYS", true);
     },
     example: Some(|exhibit| exhibit.add_masks()),
+    ..Part::NOTHING
+};
+
+/// That of surfaces that are aimed at.
+pub const OF_LAMPS: Part = Part {
+    name: "opacity of surfaces that shine",
+    used: |scene| (OPACITY.used)(scene) && (lights::SURFACES.used)(scene),
+    modules: &[(Place::Stage, module!("parts/opacity/aimed.wgsl"))],
+    lines: &[("AIMED_AT_SURFACE", "(*aim).strength *= opacity_aimed_at(emitter, point);")],
     ..Part::NOTHING
 };
 

@@ -51,6 +51,44 @@ fn each_is_read_with_its_units() {
 }
 
 #[test]
+fn each_says_what_it_is_of() {
+    let said =
+        |name: &str, text: &str, column: Option<&str>| read(name, text, column).unwrap().said.map(|(said, _)| said);
+    assert_eq!(said("lamp.spdx", SPDX, None), Some(Said::Irradiance));
+    for (quantity, expected) in [
+        ("transmittance", Some(Said::Transmittance)),
+        ("T-Factor", Some(Said::Transmittance)),
+        ("R-Factor", Some(Said::Reflectance)),
+        ("absorptance", Some(Said::Absorptance)),
+        ("relative", None),
+    ] {
+        assert_eq!(said("lamp.spdx", &SPDX.replace("irradiance", quantity), None), expected, "{quantity}");
+    }
+    assert!(
+        read("lamp.spdx", &SPDX.replace("irradiance", "absorbance"), None).unwrap_err().message.contains("logarithm")
+    );
+    // A flux is no irradiance, though W nm-1 has the dimension of one over wavenumber.
+    for quantity in ["flux", "intensity"] {
+        let unit = read("lamp.spdx", &SPDX.replace("irradiance", quantity), None).unwrap().unit.expect("a unit");
+        let unit::Meaning::Unit(measure) = unit.meaning else { panic!("{unit:?}") };
+        assert_eq!(
+            [unit::Kind::Irradiance, unit::Kind::Radiance].map(|kind| measure.to(kind)),
+            [None; 2],
+            "{quantity}"
+        );
+    }
+    assert_eq!(said("leaf.sig", SIG, None), Some(Said::Reflectance));
+    assert_eq!(said("leaf.sig", SIG, Some("target")), Some(Said::Radiance));
+    let irradiance = SIG.replace("Radiance, Radiance", "Irradiance, Irradiance");
+    assert!(read("leaf.sig", &irradiance, Some("target")).unwrap_err().message.contains("no radiance"));
+    assert_eq!(said("leaf.sed", SED, Some("Rad. (Target)")), Some(Said::Radiance));
+    assert_eq!(said("leaf.sed", &SED.replace("Reflect. %", "Transmit. %"), None), Some(Said::Transmittance));
+    assert_eq!(said("co2.spec", RADIS, Some("radiance_noslit")), Some(Said::Radiance));
+    let um = CAMERA.replace("\"units\": \"relative\"", "\"units\": \"relative\", \"wavelength_units\": \"um\"");
+    assert!(read("camera.json", &um, Some("R")).unwrap_err().message.contains("`um`"));
+}
+
+#[test]
 fn air_is_converted_where_a_file_says_so() {
     let text = RADIS.replace("\"cm-1\"}}", "\"nm\"}}").replace("[2000.0, 2500.0]", "[500.0, 589.0]");
     let air = read("a.spec", &text, Some("abscoeff")).unwrap();

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::{Bands, Map, checked_size, spectral, whole, with_help};
 use crate::error::Problem;
-use crate::format::envi::{header_path, is_header, parse};
+use crate::format::envi::{Header, header_path, is_header, parse};
 use crate::format::unit::{Meaning, Stated};
 
 /// The header of the data file at `path`, if it is one of ENVI's.
@@ -33,6 +33,29 @@ fn data_of(path: &Path) -> Result<PathBuf, Box<Problem>> {
     }
 }
 
+/// Refuses a map of the sphere by latitude and longitude whose first column is not at the west of it, or its first row not at the
+/// north: columns go from -180 to 180 degrees, rows from 90 to -90.
+fn check_place(header: &Header) -> Result<(), Box<Problem>> {
+    let Some(info) = header.list("map info") else { return Ok(()) };
+    let lower = info.first().map(|name| name.to_lowercase()).unwrap_or_default();
+    let numbers: Vec<f64> = info.iter().skip(1).take(6).map_while(|text| text.parse().ok()).collect();
+    let (true, &[x, y, longitude, latitude, dx, dy]) = (lower.contains("lat"), &numbers[..]) else { return Ok(()) };
+    // The reference is a corner at 1, the middle of the first pixel at 1.5.
+    let (west, north) = (longitude - (x - 1.0) * dx, latitude + (y - 1.0) * dy);
+    let off = |found: f64, wanted: f64, step: f64| (found - wanted).abs() > 0.01 * step.abs();
+    if off(west, -180.0, dx) && off(west, 180.0, dx) {
+        let message = format!(
+            "begins at longitude {west}, but the first column of a map is at -180: bring the columns into that order (numpy.roll)"
+        );
+        return Err(header.problem("map info", &message));
+    }
+    if off(north, 90.0, dy) {
+        let message = format!("begins at latitude {north}, but the first row of a map is at 90, the north");
+        return Err(header.problem("map info", &message));
+    }
+    Ok(())
+}
+
 /// The raster of the header at `path`; `data` is its file of numbers, where that is known.
 pub fn read(path: &Path, data: Option<&Path>) -> Result<Map, Box<Problem>> {
     let bytes = |path: &Path| std::fs::read(path).map_err(|e| whole(path, format!("cannot be read: {e}")));
@@ -53,12 +76,13 @@ pub fn read(path: &Path, data: Option<&Path>) -> Result<Map, Box<Problem>> {
             "list that of each band, e.g. `wavelength = { 400, 500, 600 }`",
         )
     })?;
+    check_place(&header)?;
     let mut warnings: Vec<String> = header.notes.clone();
     let density = match header.unit() {
         Some(Stated { meaning, text, .. }) => {
             let measure = match meaning {
                 Meaning::Unit(measure) => Some(*measure),
-                Meaning::Unknown => None,
+                Meaning::Unknown | Meaning::Factor => None,
                 Meaning::Logarithm => {
                     return Err(header.problem("z plot titles", "speaks of logarithms: write radiances"));
                 }

@@ -4,7 +4,9 @@ use std::path::Path;
 
 use super::{Bands, Map, checked_size, spectral, whole, with_help};
 use crate::error::Problem;
-use crate::format::unit::{self, Density, Unit};
+use crate::format::said::Said;
+use crate::format::table::shown;
+use crate::format::unit::{self, Density, Meaning, Stated, Unit};
 use crate::format::zarr::{self, Variable};
 
 /// The array that is read where a store has several.
@@ -57,6 +59,8 @@ pub fn read(path: &Path) -> Result<Map, Box<Problem>> {
     }
     let axis = axis(path, &arrays, &dimensions[spectrum], shape[spectrum])?;
     let bands = bands(path, &arrays, axis, &mut warnings)?;
+    refuse_other_quantities(path, radiance)?;
+    warnings.extend(bad_bands(&arrays, axis)?);
     let density = density(path, radiance, axis.unit()?, &mut warnings)?;
     let rows = match coordinate(y, &LATITUDE) {
         Some(array) => from_north(path, array, &mut warnings)?,
@@ -309,7 +313,11 @@ fn bands(
         let text = axis.array.attributes.get(key).and_then(|value| value.as_str()).unwrap_or("");
         unit::is_in_air(text) && !text.to_lowercase().contains("vac")
     };
-    let in_air = says_air("long_name") || says_air("standard_name");
+    let in_air = ["long_name", "standard_name", "medium", "comment", "description"].into_iter().any(says_air);
+    let text = |key: &str| axis.array.attributes.get(key).and_then(|value| value.as_str()).unwrap_or("");
+    if let Some(name) = [text("long_name"), text("standard_name")].into_iter().find(|name| says_logarithm(name)) {
+        return Err(whole(path, format!("gives logarithms as its wavelengths: `{name}`")));
+    }
     warnings.extend(in_air.then(|| unit::FROM_AIR.to_owned()));
     let in_nm = |x: f64, unit: Unit| match unit.to_nm(x) {
         _ if x <= 0.0 => f64::NAN,
@@ -366,6 +374,33 @@ fn bands(
 }
 
 /// What makes radiance of the numbers.
+fn says_logarithm(name: &str) -> bool {
+    Stated::in_name(name).is_some_and(|stated| stated.meaning == Meaning::Logarithm)
+}
+
+/// Refuses an array that CF's names call something else than a radiance.
+fn refuse_other_quantities(path: &Path, array: &Variable) -> Result<(), Box<Problem>> {
+    for key in ["standard_name", "long_name"] {
+        let Some(name) = array.attributes.get(key).and_then(|value| value.as_str()) else { continue };
+        let what = match Said::in_name(name) {
+            _ if says_logarithm(name) => "logarithms",
+            Some(said) if said != Said::Radiance => said.noun(),
+            _ => continue,
+        };
+        let message = format!("says that `{}` is {what} (`{key}`: `{}`)", array.name, shown(name));
+        return Err(with_help(path, message, "a map holds radiance: compute it, or correct the attribute"));
+    }
+    Ok(())
+}
+
+/// What to say of bands that an array beside the wavelengths calls bad, as those of EMIT do.
+fn bad_bands(arrays: &[Variable], axis: SpectralAxis) -> Result<Option<String>, Box<Problem>> {
+    let good = arrays.iter().find(|array| array.name == "good_wavelengths" && array.shape == axis.array.shape);
+    let Some(good) = good else { return Ok(None) };
+    let bad = good.values()?.iter().filter(|good| **good == 0.0).count();
+    Ok((bad > 0).then(|| format!("has {bad} bands that `good_wavelengths` calls bad: they are read as the others")))
+}
+
 fn density(path: &Path, array: &Variable, axis: Unit, warnings: &mut Vec<String>) -> Result<Density, Box<Problem>> {
     match array.units() {
         Some((text, measure)) => super::radiance_of(path, text, measure, axis, warnings),

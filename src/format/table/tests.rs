@@ -57,6 +57,8 @@ fn headers_are_found_where_they_stand() {
         ("Long name,second\nnm,W\nof a lamp,\n400,1\n500,2\n", &["Long name (nm)", "second (W)"]),
         ("400,1\n500,1\n", &[]),
         ("band,nm,response\nred,400,1\n", &["band", "nm", "response"]),
+        ("nm,%\nwavelength,reflectance\n400,1\n500,1\n", &["wavelength (nm)", "reflectance (%)"]),
+        ("Al, as WVASE has it\nANGSTROMS\nNK\n4000 1 3\n5000 2 3\n", &["ANGSTROMS", "n", "k"]),
     ] {
         let table = read(text.as_bytes(), Path::new("t.csv")).unwrap_or_else(|problem| panic!("{text}: {problem}"));
         assert_eq!(table.names, names, "{text}");
@@ -70,11 +72,28 @@ fn what_can_be_read_in_two_ways_is_refused() {
         ("nm;v\n1,5;2.5\n2,5;3.5\n", 2, "decimal comma"),
         ("Scale factor: 100\nnm,v\n400,1\n500,1\n", 1, "not applied"),
         ("X Units: um\nwl,v\n400,1\n500,1\n", 1, "not applied"),
+        ("Scale factor,0.01\nnm,v\n400,1\n500,1\n", 1, "not applied"),
+        ("Units: percent\nnm,v\n400,1\n500,1\n", 1, "not applied"),
+        ("about\nDivide by 10000 to get reflectance\nnm,v\n400,1\n500,1\n", 2, "not applied"),
+        ("lamp\nANGSTROMS\nlambda value\n4000 1\n5000 1\n", 2, "not applied"),
+        ("Data\nXAxis mode: Raman Shifts\n>>>>>Begin Spectral Data<<<<<\n400\t1\n500\t1\n", 2, "Raman Shifts"),
+        ("Y-axis: % Reflectance\n400\t1\n500\t1\n", 1, "% Reflectance"),
+        ("Y-axis: Counts\n400\t1\n500\t1\n", 1, "Counts"),
         ("nm,v,w,x\n400,1\n500,1\n", 1, "4 cells where the numbers below have 2"),
     ] {
         let problem = read(text.as_bytes(), Path::new("t.csv")).unwrap_err();
         assert!(problem.message.contains(words) && problem.line == Some(line), "{text}: {problem}");
     }
+    // What Windows prints of no number, which is no comment.
+    for cell in ["1.#QNAN", "-1.#IND", "1.#INF", "1.#INF00"] {
+        let text = format!("nm,v\n400,{cell}\n500,1\n");
+        let table = read(text.as_bytes(), Path::new("t.csv")).unwrap_or_else(|problem| panic!("{problem}"));
+        let problem = table.number(&table.rows[0], 1).unwrap_err();
+        assert!(problem.message.contains("not a finite number") && problem.line == Some(2), "{cell}: {problem}");
+    }
+    // Lines of OceanView and the like that change nothing are only left out.
+    let plain = "User: x\nXAxis mode: Wavelengths\nNumber of Pixels in Spectrum: 2\n400\t1\n500\t1\n";
+    assert_eq!(read(plain.as_bytes(), Path::new("t.txt")).map(|table| table.rows.len()).ok(), Some(2));
     let table = read(b"nm,v\n400,0,1,0\n700,0,1,0\n", Path::new("t.csv"));
     let problem = table.and_then(|table| table.check_row(&table.rows[0])).unwrap_err();
     assert!(problem.to_string().contains("2") && problem.line.is_some(), "{problem}");

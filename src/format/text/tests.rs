@@ -162,3 +162,44 @@ fn mistakes_name_their_line() {
     }
     assert!(csv("400,1\n500,2", Some("a")).unwrap_err().message.contains("no header"));
 }
+
+#[test]
+fn percent_counts_once() {
+    // A tenth and a fifth, whether the header, the cells or both say percent; in a header of percent a bare number is percent too.
+    for text in ["nm,R (%)\n400,10%\n500,20%", "nm,R (%)\n400,10%\n500,20", "nm,R (%)\n400,10\n500,20"] {
+        let table = csv(text, None).unwrap();
+        assert!(table.unit.as_ref().is_some_and(Stated::is_percent), "{text}");
+        assert_eq!(table.value, [10.0, 20.0], "{text}");
+    }
+    let table = csv("nm,R\n400,10%\n500,20%", None).unwrap();
+    assert_eq!((table.unit, table.value), (None, vec![0.1, 0.2]));
+    // A comment counts where there is one column; of several nobody can tell.
+    let table = csv("# Column 2: reflectance (percent)\nnm,v\n400,10\n500,20", None).unwrap();
+    assert!(
+        table.unit.as_ref().is_some_and(Stated::is_percent) && table.notes[0].contains("line 1"),
+        "{:?}",
+        table.notes
+    );
+    let table = csv("# Reflectance in percent\nnm,v,w\n400,10,1\n500,20,1", Some("v")).unwrap();
+    assert_eq!(table.unit.map(|stated| stated.meaning), Some(Meaning::Factor));
+}
+
+#[test]
+fn wavelengths_of_their_own_are_refused() {
+    for (text, column, words) in [
+        ("Wavelength (nm),v,Wavelength (um),w\n400,1,0.5,1\n500,1,0.6,1", "w", "wavelengths of its own"),
+        ("Wavelength (nm),v,Wavelength (nm),w\n400,1,500,1\n500,1,600,1", "w", "wavelengths of its own"),
+        ("from (nm),to (nm),v\n400,500,1\n500,600,1", "v", "intervals"),
+        ("lower_nm,upper_nm,v\n400,500,1\n500,600,1", "v", "intervals"),
+    ] {
+        let problem = csv(text, Some(column)).unwrap_err();
+        assert!(problem.message.contains(words), "{text}: {problem}");
+    }
+    // The same places in another unit are no others, nor is a second axis beside the first.
+    for text in [
+        "Wavelength (nm),v,Wavelength (um),w\n400,1,0.4,3\n500,1,0.5,4",
+        "Wavelength (um),Wavenumber (cm-1),w\n0.4,25000,3\n0.5,20000.1,4",
+    ] {
+        assert_eq!(csv(text, Some("w")).unwrap().value, [3.0, 4.0], "{text}");
+    }
+}

@@ -2,7 +2,7 @@
 
 use super::{ATMOSPHERE, COUNT, ELECTRONVOLT, FACTORS, KELVIN, LUMEN, METRE, Measure, SECOND, STERADIAN, WATT};
 
-fn words(text: &str) -> impl Iterator<Item = &str> {
+pub(super) fn words(text: &str) -> impl Iterator<Item = &str> {
     text.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty())
 }
 
@@ -27,6 +27,7 @@ pub(super) fn is_logarithm(text: &str) -> bool {
     // Timber has logs too: "log, oak".
     let is_of = |word: &str| is_quantity(word) || ["irr", "int"].iter().any(|start| word.starts_with(start));
     let is_letter = |word: &str| matches!(word, "r" | "t" | "1");
+    let is_of = |word: &str| is_of(word) || ["energy", "sensitivity", "response", "quantal"].contains(&word);
     if matches!(all[..], ["log", next, ..] if is_of(next) || (is_letter(next) && !lower.starts_with("log,"))) {
         return true;
     }
@@ -46,12 +47,20 @@ pub(super) fn is_logarithm(text: &str) -> bool {
     let squeezed = lower.replace(' ', "");
     all.windows(2).any(|pair| pair == ["optical", "density"])
         || (of_number && matches!(bare.trim_end_matches('.'), "abs" | "od"))
-        || matches!(squeezed.as_str(), "k/s" | "f(r)" | "f(r\u{221e})")
+        || matches!(squeezed.as_str(), "k/s" | "k-m" | "density" | "f(r)" | "f(r\u{221e})")
 }
 
 /// Whether the words of a name make it a share in percent: the first or the last is that word. `None` where a number stands
 /// before it, which may be that of a mixture.
 pub(super) fn is_percent(text: &str) -> Option<bool> {
+    // PercentReflectance, ReflectancePercent.
+    let mut text = text.to_owned();
+    let is_capital = |after: &str| after.starts_with(|c: char| c.is_uppercase());
+    if text.strip_prefix("Percent").is_some_and(is_capital) {
+        text.insert("Percent".len(), ' ');
+    } else if text.strip_suffix("Percent").is_some_and(|before| before.ends_with(char::is_lowercase)) {
+        text.insert(text.len() - "Percent".len(), ' ');
+    }
     let lower = text.to_lowercase().replace("per cent", "percent").replace('_', " ");
     let is = |word: &str| ["percent", "pct", "perc", "%"].contains(&word.trim_end_matches('.'));
     let all: Vec<&str> = lower.split_whitespace().collect();
@@ -146,6 +155,54 @@ pub(super) fn has_factor(text: &str) -> bool {
     })
 }
 
+/// Whether a name begins with a factor of its values: `100*R`, `10^4 rho`, `1e4 R`.
+pub(super) fn begins_with_factor(text: &str) -> bool {
+    let end = text
+        .find(|c: char| !(c.is_ascii_digit() || matches!(c, '.' | 'e' | 'E' | '^' | '-' | '+')))
+        .unwrap_or(text.len());
+    let (number, rest) = text.split_at(end);
+    let after = rest.trim_start();
+    let is_written = number.contains(['e', 'E', '^']) || after.starts_with('*') || rest.starts_with(" x ");
+    let factor = number.replace("10^", "1e").parse::<f64>();
+    is_written
+        && factor.is_ok_and(|factor| factor != 1.0)
+        && after.trim_start_matches(['*', 'x', ' ']).starts_with(char::is_alphabetic)
+}
+
+/// Whether this is 1 over a power of ten above one: 1/10000.
+pub(super) fn is_power_of_ten(text: &str) -> bool {
+    let under = text.split_once('/').filter(|(over, _)| over.trim() == "1").map(|(_, under)| under.trim());
+    under
+        .is_some_and(|under| under.len() > 1 && under.starts_with('1') && under[1..].bytes().all(|digit| digit == b'0'))
+}
+
+/// Whether a sentence says that values are in percent: a quantity `in percent` or with it in brackets, or a key for units.
+pub(super) fn speaks_of_percent(text: &str) -> bool {
+    let lower = text.trim_start_matches(['#', '%', '!', '/', ' ']).to_lowercase().replace("per cent", "percent");
+    let is = |word: &str| ["percent", "pct", "%"].contains(&word.trim_matches(['.', ',', ';', '(', ')', '[', ']']));
+    if let Some((key, value)) = lower.split_once([':', '='])
+        && words(key).any(|word| word.starts_with("unit"))
+        && !words(key).any(|word| word.starts_with('x') || word.starts_with("wave"))
+    {
+        return is(value.trim());
+    }
+    let all: Vec<&str> = lower.split_whitespace().collect();
+    let is_of = |word: &str| {
+        let word = word.trim_start_matches('(').trim_end_matches([',', ':', ')']);
+        is_quantity(word) || matches!(word, "r" | "t" | "values" | "data" | "y")
+    };
+    all.iter().enumerate().any(|(i, word)| {
+        if !is(word) || i == 0 {
+            return false;
+        }
+        let in_brackets = word.starts_with(['(', '[']);
+        match all[i - 1] {
+            "in" | "as" | "=" | ":" | "are" => i > 1 && is_of(all[i - 2]),
+            before => in_brackets && is_of(before) || before.ends_with([',', ':']) && is_of(before),
+        }
+    })
+}
+
 /// Whether a sentence states a factor, or an offset, other than none.
 pub(super) fn states_a_factor(text: &str) -> bool {
     /// What may stand between the word and its number.
@@ -188,6 +245,15 @@ pub(super) fn states_a_factor(text: &str) -> bool {
 /// One form for the many ways to write the same characters: superscripts, minus signs, dots, µ and Å, LaTeX.
 pub(super) fn plain(text: &str) -> String {
     let mut text = text.trim().to_owned();
+    // Of old a millimicron, which is no micrometre.
+    for spelt in ["m\u{b5}", "m\u{3bc}"] {
+        if let Some(at) = text.find(spelt)
+            && !text[..at].ends_with(char::is_alphanumeric)
+            && !text[at + spelt.len()..].starts_with(char::is_alphanumeric)
+        {
+            text.replace_range(at..at + spelt.len(), "nm");
+        }
+    }
     for (command, meant) in [
         ("\\mathrm", ""),
         ("\\mathsf", ""),
@@ -452,6 +518,9 @@ fn product(tokens: &[Token], at: &mut usize, depth: usize) -> Option<Measure> {
             power = *written;
             *at += 1;
         }
+        // The wavelength that a unit is over stands below the line.
+        factor.is_odd |=
+            factor.lengths == [1, 0] && factor.factor < 1e-3 && power > 0 && matches!(token, Token::Name(_));
         if power != 1 {
             factor = Measure::ONE.times(factor, power)?;
         }
@@ -547,9 +616,8 @@ fn spelt_out(lower: &str) -> Option<Measure> {
         | "dn" | "count" => Measure::of(COUNT, 1.0),
         "steradian" | "steradians" | "ster" | "str" => Measure::of(STERADIAN, 1.0),
         "sr" => Measure::of(STERADIAN, 1.0),
-        "angstrom" | "angstroms" | "\u{e5}ngstr\u{f6}m" | "\u{e5}ngstrom" | "angstr\u{f6}m" | "ang" | "\u{e5}" => {
-            Measure::of(METRE, 1e-10)
-        }
+        "angstrom" | "angstroms" | "angstroem" | "angstroems" | "\u{e5}ngstr\u{f6}m" | "\u{e5}ngstrom"
+        | "angstr\u{f6}m" | "ang" | "\u{e5}" => Measure::of(METRE, 1e-10),
         "nm" => Measure::of(METRE, 1e-9),
         "um" | "micron" | "microns" | "mic" | "mu" | "mum" => Measure::of(METRE, 1e-6),
         "hz" => base("Hz")?,
@@ -571,7 +639,7 @@ fn base(name: &str) -> Option<Measure> {
         "W" => Measure::of(WATT, 1.0),
         "s" => Measure::of(SECOND, 1.0),
         "sr" => Measure::of(STERADIAN, 1.0),
-        "Hz" => Measure { powers: Measure::ONE.times(Measure::of(SECOND, 1.0), -1)?.powers, factor: 1.0 },
+        "Hz" => Measure::ONE.times(Measure::of(SECOND, 1.0), -1)?,
         "eV" => Measure::of(ELECTRONVOLT, 1.0),
         "J" => Measure::of(WATT, 1.0).times(Measure::of(SECOND, 1.0), 1)?,
         "K" => Measure::of(KELVIN, 1.0),

@@ -72,9 +72,12 @@ fn axes_in_every_spelling() {
                 "wl (\u{212b})",
                 "Angstroms",
                 "\\AA",
+                "Wavelength_Angstroem",
             ],
             Unit::Wavelength(0.1),
         ),
+        // A millimicron of old, which is no micrometre.
+        (&["wavelength (m\u{b5})", "\u{3bb} [m\u{3bc}]", "m\u{b5}"], Unit::NANOMETRE),
         (&["Frequency (GHz)", "GHz", "f [GHZ]"], Unit::Frequency(1e9)),
         (&["THz", "freq_THz", "nu (THz)"], Unit::Frequency(1e12)),
         (&["eV", "E (eV)", "Photon energy (eV)", "energy/eV"], Unit::Energy(1.0)),
@@ -101,6 +104,10 @@ fn axes_in_every_spelling() {
         "x (W)",
         "energy (J)",
         "angle (deg)",
+        "wavelength (x10 nm)",
+        "WL (tenths of nm)",
+        "wavenumber (kcm-1)",
+        "wavenumber x 100 (cm-1)",
     ] {
         assert!(Unit::from_header(header).is_err() || header == "K", "{header}: {:?}", Unit::from_header(header));
     }
@@ -150,6 +157,32 @@ fn units_of_values() {
         let got = per_nm(text).unwrap_or_else(|| panic!("{text} is not understood"));
         assert!((got - expected).abs() < 1e-12 * expected, "{text}: {got}, expected {expected}");
     }
+    // A unit over a spectral axis names it: one of the same dimension over another axis is another quantity.
+    for (text, kinds) in [
+        ("W m-2 sr-1 nm-1", &[Kind::Radiance][..]),
+        ("W/m3/sr", &[Kind::Radiance]),
+        ("W/m2/sr/cm-1", &[Kind::Radiance]),
+        ("W m-2 sr-1 cm", &[Kind::Radiance]),
+        ("W m-2 sr-1 Hz-1", &[Kind::Radiance]),
+        ("W/sr/nm", &[Kind::Intensity]),
+        ("mW sr-1 um-1", &[Kind::Intensity]),
+        ("W/sr/cm-1", &[Kind::Intensity]),
+        ("W/(sr Hz)", &[Kind::Intensity]),
+        ("W m-2 nm-1", &[Kind::Irradiance]),
+        ("erg/s/cm2/A", &[Kind::Irradiance]),
+        ("W/m2/(cm-1)", &[Kind::Irradiance]),
+        ("Jy", &[Kind::Irradiance]),
+        ("W/nm", &[]),
+        ("mW nm-1", &[]),
+        ("W/m2*nm", &[]),
+        ("W/cm-1", &[]),
+        ("W", &[]),
+    ] {
+        let measure = parse(text).unwrap_or_else(|| panic!("{text} is not understood"));
+        let is_of = |kind: &Kind| measure.to(*kind).is_some();
+        let found: Vec<Kind> = [Kind::Radiance, Kind::Irradiance, Kind::Intensity].into_iter().filter(is_of).collect();
+        assert_eq!(found, kinds, "{text}");
+    }
     for text in ["W m-2 sr-1", "W m-2", "K", "photons s-1 m-2 sr-1 nm-1", "Reflectance", "DN", "", "W/m2/sr/foo", "lm"]
     {
         assert_eq!(per_nm(text), None, "{text}");
@@ -190,6 +223,8 @@ fn units_in_names_of_columns() {
         ("Percent Reflectance", Kind::Number, 0.01),
         ("reflectance_percent", Kind::Number, 0.01),
         ("R pct.", Kind::Number, 0.01),
+        ("PercentReflectance", Kind::Number, 0.01),
+        ("ReflectancePercent", Kind::Number, 0.01),
         ("reflectance (per mille)", Kind::Number, 1e-3),
         ("radiance (flick)", Kind::Radiance, 10.0),
         ("300 (kPa-1 m-1)", Kind::Absorption, 101.325),
@@ -228,6 +263,9 @@ fn units_in_names_of_columns() {
         "Abs. coefficient",
         "absolute",
         "OD 2 filter",
+        "2x zoom",
+        "300 K",
+        "4x4 panel",
         "period",
         "k",
         "reflectance of bog oak",
@@ -269,10 +307,20 @@ fn units_in_names_of_columns() {
         ("radiance (W/m2/sr/furlong)", Meaning::Unknown),
         ("radiance (a.u.)", Meaning::Unknown),
         ("L_mW_m2_sr_nm", Meaning::Unknown),
-        ("reflectance x 10000", Meaning::Unknown),
-        ("R (x1e4)", Meaning::Unknown),
-        ("R*100", Meaning::Unknown),
-        ("R (1e-4)", Meaning::Unknown),
+        ("reflectance x 10000", Meaning::Factor),
+        ("R (x1e4)", Meaning::Factor),
+        ("R*100", Meaning::Factor),
+        ("R (1e-4)", Meaning::Factor),
+        ("reflectance [1/10000]", Meaning::Factor),
+        ("reflectance (scaled by 10000)", Meaning::Factor),
+        ("radiance (W/m2/sr/um) x 10", Meaning::Factor),
+        ("100*R", Meaning::Factor),
+        ("10^4 rho", Meaning::Factor),
+        ("1e4 R", Meaning::Factor),
+        ("10000 x reflectance", Meaning::Factor),
+        ("K-M", Meaning::Logarithm),
+        ("density", Meaning::Logarithm),
+        ("log energy L", Meaning::Logarithm),
     ] {
         assert_eq!(Stated::in_name(name).map(|stated| stated.meaning), Some(meaning), "{name}");
     }
@@ -295,6 +343,41 @@ fn units_in_sentences() {
             other => panic!("{other:?}"),
         });
         assert_eq!(found, irradiance.map(|factor| Some(Density::Plain(factor))), "{text}");
+    }
+}
+
+#[test]
+fn percent_in_sentences_and_axes_by_their_names() {
+    for text in [
+        "# Column 2: reflectance (percent)",
+        "# Reflectance in percent",
+        "# reflectance, in %",
+        "# unit = %",
+        "Units: percent",
+        "# values are percent",
+        "# transmittance [%]",
+        "# reflectance: %",
+    ] {
+        assert!(speaks_of_percent(text), "{text}");
+    }
+    for text in [
+        "# reflectance of a 5 percent mixture",
+        "# reflectance is 5 percent lower in summer",
+        "# uncertainty of reflectance 1 %",
+        "# 50 % humidity",
+        "# X units: percent",
+        "# humidity in percent",
+        "% reflectance of oak",
+    ] {
+        assert!(!speaks_of_percent(text), "{text}");
+    }
+    for name in
+        ["Wavelength", "wavelength (um)", "Wavenumber (cm-1)", "wl_nm", "nm", "b nm", "\u{3bb} [nm]", "Frequency"]
+    {
+        assert!(is_axis(name), "{name}");
+    }
+    for name in ["B1", "radiance (W/m2/sr/nm)", "Response", "uncertainty", "band 550", "R (%)", ""] {
+        assert!(!is_axis(name), "{name}");
     }
 }
 
@@ -363,6 +446,7 @@ fn sentences_about_factors_and_air() {
         ("# wavelengths in air", true),
         ("# Wavelength (air), radiance", true),
         ("# air wavelengths, nm", true),
+        ("# wavelengths in standard air", true),
         ("# wavelengths in vacuum, converted from those in air", false),
         ("# dried in air", false),
         ("# wavelengths of air-dried soil, in air-tight boxes", false),

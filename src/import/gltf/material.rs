@@ -146,6 +146,12 @@ impl Importer<'_, '_> {
     fn made(&mut self, material: &Material, name: &str, path: &str) -> Result<Look> {
         let pbr = &material.pbr_metallic_roughness;
         let unit = |v: f32| f64::from(v).clamp(0.0, 1.0);
+        let transmission = material.extensions.as_ref().and_then(|e| e.transmission.as_ref());
+        let factors = pbr.base_color_factor.0.into_iter().chain([pbr.metallic_factor.0, pbr.roughness_factor.0]);
+        let mut factors = factors.chain(transmission.map(|t| t.transmission_factor.0));
+        if factors.any(|factor| !(0.0..=1.0).contains(&factor)) {
+            self.scene.report.approximated(self.place(path), "factors outside of 0 to 1, which are clipped to that");
+        }
         let [r, g, b, alpha] = pbr.base_color_factor.0.map(unit);
         let base_path = format!("{path}.pbrMetallicRoughness.baseColorTexture");
         let base = pbr.base_color_texture.as_ref().map(|info| self.found(info, &base_path)).transpose()?.flatten();

@@ -181,11 +181,13 @@ impl<'n> Importer<'n, '_> {
                 Ok(self.put(name, "diffuse", section.with("reflectance", reflectance), &around, true))
             }
             "difftrans" => {
-                let both =
-                    ["reflectance", "transmittance"].map(|name| self.colour(plugin, name, Of::Reflectance, flip));
+                let mut colour = |name: &str| -> Result<Colour> {
+                    Ok(self.colour(plugin, name, Of::Reflectance, flip)?.unwrap_or(Colour::grey(0.5)))
+                };
+                let both = [colour("reflectance")?, colour("transmittance")?];
+                let both = surfaces::within_one(both, &mut self.scene.report, plugin.place());
                 let mut section = section;
                 for (key, colour) in ["reflectance", "transmittance"].into_iter().zip(both) {
-                    let colour = colour?.unwrap_or(Colour::grey(0.5));
                     around.is_textured |= colour.is_texture();
                     section.set(key, colour.toml(self.scene, &format!("{name}-{key}"))?);
                 }

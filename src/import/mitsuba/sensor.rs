@@ -78,7 +78,11 @@ impl<'n> Importer<'n, '_> {
     fn field_of_view(&mut self, plugin: &Plugin<'n>, camera: &mut Section, aspect: f64) -> Result<()> {
         let mut axis = plugin.string("fov_axis")?.unwrap_or("x").trim();
         let fov = match (plugin.float("fov")?, plugin.string("focal_length")?) {
-            (Some(fov), _) => fov,
+            (Some(_), Some(_)) => {
+                let message = "has both `fov` and `focal_length`, of which a camera has one: remove the other";
+                return Err(plugin.node.problem(message).into());
+            }
+            (Some(fov), None) => fov,
             (None, Some(length)) => {
                 let millimetres = length.trim().trim_end_matches("mm").trim().parse::<f64>().ok().filter(|f| *f > 0.0);
                 let millimetres =

@@ -93,7 +93,10 @@ impl<'n> Importer<'n, '_> {
             (Made::Material { name, is_textured }, _) => (name, is_textured || lit),
             (Made::Nothing, true) => (self.black(), lit),
             (Made::Nothing, false) => {
-                self.scene.report.left_out(plugin.place(), "a shape of which nothing is seen (BSDF `null`)");
+                let filled = plugin.get("interior").or(plugin.get("exterior")).is_some();
+                let what = if filled { ", and the medium that it bounds" } else { "" };
+                let what = format!("a shape of which nothing is seen (BSDF `null`){what}");
+                self.scene.report.left_out(plugin.place(), what);
                 plugin.finish(&mut self.scene.report);
                 return Ok(());
             }

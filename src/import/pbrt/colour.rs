@@ -34,7 +34,16 @@ impl Importer<'_> {
                 Some(colour) => colour.clone(),
                 None => return Err(at.problem(format!("no texture is named \"{}\"", shown(name))).into()),
             },
-            ("rgb", &[r, g, b], _) => self.rgb([r, g, b], of),
+            ("rgb", &[r, g, b], _) => {
+                if [r, g, b].iter().any(|v| *v < 0.0) {
+                    let what = format!("`{}` with negative values, which are 0", shown(&parameter.name));
+                    self.scene.report.approximated(at.place(), what);
+                }
+                if of == Of::Albedo && [r, g, b].iter().any(|v| *v > 1.0) {
+                    self.scene.report.approximated(at.place(), "a reflectance above 1, which is 1");
+                }
+                self.rgb([r, g, b], of)
+            }
             ("float" | "spectrum", &[value], _) => Colour::grey(value),
             ("blackbody", &[kelvin, ..], _) if kelvin > 0.0 => {
                 let shape = Curve::Blackbody { kelvin, scale: 1.0 };

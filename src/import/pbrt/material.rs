@@ -6,7 +6,7 @@ use super::{Importer, Look};
 use crate::Result;
 use crate::import::picture::Colour;
 use crate::import::scene::Section;
-use crate::import::text;
+use crate::import::{surfaces, text};
 use crate::spectral::Curve;
 
 impl Importer<'_> {
@@ -30,9 +30,13 @@ impl Importer<'_> {
             "diffusetransmission" => {
                 let scale = parameters.number("scale")?.unwrap_or(1.0);
                 let (mut section, mut textured) = (Section::default(), false);
-                for key in ["reflectance", "transmittance"] {
+                let mut colour = |key: &str| -> Result<Colour> {
                     let colour = self.colour(parameters, key, Of::Albedo)?.unwrap_or(Colour::grey(0.25));
-                    let colour = if scale == 1.0 { colour } else { colour.map(|v| v * scale) };
+                    Ok(if scale == 1.0 { colour } else { colour.map(|v| v * scale) })
+                };
+                let both = [colour("reflectance")?, colour("transmittance")?];
+                let both = surfaces::within_one(both, &mut self.scene.report, at.place());
+                for (key, colour) in ["reflectance", "transmittance"].into_iter().zip(both) {
                     textured |= colour.is_texture();
                     section.set(key, colour.toml(self.scene, &format!("{name}-{key}"))?);
                 }

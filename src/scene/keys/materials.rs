@@ -67,7 +67,7 @@ const EMISSIVITY: Key = Key::required(
 .unless("`reflectance`");
 const TRANSMITTANCE: Key = Key::optional(
     "transmittance",
-    Spectrum(Quantity::Reflectance),
+    Spectrum(Quantity::Transmittance),
     "nothing passes",
     "The share of light that passes through and is scattered on the other side, the same in all directions: leaves, paper, cloth. \
      Both sides are alike, and with `reflectance` it is 1 at most at every wavelength; the rest is absorbed.",

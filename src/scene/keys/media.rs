@@ -191,7 +191,8 @@ pub static SPECIES: Section = Section {
             "table",
             File,
             "CSV of the absorption coefficient in m⁻¹ atm⁻¹: a column of wavelengths, and one for each temperature, \
-             whose header is that in K: `nm,300,600,1000`; or of cross sections (`300 K (cm2/molecule)`), which become that. Between columns it is linear in temperature; beyond them \
+             whose header is that in K: `nm,300,600,1000`; or of cross sections (`300 K (cm2/molecule)`), times \
+             the molecules in a volume, p / (k T), T the gas's own (without one the column's). Between columns it is linear in temperature; beyond them \
              the nearest holds, with a warning. One column holds at all temperatures.",
         ),
         Key::required("fraction", Number, "Share of the volume (mole fraction). Those of a medium sum to 1 at most.")

@@ -2,7 +2,7 @@
 
 use super::Kind::{Boolean, Choice, File, ListOfTables, Number, Spectrum, Table, Text, Whole};
 use super::{Key, Section};
-use crate::scene::Quantity::Reflectance;
+use crate::scene::Quantity::{Absorptance, Efficiency, Transmittance};
 
 const fn section(path: &'static str, keys: &'static [Key], later: &'static [&'static str]) -> Section {
     Section { path, heading: path, summary: "", about: "", keys, later, at: "", examples: &[], notes: "" }
@@ -27,7 +27,7 @@ pub static OPTICS: Section = section(
         Key::optional("f_number", Number, "focal_length / aperture", "Focal length over aperture.").range("[0.5, inf)"),
         Key::optional("aperture", Number, "from `f_number`", "Diameter of the entrance pupil.").unit("m"),
         Key::optional("focal_length", Number, "not needed beside `f_number`", "Focal length.").unit("m"),
-        Key::default("transmittance", Spectrum(Reflectance), "1.0", "What the optics let through."),
+        Key::default("transmittance", Spectrum(Transmittance), "1.0", "What the optics let through."),
         Key::default("cos4", Boolean, "false", "Whether irradiance falls as cos⁴ of the angle to the axis."),
         Key::optional("temperature", Number, "they emit nothing", "Of the optics, which emit what they absorb.")
             .unit("K"),
@@ -48,14 +48,14 @@ pub static DETECTOR: Section = section(
         Key::default("dsnu", Number, "0.0", "Standard deviation of the dark signal over pixels: electrons, or counts."),
         Key::default("pattern_seed", Whole, "0", "Of both patterns, the same in every exposure."),
         Key::optional("integration_time", Number, "photon detectors need it", "Exposure.").unit("s"),
-        Key::optional("quantum_efficiency", Spectrum(Reflectance), "photon detectors need it", "Electrons a photon."),
+        Key::optional("quantum_efficiency", Spectrum(Efficiency), "photon detectors need it", "Electrons a photon."),
         Key::default("dark_current", Number, "0.0", "At the temperature of operation.").unit("electrons/s"),
         Key::optional("full_well", Number, "no limit", "Electrons that a pixel holds."),
         Key::default("read_noise", Number, "0.0", "Standard deviation.").unit("electrons"),
         Key::optional("gain", Number, "photon detectors need it", "Electrons a count."),
         Key::optional("responsivity", Number, "thermal detectors need it", "Counts a watt on the sensitive area."),
         Key::optional("noise_equivalent_power", Number, "thermal detectors need it", "Standard deviation.").unit("W"),
-        Key::default("absorptance", Spectrum(Reflectance), "1.0", "Of thermal detectors."),
+        Key::default("absorptance", Spectrum(Absorptance), "1.0", "Of thermal detectors."),
     ],
     &[],
 );

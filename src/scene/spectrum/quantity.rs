@@ -1,6 +1,7 @@
 //! What a spectrum is of.
 
 use crate::format::noise::Range;
+use crate::format::said::Said;
 use crate::format::unit::Kind;
 use crate::spectral::Outside;
 
@@ -16,6 +17,12 @@ const MOST_ABSORBING: f64 = 1e15;
 pub enum Quantity {
     /// Dimensionless, in [0, 1]; held beyond its table, with a warning.
     Reflectance,
+    /// What passes through; as [`Quantity::Reflectance`].
+    Transmittance,
+    /// What a detector absorbs; as [`Quantity::Reflectance`].
+    Absorptance,
+    /// Electrons a photon; as [`Quantity::Reflectance`].
+    Efficiency,
     /// What a surface emits of what a black body does: as [`Quantity::Reflectance`], of which it is the complement.
     Emissivity,
     /// W m⁻² sr⁻¹ nm⁻¹, not negative; zero beyond its table.
@@ -40,8 +47,11 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    pub const ALL: [Quantity; 11] = [
+    pub const ALL: [Quantity; 14] = [
         Quantity::Reflectance,
+        Quantity::Transmittance,
+        Quantity::Absorptance,
+        Quantity::Efficiency,
         Quantity::Emissivity,
         Quantity::Radiance,
         Quantity::Intensity,
@@ -55,13 +65,41 @@ impl Quantity {
     ];
 
     /// Whether it is light itself rather than what becomes of light.
-    pub(super) fn is_light(self) -> bool {
+    pub fn is_light(self) -> bool {
         matches!(self, Quantity::Radiance | Quantity::Intensity | Quantity::Irradiance)
     }
 
     /// Whether it is an emissivity, an index of refraction or something of matter, which no temperature and no colour makes.
     pub fn is_index(self) -> bool {
-        self != Quantity::Reflectance && !self.is_light()
+        !self.is_made_of_light() && !self.is_light()
+    }
+
+    /// Whether it is a share of light that is not that of an emissivity.
+    fn is_made_of_light(self) -> bool {
+        matches!(self, Quantity::Reflectance | Quantity::Transmittance | Quantity::Absorptance | Quantity::Efficiency)
+    }
+
+    /// Whether values that their file calls `said` can be of it.
+    pub(super) fn may_be(self, said: Said) -> bool {
+        match self {
+            Quantity::Reflectance => said == Said::Reflectance,
+            Quantity::Transmittance => said == Said::Transmittance,
+            Quantity::Absorptance => matches!(said, Said::Absorptance | Said::Absorption | Said::Emissivity),
+            Quantity::Emissivity => matches!(said, Said::Emissivity | Said::Absorptance),
+            // Files of filters and of windows before a detector are taken for what it counts.
+            Quantity::Efficiency => matches!(said, Said::Transmittance | Said::Absorptance | Said::Absorption),
+            Quantity::Radiance => said == Said::Radiance,
+            Quantity::Irradiance => said == Said::Irradiance,
+            Quantity::Intensity => false,
+            Quantity::Absorption => said == Said::Absorption,
+            Quantity::Scattering => said == Said::Scattering,
+            Quantity::Index | Quantity::CoatIndex | Quantity::Extinction | Quantity::Asymmetry => false,
+        }
+    }
+
+    /// Whether it is a share.
+    fn is_share(self) -> bool {
+        self.is_made_of_light() || self == Quantity::Emissivity
     }
 
     /// Whether it is n or k.
@@ -81,6 +119,9 @@ impl Quantity {
             Quantity::Irradiance => "W m⁻² nm⁻¹",
             Quantity::Absorption | Quantity::Scattering => "m⁻¹",
             Quantity::Reflectance
+            | Quantity::Transmittance
+            | Quantity::Absorptance
+            | Quantity::Efficiency
             | Quantity::Emissivity
             | Quantity::Index
             | Quantity::CoatIndex
@@ -101,6 +142,9 @@ impl Quantity {
     pub fn noun(self) -> &'static str {
         match self {
             Quantity::Reflectance => "a reflectance",
+            Quantity::Transmittance => "a transmittance",
+            Quantity::Absorptance => "an absorptance",
+            Quantity::Efficiency => "a quantum efficiency",
             Quantity::Emissivity => "an emissivity",
             Quantity::Radiance => "a radiance",
             Quantity::Intensity => "an intensity",
@@ -116,20 +160,20 @@ impl Quantity {
 
     pub fn allows(self, value: f64) -> bool {
         match self {
-            Quantity::Reflectance | Quantity::Emissivity => (0.0..=1.0).contains(&value),
+            _ if self.is_share() => (0.0..=1.0).contains(&value),
             Quantity::Radiance | Quantity::Intensity | Quantity::Irradiance => (0.0..=BRIGHTEST).contains(&value),
             Quantity::Index => value > 0.0 && value <= DENSEST,
             Quantity::CoatIndex => (1.0..=DENSEST).contains(&value),
             Quantity::Extinction => (0.0..=DENSEST).contains(&value),
             Quantity::Absorption | Quantity::Scattering => (0.0..=MOST_ABSORBING).contains(&value),
-            Quantity::Asymmetry => value > -1.0 && value < 1.0,
+            _ => value > -1.0 && value < 1.0,
         }
     }
 
     /// What measured values of it may be but for noise; `None` where there is no bound that noise could cross.
     pub(super) fn noise(self) -> Option<Range> {
         match self {
-            Quantity::Reflectance | Quantity::Emissivity => Some(Range::Share),
+            _ if self.is_share() => Some(Range::Share),
             Quantity::Extinction => Some(Range::Extinction),
             Quantity::Index | Quantity::CoatIndex | Quantity::Asymmetry => None,
             _ => Some(Range::NotNegative),
@@ -150,13 +194,13 @@ impl Quantity {
     /// The values that are allowed.
     pub fn interval(self) -> &'static str {
         match self {
-            Quantity::Reflectance | Quantity::Emissivity => "[0, 1]",
+            _ if self.is_share() => "[0, 1]",
             Quantity::Radiance | Quantity::Intensity | Quantity::Irradiance => "[0, 1e35]",
             Quantity::Index => "(0, 1000]",
             Quantity::CoatIndex => "[1, 1000]",
             Quantity::Extinction => "[0, 1000]",
             Quantity::Absorption | Quantity::Scattering => "[0, 1e15]",
-            Quantity::Asymmetry => "(-1, 1)",
+            _ => "(-1, 1)",
         }
     }
 

@@ -8,6 +8,7 @@ use super::super::texture::is_texture;
 use super::super::tree::{Origin, Value};
 use crate::error::Problem;
 use crate::format::refractive;
+use crate::format::said::Said;
 use crate::format::text::{self, Column, SpectrumTable};
 use crate::format::unit::{Stated, Unit};
 use crate::spectral::Outside;
@@ -17,6 +18,8 @@ use crate::spectral::Outside;
 pub(super) struct Source<'a> {
     pub(super) data: Data,
     pub(super) scale: f64,
+    /// Whether the scene says so, and be it 1.
+    pub(super) is_scaled: bool,
     pub(super) outside: Option<Outside>,
     /// The key and place of what `data` was made from.
     pub(super) path: String,
@@ -43,6 +46,7 @@ pub(super) struct TableFile {
     /// The line of each value; empty where the file has no lines.
     pub(super) lines: Vec<usize>,
     pub(super) unit: Option<Stated>,
+    pub(super) said: Option<(Said, String)>,
     pub(super) notes: Vec<String>,
 }
 
@@ -57,7 +61,14 @@ pub(super) fn source<'a>(item: &Item<'a>, needed: Option<[f64; 2]>) -> Option<So
             return None;
         }
         let data = Data::Constant(item.number()?);
-        return Some(Source { data, scale: 1.0, outside: None, path: item.path.clone(), at: item.at });
+        return Some(Source {
+            data,
+            scale: 1.0,
+            is_scaled: false,
+            outside: None,
+            path: item.path.clone(),
+            at: item.at,
+        });
     };
     if is_texture(item) {
         item.error_help(
@@ -94,7 +105,8 @@ pub(super) fn source<'a>(item: &Item<'a>, needed: Option<[f64; 2]>) -> Option<So
     if outside.is_some() && matches!(data, Data::Constant(_) | Data::Blackbody(_)) {
         item.cx.warn(format!("`{}.outside` has no effect: the spectrum is not a table", item.path));
     }
-    Some(Source { data, scale: scale?, outside, path: kind.path, at: kind.at })
+    let is_scaled = fields.has("scale");
+    Some(Source { data, scale: scale?, is_scaled, outside, path: kind.path, at: kind.at })
 }
 
 pub(super) fn file(item: &Item, column: Option<Item>, unit: Option<Item>, needed: Option<[f64; 2]>) -> Option<Data> {
@@ -172,8 +184,8 @@ pub(super) fn column_kelvin(name: &str) -> Option<f64> {
 }
 
 pub(super) fn table_data(table: SpectrumTable, path: PathBuf) -> Data {
-    let SpectrumTable { nm, value, line, unit, notes } = table;
-    Data::Table { nm, value, file: Some(TableFile { path, lines: line, unit, notes }) }
+    let SpectrumTable { nm, value, line, unit, said, notes } = table;
+    Data::Table { nm, value, file: Some(TableFile { path, lines: line, unit, said, notes }) }
 }
 
 /// A mistake in a file that `item` names: at its line there, or, if the file as a whole is wrong, at the item.
