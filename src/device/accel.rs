@@ -16,7 +16,7 @@ use obvhs::{Boundable, BvhBuildParams};
 use crate::device::words::{
     HAS_COORDINATES, HAS_NORMALS, KIND_CYLINDER, KIND_DISK, KIND_INSTANCE, KIND_SPHERE, NONE, Primitive,
 };
-use crate::scene::{Attributes, Object, Scene, Shape};
+use crate::scene::{Attributes, Object, Scene, Shape, box_around};
 
 /// The largest number of materials: ids have 24 bits beside the primitive's kind, and one stands for none.
 pub const MAX_MATERIALS: usize = (1 << 24) - 1;
@@ -323,7 +323,7 @@ fn stub(to_device: DAffine3, bounds: Aabb, assembly: usize, object: usize) -> St
     let m = to_device.matrix3.as_mat3();
     let at = to_device.translation.as_vec3();
     let (low, high) = (DVec3::from(bounds.min.as_dvec3()), DVec3::from(bounds.max.as_dvec3()));
-    let [low, high] = crate::scene::box_around(&to_device, [low, high]).map(|p| p.as_vec3a());
+    let [low, high] = box_around(&to_device, [low, high]).map(|p| p.as_vec3a());
     // Rays are moved into it in f32.
     let reach =
         low.abs().max(high.abs()).max_element() + (m.x_axis.abs() + m.y_axis.abs() + m.z_axis.abs()).max_element();
@@ -336,13 +336,6 @@ fn stub(to_device: DAffine3, bounds: Aabb, assembly: usize, object: usize) -> St
 
 /// Of what a ray goes through when it is moved in f32, relative to the largest number on the way: eight roundings.
 const PLACING_ERROR: f32 = 4.8e-7;
-
-/// The corners of a box around `shapes`; `None` without any.
-pub fn bounds<'a>(shapes: impl Iterator<Item = &'a Shape>) -> Option<[DVec3; 2]> {
-    let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
-    let [min, max] = shapes.map(Shape::bounds).fold(none, |[min, max], [low, high]| [min.min(low), max.max(high)]);
-    (min.x <= max.x).then_some([min, max])
-}
 
 fn device_space(scene: &Scene) -> DeviceSpace {
     let alone = DeviceSpace { center: scene.camera.position, scale: 1.0, radius: 1.0 };

@@ -46,7 +46,7 @@ pub fn decode<'a>(
         parts.iter().for_each(|part| objects.add_to(decoded.len(), part));
         let own = objects.since(first);
         let is_round = own.iter().any(|object| !matches!(object.shape, Shape::Mesh(_)));
-        let bounds = join(own.iter().map(|object| object.shape.bounds()));
+        let bounds = box_around_all(own.iter().map(|object| object.shape.bounds()));
         for ((placed, item), bounds) in of_name().zip(std::iter::repeat(bounds)) {
             let all = placed.iter().flat_map(|(_, all)| all).zip(std::iter::repeat(bounds));
             for (one, bounds) in all.filter_map(|(one, bounds)| Some((one, bounds?))) {
@@ -273,17 +273,17 @@ impl Scene {
             let Some(own) = self.bounds_of(id) else { continue };
             boxes.extend(assembly.instances.iter().map(|to_world| transform::box_around(to_world, own)));
         }
-        join(boxes)
+        box_around_all(boxes)
     }
 
     /// A box around an assembly, in its own space.
     pub fn bounds_of(&self, assembly: AssemblyId) -> Option<[DVec3; 2]> {
-        join(self.objects.iter().filter(|o| o.assembly == Some(assembly)).map(|object| object.shape.bounds()))
+        box_around_all(self.objects.iter().filter(|o| o.assembly == Some(assembly)).map(|object| object.shape.bounds()))
     }
 }
 
 /// The corners of a box around others; `None` without any.
-fn join(boxes: impl IntoIterator<Item = [DVec3; 2]>) -> Option<[DVec3; 2]> {
+pub fn box_around_all(boxes: impl IntoIterator<Item = [DVec3; 2]>) -> Option<[DVec3; 2]> {
     let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
     let [min, max] = boxes.into_iter().fold(none, |[min, max], [low, high]| [min.min(low), max.max(high)]);
     (min.x <= max.x).then_some([min, max])

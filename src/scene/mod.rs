@@ -40,6 +40,7 @@ use std::sync::Arc;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
+pub use assembly::box_around_all;
 pub use decode::join as dotted_key;
 pub use draft::Draft;
 pub use file::{load, parse, read};

@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DVec3};
 
-use crate::device::accel::{Accel, bounds};
+use crate::device::accel::Accel;
 use crate::device::part::{Part, Place, Records, SceneBuffer};
 use crate::device::parts::crossings::{meet, place_on};
 use crate::device::parts::origins::{Cut, Origins};
@@ -11,7 +11,9 @@ use crate::device::text::{Module, module};
 use crate::device::words::{
     NONE, NULL_BOUNDARY, Primitive, VOLUME_EMITS, VOLUME_GRID, VOLUME_SCATTERS, VOLUME_WORDS, VOLUMES_HEAD,
 };
-use crate::scene::{Absorber, Bsdf, Component, Field, Interior, MaterialId, Medium, MediumId, Scene, SpectrumId};
+use crate::scene::{
+    Absorber, Bsdf, Component, Field, Interior, MaterialId, Medium, MediumId, Scene, SpectrumId, box_around_all,
+};
 use crate::spectral::{Curve, planck};
 use crate::{Error, Result};
 
@@ -590,7 +592,7 @@ fn source(scene: &Scene, kelvin: f64, index: Option<&Curve>) -> Curve {
 pub fn extent(scene: &Scene, accel: &Accel, interior: Option<&Interior>) -> f64 {
     let Some(interior) = interior else { return 2.0 * accel.space.radius / accel.space.scale };
     let of_body = scene.objects.iter().filter(|o| o.interior.is_some_and(|i| i.body == interior.body));
-    bounds(of_body.map(|object| &object.shape)).map_or(0.0, |[low, high]| (high - low).length())
+    box_around_all(of_body.map(|object| object.shape.bounds())).map_or(0.0, |[low, high]| (high - low).length())
 }
 
 /// Spectra and factors whose sum is the absorption of a medium, m⁻¹, at a temperature and the density of each kind of matter.
