@@ -463,8 +463,9 @@ fn report(
         }),
     )?;
     let names: Vec<String> = written.iter().map(|path| path.display().to_string()).collect();
-    let bytes = files::format_bytes(bytes);
-    output.text(&format!("{}: {width} x {height} pixels x {channels} bands, {bytes}\n", names.join(", ")))?;
+    // What went through a pipe has left no file.
+    let bytes = if bytes > 0 { format!(", {}", files::format_bytes(bytes)) } else { String::new() };
+    output.text(&format!("{}: {width} x {height} pixels x {channels} bands{bytes}\n", names.join(", ")))?;
     if missing > 0 {
         output.text(&format!("{missing} of {tiles} tiles have no samples yet\n"))?;
     }

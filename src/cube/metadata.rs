@@ -520,7 +520,7 @@ impl Header {
         }
         // And mean what it means by them.
         for (name, array) in &arrays {
-            check_meaning(path, name, array, &stored[*name])?;
+            check_meaning(path, "is a copy of a cube in which somebody gave", name, array, &stored[*name])?;
         }
         header.check_wavelengths(path)?;
         Ok((header, layout))
@@ -534,8 +534,8 @@ impl Header {
         let consolidated = &group["consolidated_metadata"]["metadata"];
         for (name, array) in arrays(self, Layout::Columns) {
             let own = json(&path.join(name).join("zarr.json")).unwrap_or_default();
-            check_meaning(path, name, &array, &own)?;
-            check_meaning(path, name, &array, &consolidated[name])?;
+            check_meaning(path, "somebody has given", name, &array, &own)?;
+            check_meaning(path, "somebody has given", name, &array, &consolidated[name])?;
         }
         self.check_wavelengths(path)
     }
@@ -565,11 +565,11 @@ impl Header {
     }
 }
 
-/// Refuses an array whose stored metadata make other numbers of it than `ours`.
-fn check_meaning(path: &Path, name: &str, ours: &Value, stored: &Value) -> Result<()> {
+/// Refuses an array whose stored metadata make other numbers of it than `ours`; `who` has given it those.
+fn check_meaning(path: &Path, who: &str, name: &str, ours: &Value, stored: &Value) -> Result<()> {
     let Some(what) = other_meaning(&ours["attributes"], &stored["attributes"]) else { return Ok(()) };
     let help = "values are read as Spectile writes them: put that right, or open the cube with xarray";
-    Err(Error::storage(path, format!("somebody has given `{name}` {what}; {help}")))
+    Err(Error::storage(path, format!("{who} `{name}` {what}; {help}")))
 }
 
 /// The error of an array that another program has stored anew.

@@ -93,6 +93,15 @@ impl<'a> CubeState<'a> {
         offset: u64,
         values: &mut [T],
     ) -> Result<()> {
+        if matches!(part, TileArray::Radiance | TileArray::StandardError) {
+            let expected = 4 * (self.cube.grid().tile_pixels() * self.cube.channels().len()) as u64;
+            // What cannot be asked fails when it is read.
+            let bytes = file.metadata().map_or(expected, |found| found.len());
+            if bytes != expected {
+                let what = format!("is damaged: {bytes} bytes long, not {expected}");
+                return Err(Error::storage(&self.cube.part_path(part, tile), what));
+            }
+        }
         let read = file.seek(SeekFrom::Start(offset)).and_then(|_| file.read_exact(bytemuck::cast_slice_mut(values)));
         read.map_err(|error| Error::storage(&self.cube.part_path(part, tile), format!("is damaged: {error}")))
     }

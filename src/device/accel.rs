@@ -322,7 +322,7 @@ impl Accel {
 fn stub(to_device: DAffine3, bounds: Aabb, assembly: usize, object: usize) -> Stub {
     let m = to_device.matrix3.as_mat3();
     let at = to_device.translation.as_vec3();
-    let (low, high) = (DVec3::from(bounds.min.as_dvec3()), DVec3::from(bounds.max.as_dvec3()));
+    let (low, high) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
     let [low, high] = box_around(&to_device, [low, high]).map(|p| p.as_vec3a());
     // Rays are moved into it in f32.
     let reach =

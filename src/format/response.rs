@@ -162,8 +162,8 @@ fn is_no_response(name: &str) -> bool {
     let lower = name.to_lowercase();
     let first = lower.split(|c: char| !c.is_alphabetic()).find(|word| !word.is_empty()).unwrap_or("");
     let last = lower.split(|c: char| !c.is_alphabetic()).rfind(|word| !word.is_empty()).unwrap_or("");
-    const SPREADS: [&str; 10] =
-        ["stdev", "stddev", "std", "sd", "uncertainty", "unc", "uncert", "sigma", "err", "error"];
+    const SPREADS: [&str; 12] =
+        ["stdev", "stddev", "std", "sd", "uncertainty", "unc", "uncert", "sigma", "err", "error", "fwhm", "bandwidth"];
     unit::is_axis(name)
         || ["wavelength", "wavenumber", "frequency"].contains(&first)
         || SPREADS.contains(&first)
@@ -365,6 +365,8 @@ mod tests {
             assert_eq!(found.named[0].1, per_photon.named[0].1, "{text}");
             assert!(found.warnings[0].contains("multiplied by the wavelength"), "{:?}", found.warnings);
         }
+        // Centres and widths are no curves.
+        assert!(parse("nm,fwhm\n500,50\n600,50\n").unwrap_err().message.contains("no responses"));
         assert!(parse("nm,log energy L\n400,1\n500,2\n").unwrap_err().message.contains("logarithms"));
         let twice = parse("nm,red (%)\n400,0%\n500,50%\n600,0%\n").unwrap();
         assert_eq!(twice.named[0].1.integral(), 50.0);

@@ -206,6 +206,10 @@ impl Axis {
             return Err(table.problem(Some(table.line), message, "remove `unit`, or correct the header"));
         }
         let is_guessed = unit.is_none() && stated == Ok(None);
+        if is_guessed && table.path.extension().is_some_and(|e| e.eq_ignore_ascii_case("dpt")) {
+            let message = "does not say in what its first column is, which OPUS of Bruker writes as wavenumbers mostly";
+            return Err(table.problem(None, message.to_owned(), "say so in the scene, `unit = \"cm-1\"`"));
+        }
         let unit = match unit {
             Some(unit) => unit,
             None => stated.map(|unit| unit.unwrap_or(Unit::NANOMETRE)).map_err(|other| {

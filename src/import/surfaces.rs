@@ -83,6 +83,20 @@ pub fn index_of(f0: f64) -> f64 {
     (1.0 + root) / (1.0 - root)
 }
 
+/// A reflectance and a transmittance, both scaled down where they pass on more light than arrives, which is told.
+pub fn within_one(both: [Colour; 2], report: &mut Report, place: Place) -> [Colour; 2] {
+    let [reflectance, transmittance] = [both[0].mean(), both[1].mean()];
+    let sum = |nm: u32| reflectance.eval(f64::from(nm)) + transmittance.eval(f64::from(nm));
+    let most = (360..=830).map(sum).fold(0.0, f64::max);
+    if most <= 1.0 {
+        return both;
+    }
+    report
+        .approximated(place, format!("a reflectance and a transmittance of {most:.3} in all, both scaled to 1 in all"));
+    // A little below 1, for what writing rounds.
+    both.map(|colour| colour.map(|v| v * (1.0 - 1e-6) / most))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -110,18 +124,4 @@ mod tests {
         }
         assert!(under_coat(&Colour::grey(1.0), 1.5, 1.0).1);
     }
-}
-
-/// A reflectance and a transmittance, both scaled down where they pass on more light than arrives, which is told.
-pub fn within_one(both: [Colour; 2], report: &mut Report, place: Place) -> [Colour; 2] {
-    let [reflectance, transmittance] = [both[0].mean(), both[1].mean()];
-    let sum = |nm: u32| reflectance.eval(f64::from(nm)) + transmittance.eval(f64::from(nm));
-    let most = (360..=830).map(sum).fold(0.0, f64::max);
-    if most <= 1.0 {
-        return both;
-    }
-    report
-        .approximated(place, format!("a reflectance and a transmittance of {most:.3} in all, both scaled to 1 in all"));
-    // A little below 1, for what writing rounds.
-    both.map(|colour| colour.map(|v| v * (1.0 - 1e-6) / most))
 }

@@ -323,6 +323,21 @@ mod tests {
         let half = set(&[("spectra.paint.scale", "0.5")]).expect("a change").basis.spectra[1].curve.clone();
         assert_eq!(half, Curve::Linear { nm: vec![400.0, 700.0], value: vec![0.05, 0.35], outside: Outside::Hold });
         assert_eq!(set(&[]).expect("nothing").basis, basis());
+        assert_eq!(set(&[]).expect("nothing").warnings, Vec::<String>::new());
+    }
+
+    #[test]
+    fn lamps_that_shine_in_no_channel_are_told_of() {
+        let relit = set(&[("spectra.lamp", "{ samples = [[4000, 1], [7000, 2]] }")]).expect("a change");
+        let words = "the spectrum `lamp` of a source shines in none of the channels, 400 and 700 nm";
+        assert_eq!(relit.warnings, [words]);
+        // So it is where the channels are others, as of a sensor whose file is in micrometres and does not say so.
+        let sets = [("intervals".to_owned(), "[[0.4, 0.7]]".to_owned())];
+        let mut cube = basis();
+        let table = Curve::Linear { nm: vec![400.0, 700.0], value: vec![1.0, 2.0], outside: Outside::Zero };
+        cube.spectra[0].curve = table;
+        let relit = relight(&cube, &Channels::equal(400.0, 700.0, 3), &[], NewChannels::Set(&sets)).expect("channels");
+        assert!(relit.warnings.iter().any(|warning| warning.contains("in none of the channels, 0.4 and 0.7 nm")));
     }
 
     #[test]

@@ -200,7 +200,8 @@ fn other_meanings_are_refused_by_name() {
             group["consolidated_metadata"]["metadata"]["radiance"]["attributes"][name] = value;
         });
     };
-    let cases: [(&str, fn(&Path, &dyn Fn(&Path, &str, Value))); 8] = [
+    type ChangeOf = fn(&Path, &dyn Fn(&Path, &str, Value));
+    let cases: [(&str, ChangeOf); 8] = [
         ("the units `W m-2 sr-1 um-1`", |cube, both| both(cube, "units", json!("W m-2 sr-1 um-1"))),
         ("a `scale_factor` of 2.0", |cube, both| both(cube, "scale_factor", json!(2.0))),
         ("a `gain` of 2.0", |cube, both| both(cube, "gain", json!(2.0))),

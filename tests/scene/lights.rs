@@ -429,6 +429,31 @@ fn zarr_attributes_that_are_not_applied_are_refused() {
     assert_eq!(warnings, Vec::<String>::new());
 }
 
+/// A map of ENVI by latitude and longitude begins where a map does, or is refused.
+#[test]
+fn envi_maps_begin_in_the_north_west() {
+    let with = |info: &str| {
+        let more = format!("map info = {{ {info}, WGS-84, units=Degrees }}\n");
+        let mut bytes = b"12345".to_vec();
+        bytes.extend((0..24).flat_map(|i| (i as f32).to_le_bytes()));
+        Folder::new(&[("a.img", bytes), ("a.hdr", envi_header("bsq", 4, 0, &more))])
+    };
+    for (info, words) in [
+        ("Geographic Lat/Lon, 1, 1, 0, 90, 120, 90", Some("begins at longitude 0")),
+        ("Geographic Lat/Lon, 1.5, 1.5, 60, 45, 120, 90", Some("begins at longitude 0")),
+        ("Geographic Lat/Lon, 1, 1, -180, 45, 120, 90", Some("begins at latitude 45")),
+        ("Geographic Lat/Lon, 1, 1, -180, 90, 120, 90", None),
+        ("Geographic Lat/Lon, 1.5, 1.5, -120, 45, 120, 90", None),
+        ("Arbitrary, 1, 1, 0, 0, 1, 1", None),
+    ] {
+        let folder = with(info);
+        match words {
+            Some(words) => folder.refused("map = \"a.img\"", &["map info", words]),
+            None => drop(folder.map("map = \"a.img\"")),
+        }
+    }
+}
+
 #[test]
 fn zarr_arrays_of_other_quantities_are_refused_by_name() {
     for (attribute, what) in [

@@ -177,6 +177,35 @@ fn grids_resolve() {
     assert!((to_grid.transform_point3(world) - DVec3::new(1.0, 1.0, 0.5)).length() < 1e-14);
 }
 
+/// Height grows with z; depth, of which CF says `positive` = `down`, grows against it.
+#[test]
+fn depths_run_downward() {
+    let text = filled(BALL, "[media.gas]\nabsorption = 1\ndensity = { grid = \"g.zarr/d\" }");
+    for (positive, places, expected) in [
+        ("up", [10.0, 20.0], [1f32, 2.0]),
+        ("up", [20.0, 10.0], [2.0, 1.0]),
+        ("down", [10.0, 20.0], [2.0, 1.0]),
+        ("down", [20.0, 10.0], [1.0, 2.0]),
+    ] {
+        let dir = folder(&[]);
+        let store = Arc::new(FilesystemStore::new(dir.path().join("g.zarr")).expect("a folder"));
+        let array = |name: &str, shape: Vec<u64>, dimensions: &[&str], values: &[f64]| {
+            let mut builder = ArrayBuilder::new(shape.clone(), shape, data_type::float64(), 0.0f64);
+            let attributes = serde_json::json!({ "positive": positive });
+            builder.dimension_names(Some(dimensions.iter().copied()));
+            builder.attributes(attributes.as_object().expect("an object").clone());
+            let array = builder.build(store.clone(), name).expect("an array");
+            array.store_metadata().expect("metadata");
+            array.store_array_subset(&array.subset_all(), values).expect("values");
+        };
+        array("/d", vec![2, 1, 1], &["z", "y", "x"], &[1.0, 2.0]);
+        array("/z", vec![2], &["z"], &places);
+        let scene = scene::parse(&text, &dir.path().join("scene.toml"), &overrides(&[])).unwrap();
+        let Field::Grid(grid) = &scene.media[0].components[0].density else { panic!("no grid") };
+        assert_eq!(grid.values, expected, "{positive}, {places:?}");
+    }
+}
+
 /// The mesh as a whole has the box, and a `material` of its own, or of its usemtl names, or none.
 #[test]
 fn meshes_with_interiors() {

@@ -184,6 +184,14 @@ fn percent_counts_once() {
     assert_eq!(table.unit.map(|stated| stated.meaning), Some(Meaning::Factor));
 }
 
+/// Bruker's tables have wavenumbers, and no header that says so.
+#[test]
+fn tables_of_opus_need_a_unit() {
+    let read = |unit| parse(b"25000,0.1\n20000,0.2\n", Path::new("a.dpt"), Column::Only, unit);
+    assert!(read(None).unwrap_err().help.is_some_and(|help| help.contains("cm-1")));
+    assert_eq!(read(Some(Unit::WAVENUMBER)).unwrap().nm, [400.0, 500.0]);
+}
+
 #[test]
 fn wavelengths_of_their_own_are_refused() {
     for (text, column, words) in [
