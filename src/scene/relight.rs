@@ -209,10 +209,13 @@ fn decode<'a>(
     }
 }
 
-/// Sources that shine in none of the channels, as of scenes.
+/// Sources that shine in none of the channels, as of scenes; what is 0 everywhere has been switched off.
 fn dark<'b>(basis: &'b Basis, channels: &'b Channels) -> impl Iterator<Item = String> + use<'b> {
     let shines = |curve: &Curve| channels.bounds.iter().any(|&[a, b]| curve.mean(a, b) >= f64::from(f32::MIN_POSITIVE));
-    let is_dark = move |leaf: &&Leaf| quantity(leaf).is_some_and(Quantity::is_light) && !shines(&leaf.curve);
+    let is_on = |curve: &Curve| curve.max(1e-3, 1e15) > 0.0;
+    let is_dark = move |leaf: &&Leaf| {
+        quantity(leaf).is_some_and(Quantity::is_light) && !shines(&leaf.curve) && is_on(&leaf.curve)
+    };
     let [first, last] = channels.hull().unwrap_or_default();
     basis.spectra.iter().filter(is_dark).map(move |leaf| {
         format!("the spectrum `{}` of a source shines in none of the channels, {first} and {last} nm", leaf.name)
@@ -331,6 +334,7 @@ mod tests {
         let relit = set(&[("spectra.lamp", "{ samples = [[4000, 1], [7000, 2]] }")]).expect("a change");
         let words = "the spectrum `lamp` of a source shines in none of the channels, 400 and 700 nm";
         assert_eq!(relit.warnings, [words]);
+        assert_eq!(set(&[("spectra.lamp", "0.0")]).expect("off").warnings, Vec::<String>::new());
         // So it is where the channels are others, as of a sensor whose file is in micrometres and does not say so.
         let sets = [("intervals".to_owned(), "[[0.4, 0.7]]".to_owned())];
         let mut cube = basis();

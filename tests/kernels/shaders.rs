@@ -25,7 +25,7 @@ use crate::scene_builder::*;
 const MAX_PLAIN_BYTES: usize = 18 << 10;
 const MAX_BYTES: usize = 32 << 10;
 /// Of general scenes, by what their materials need.
-const MAX_GENERAL_BYTES: usize = 64 << 10;
+const MAX_GENERAL_BYTES: usize = 72 << 10;
 /// Of the scene with everything, which nobody renders.
 const MAX_EVERYTHING_BYTES: usize = 110 << 10;
 
