@@ -14,7 +14,12 @@ fn emit(list: ptr<function, RecordList>, path: Path, meeting: Meeting, site: Sit
     }
     var weight = path.scale;
     if (path.density >= 0.0) {
-        weight *= power_heuristic(path.density, light_density(site.surface.emitter, path.ray.origin, path.ray.direction, meeting.distance, site.surface.normal));
+#if PLACED_LIGHTS
+        let chance = light_density(emitter, path.ray.origin, path.ray.direction, meeting.distance, site.surface.normal);
+#else
+        let chance = light_density(site.surface.emitter, path.ray.origin, path.ray.direction, meeting.distance, site.surface.normal);
+#endif
+        weight *= power_heuristic(path.density, chance);
     }
     let begin = (*list).count;
 #lines EMITTED

@@ -1,11 +1,12 @@
 //! Spectral OpenEXR (A. Fichet, R. Pacanowski, A. Wilkie 2021, JCGT 10(3)): a channel a band, named by its wavelength, and
 //! R, G, B for viewers that know nothing of spectra.
 
+use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use exr::block::writer::ChunksWriter;
+use exr::block::writer::{ChunkWriter, ChunksWriter};
 use exr::block::{BlockIndex, UncompressedBlock};
 use exr::math::{RoundingMode, Vec2};
 use exr::meta::attribute::{
@@ -122,12 +123,20 @@ fn write_file(view: &View, path: &Path, strict_units: bool, progress: &mut Progr
     let sources: Vec<Source> = named.iter().map(|(_, source)| *source).collect();
     let header = header(view, &named, strict_units)?;
 
+    write_image(path, header, |meta, writer| write_tiles(view, path, &sources, meta, writer, progress))
+}
+
+/// An image whose blocks `write` writes in their order, which has not taken its place yet.
+pub(super) fn write_image(
+    path: &Path,
+    header: Header,
+    write: impl FnOnce(&MetaData, &mut ChunkWriter<&mut BufWriter<&mut File>>) -> Result<()>,
+) -> Result<Replacement> {
     let mut replacement = Replacement::create(path, IMAGE)?;
     let mut ended = None;
     let mut file = BufWriter::with_capacity(1 << 20, replacement.file());
     let result = exr::block::write(&mut file, SmallVec::from_vec(vec![header]), true, |meta, writer| {
-        let written = write_tiles(view, path, &sources, &meta, writer, progress);
-        written.map_err(|error| {
+        write(&meta, writer).map_err(|error| {
             // What the crate can carry through is only its own errors.
             let what = error.to_string();
             ended = Some(error);
@@ -144,19 +153,19 @@ fn write_file(view: &View, path: &Path, strict_units: bool, progress: &mut Progr
     Ok(replacement)
 }
 
+/// A text as headers have it.
+pub(super) fn text(text: &str) -> Result<Text> {
+    Text::new_or_none(text).ok_or_else(|| Error::Internal(format!("`{text}` cannot stand in an EXR header")))
+}
+
+/// A channel of f32, of every pixel.
+pub(super) fn channel(name: &str) -> Result<ChannelDescription> {
+    let (name, sampling) = (text(name)?, Vec2(1, 1));
+    Ok(ChannelDescription { name, sample_type: SampleType::F32, quantize_linearly: false, sampling })
+}
+
 fn header(view: &View, named: &[(String, Source)], strict_units: bool) -> Result<Header> {
-    let text = |text: &str| {
-        Text::new_or_none(text).ok_or_else(|| Error::Internal(format!("`{text}` cannot stand in an EXR header")))
-    };
-    let mut channels = SmallVec::new();
-    for (name, _) in named {
-        channels.push(ChannelDescription {
-            name: text(name)?,
-            sample_type: SampleType::F32,
-            quantize_linearly: false,
-            sampling: Vec2(1, 1),
-        });
-    }
+    let channels = named.iter().map(|(name, _)| channel(name)).collect::<Result<SmallVec<_>>>()?;
     let [width, height] = view.size();
     let mut side = TILE.min(width.max(height).next_power_of_two());
     while side > 1 && (side * side) as usize * named.len() * 4 > TILE_BYTES {

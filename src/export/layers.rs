@@ -1,13 +1,13 @@
 //! Layers of a cube in other formats: a band, channel or column for each of their numbers, line by line.
 
-use std::io::{BufWriter, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use exr::block::UncompressedBlock;
 use exr::block::writer::ChunksWriter;
 use exr::math::Vec2;
 use exr::meta::BlockDescription;
-use exr::meta::attribute::{ChannelDescription, LineOrder, SampleType, Text};
+use exr::meta::attribute::LineOrder;
 use exr::meta::header::Header;
 use exr::prelude::Compression;
 use smallvec::SmallVec;
@@ -182,54 +182,31 @@ fn write_exr(view: &LayerView, path: &Path, progress: &mut Progress) -> Result<V
     let names = view.names();
     let [width, height] = view.size().map(|side| side as usize);
     check_space(path, (width * height * names.len() * 4) as u64)?;
-    let text = |text: &str| {
-        Text::new_or_none(text).ok_or_else(|| Error::Internal(format!("`{text}` cannot stand in an EXR header")))
-    };
     // Readers expect them in the order of the alphabet.
     let mut order: Vec<usize> = (0..names.len()).collect();
     order.sort_by_key(|&i| &names[i]);
-    let mut channels = SmallVec::new();
-    for &i in &order {
-        let sampling = Vec2(1, 1);
-        let name = text(&names[i])?;
-        channels.push(ChannelDescription { name, sample_type: SampleType::F32, quantize_linearly: false, sampling });
-    }
+    let channels = order.iter().map(|&i| spectral_exr::channel(&names[i])).collect::<Result<SmallVec<_>>>()?;
     // A line at a time.
-    let mut header = Header::new(text("layers")?, Vec2(width, height), channels).with_encoding(
+    let mut header = Header::new(spectral_exr::text("layers")?, Vec2(width, height), channels).with_encoding(
         Compression::ZIP1,
         BlockDescription::ScanLines,
         LineOrder::Increasing,
     );
     header.own_attributes.layer_name = None;
-    header.own_attributes.comments = Some(text(&format!("Spectile {}", env!("CARGO_PKG_VERSION")))?);
-    let mut replacement = Replacement::create(path, spectral_exr::IMAGE)?;
-    let mut file = BufWriter::new(replacement.file());
-    let mut ended = None;
+    header.own_attributes.comments = Some(spectral_exr::text(&format!("Spectile {}", env!("CARGO_PKG_VERSION")))?);
     let failed = spectral_exr::failed(path);
-    let result = exr::block::write(&mut file, SmallVec::from_vec(vec![header]), true, |meta, writer| {
+    let image = spectral_exr::write_image(path, header, |meta, writer| {
         let mut indices = exr::block::enumerate_ordered_header_block_indices(&meta.headers);
-        let written = view.lines(progress, |_, line| {
+        view.lines(progress, |_, line| {
             let (at, index) = indices.next().ok_or_else(|| Error::Internal("an EXR image has too few lines".into()))?;
             let of = |&i: &usize| line[i * width..(i + 1) * width].iter().map(|value| *value as f32);
             let numbers: Vec<f32> = order.iter().flat_map(of).collect();
             let block = UncompressedBlock { index, data: bytemuck::cast_slice(&numbers).to_vec() };
             let chunk = block.compress_to_chunk(&meta.headers).map_err(failed)?;
             writer.write_chunk(at, chunk).map_err(failed)
-        });
-        written.map_err(|error| {
-            let what = error.to_string();
-            ended = Some(error);
-            exr::error::Error::Invalid(what.into())
         })
-    });
-    let flushed = file.flush();
-    drop(file);
-    if let Some(error) = ended {
-        return Err(error);
-    }
-    result.map_err(failed)?;
-    flushed.map_err(|error| replacement.failed(&error))?;
-    replacement.finish()?;
+    })?;
+    image.finish()?;
     Ok(vec![path.to_owned()])
 }
 

@@ -46,10 +46,10 @@ pub fn decode<'a>(
         parts.iter().for_each(|part| objects.add_to(decoded.len(), part));
         let own = objects.since(first);
         let is_round = own.iter().any(|object| !matches!(object.shape, Shape::Mesh(_)));
-        let bounds = box_around_all(own.iter().map(|object| object.shape.bounds()));
-        for ((placed, item), bounds) in of_name().zip(std::iter::repeat(bounds)) {
-            let all = placed.iter().flat_map(|(_, all)| all).zip(std::iter::repeat(bounds));
-            for (one, bounds) in all.filter_map(|(one, bounds)| Some((one, bounds?))) {
+        // Without any, what is wrong with its objects has been said.
+        let Some(bounds) = box_around_all(own.iter().map(|object| object.shape.bounds())) else { continue };
+        for (placed, item) in of_name() {
+            for one in placed.iter().flat_map(|(_, all)| all) {
                 if let Err(message) = transform::check(&one.to_world, is_round, bounds) {
                     report(one, message, item);
                 }

@@ -143,8 +143,8 @@ fn traverse(ray: Ray, limit: f32, any_hit: bool, overflow: ptr<function, bool>) 
             let bit = firstTrailingBit(primitives_left.y);
             primitives_left.y &= primitives_left.y - 1u;
             let primitive = primitives_left.x + bit;
-#if INSTANCES
             let p = load_primitive(primitive);
+#if INSTANCES
             if ((p.tag >> 24u) == KIND_INSTANCE) {
                 // What is left of the world waits, and what is left of this leaf.
                 if (stack_size + 2u > STACK_SIZE) {
@@ -169,8 +169,6 @@ fn traverse(ray: Ray, limit: f32, any_hit: bool, overflow: ptr<function, bool>) 
                 primitives_left.y = 0u;
                 break;
             }
-#else
-            let p = load_primitive(primitive);
 #endif
 #if SHAPES
             if ((p.tag >> 24u) != 0u) {

@@ -73,8 +73,12 @@ fn matrix_of_normals(linear: mat3x3<f32>) -> mat3x3<f32> {
 }
 
 fn largest(m: mat3x3<f32>) -> f32 {
-    let most = max(max(abs(m[0]), abs(m[1])), abs(m[2]));
-    return max(max(most.x, most.y), max(most.z, 1.0e-37));
+    return largest_of(max(max(abs(m[0]), abs(m[1])), abs(m[2])));
+}
+
+fn largest_of(v: vec3<f32>) -> f32 {
+    let a = abs(v);
+    return max(max(a.x, a.y), max(a.z, 1.0e-37));
 }
 
 // A ray in the units of an assembly, from where it passes nearest to the middle of it: `begin` along the ray of the world. From farther
@@ -87,7 +91,7 @@ struct Entered {
 
 fn entered(ray: Ray, stub: Primitive, instance: u32) -> Entered {
     let middle = placement_vector(load_primitive_part(instance, 2u).w);
-    let fastest = max(max(abs(ray.direction.x), abs(ray.direction.y)), max(abs(ray.direction.z), 1.0e-37));
+    let fastest = largest_of(ray.direction);
     let along = ray.direction / fastest;
     let towards = bitcast<vec3<f32>>(middle.xyz) - ray.origin;
     let begin = max(dot(towards, along) / dot(along, along), 0.0) / fastest;

@@ -32,11 +32,6 @@ fn emitter_placed(own: Emitter, instance: u32, pick: f32) -> Emitter {
     return emitter;
 }
 
-fn largest_of(v: vec3<f32>) -> f32 {
-    let a = abs(v);
-    return max(max(a.x, a.y), max(a.z, 1.0e-37));
-}
-
 // What a path met; in the world itself where `instance` is NONE.
 fn emitter_met(index: u32, instance: u32) -> Emitter {
     if (instance == NONE) {

@@ -44,10 +44,10 @@ fn sphere_cap(center_distance2: f32, radius: f32) -> f32 {
 #endif
 
 // The density over solid angle with which next-event estimation at `origin` finds this point.
-fn light_density(emitter_index: u32, origin: vec3<f32>, direction: vec3<f32>, distance: f32, normal: vec3<f32>) -> f32 {
 #if PLACED_LIGHTS
-    let emitter = emitter_met(emitter_index, light_in);
+fn light_density(emitter: Emitter, origin: vec3<f32>, direction: vec3<f32>, distance: f32, normal: vec3<f32>) -> f32 {
 #else
+fn light_density(emitter_index: u32, origin: vec3<f32>, direction: vec3<f32>, distance: f32, normal: vec3<f32>) -> f32 {
     let emitter = emitters[emitter_index];
 #endif
 #if SHAPES

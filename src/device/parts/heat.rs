@@ -91,7 +91,10 @@ pub const BY_PLACE: Part = Part {
 pub const EITHER: Part = Part {
     name: "hot surfaces",
     used: |scene| (BY_ANGLE.used)(scene) || (BY_PLACE.used)(scene),
-    modules: &[(Place::Stage, module!("parts/heat/heat.wgsl"))],
+    modules: &[
+        (Place::Stage, module!("parts/lights/hit_on_emitter.wgsl")),
+        (Place::Stage, module!("parts/heat/heat.wgsl")),
+    ],
     defines: |scene, _, defines| {
         let features = scene.radiators.as_ref().map(|radiators| radiators.features);
         let smooth = scene.surfaces.as_ref().is_some_and(|surfaces| surfaces.smooth);

@@ -26,7 +26,10 @@ pub const OPACITY: Part = Part {
 pub const OF_LAMPS: Part = Part {
     name: "opacity of surfaces that shine",
     used: |scene| (OPACITY.used)(scene) && (lights::SURFACES.used)(scene),
-    modules: &[(Place::Stage, module!("parts/opacity/aimed.wgsl"))],
+    modules: &[
+        (Place::Stage, module!("parts/lights/hit_on_emitter.wgsl")),
+        (Place::Stage, module!("parts/opacity/aimed.wgsl")),
+    ],
     lines: &[("AIMED_AT_SURFACE", "(*aim).strength *= opacity_aimed_at(emitter, point);")],
     ..Part::NOTHING
 };
