@@ -22,7 +22,7 @@ use crate::spectral::product::{Basis, Expander};
 use crate::{Error, Result, files};
 
 /// Folder of everything that is not plain Zarr.
-pub(super) const PRIVATE: &str = ".spectile";
+pub(super) use crate::files::output::PRIVATE;
 /// What the cube is known by, in it.
 pub(super) const RECORD: &str = ".spectile/cube.json";
 

@@ -33,6 +33,9 @@ const KNOWN: &[&str] = &[
     "tsv", "txt", "webp", "xml", "yaml", "yml", "zarr",
 ];
 
+/// The folder that each cube has beside its arrays, for Spectile alone.
+pub const PRIVATE: &str = ".spectile";
+
 /// Where a product goes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Place {
@@ -91,6 +94,12 @@ impl Product {
             Ok(found) => found,
             Err(error) if error.kind() == ErrorKind::NotFound => {
                 self.check_extension(path)?;
+                if let Some(cube) = cube_around(&real_path(path)) {
+                    return refuse(format!(
+                        "lies in the cube {}, where only its own arrays belong; choose a name outside of it",
+                        cube.display()
+                    ));
+                }
                 return new_place(path).map(Place::New);
             }
             Err(error) => return Err(Error::storage(path, format!("cannot be written: {error}"))),
@@ -139,6 +148,11 @@ impl Product {
             self.name
         )))
     }
+}
+
+/// The cube in whose folder `path` lies, by the journals that each has.
+fn cube_around(path: &Path) -> Option<&Path> {
+    path.ancestors().skip(1).find(|folder| folder.join(PRIVATE).is_dir() && folder.join("zarr.json").is_file())
 }
 
 /// The name of a file that is to be new, with links to nothing followed.

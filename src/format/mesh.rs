@@ -15,6 +15,8 @@ pub struct Mesh {
     /// Point and line elements, which have no surface.
     pub without_surface: usize,
     pub flaws: Flaws,
+    /// What it says in a comment of its lengths, where that is not the metre.
+    pub unit: Option<String>,
     /// What else is to be said of the file, a sentence each.
     pub notes: Vec<String>,
 }
@@ -161,7 +163,7 @@ pub fn content(path: &Path) -> Result<Vec<u8>, Box<Problem>> {
 /// # Errors
 /// What is wrong with it, with the line where the file has lines.
 pub fn parse(format: Format, bytes: &[u8], path: &Path) -> Result<Mesh, Box<Problem>> {
-    match format {
+    let mut mesh = match format {
         Format::Obj => obj::parse(bytes, path),
         Format::Ply => ply::parse(bytes, path),
         Format::Stl => stl::parse(bytes, path),
@@ -172,6 +174,92 @@ pub fn parse(format: Format, bytes: &[u8], path: &Path) -> Result<Mesh, Box<Prob
         Format::Gltf => {
             let file = super::gltf::parse(bytes, path)?;
             file.mesh(None).map_err(|message| file.problem(message))
+        }
+    }?;
+    mesh.unit = stated_unit(format, bytes);
+    Ok(mesh)
+}
+
+/// What the comments at the head of a file say of its lengths (`File units = millimeters`, `UNITS=mm`): none of these
+/// formats has a place for that, but writers have their habits. Nothing where it is the metre.
+fn stated_unit(format: Format, bytes: &[u8]) -> Option<String> {
+    /// Longer heads are not searched.
+    const HEAD: usize = 4096;
+    const UNITS: [&str; 29] = [
+        "mm",
+        "millimeter",
+        "millimeters",
+        "millimetre",
+        "millimetres",
+        "cm",
+        "centimeter",
+        "centimeters",
+        "centimetre",
+        "centimetres",
+        "um",
+        "micron",
+        "microns",
+        "micrometer",
+        "micrometers",
+        "micrometre",
+        "micrometres",
+        "km",
+        "kilometer",
+        "kilometers",
+        "kilometre",
+        "kilometres",
+        "in",
+        "inch",
+        "inches",
+        "ft",
+        "foot",
+        "feet",
+        "yards",
+    ];
+    let head = match format {
+        // The header of a binary file; the name of the solid in text.
+        Format::Stl => 80,
+        Format::Obj | Format::Ply => HEAD,
+        Format::Gltf | Format::Memory => return None,
+    };
+    let text = String::from_utf8_lossy(&bytes[..bytes.len().min(head)]);
+    let comments = text.split(['\r', '\n', '\0']).filter_map(|line| match format {
+        Format::Obj => line.trim_start().strip_prefix('#'),
+        Format::Ply => line.strip_prefix("comment").or(line.strip_prefix("obj_info")),
+        _ => Some(line),
+    });
+    comments.map(str::trim).find_map(|comment| {
+        let lower = comment.to_lowercase();
+        let words: Vec<&str> = lower.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).collect();
+        let said = (1..words.len()).filter(|i| matches!(words[i - 1], "unit" | "units")).any(|i| match words[i] {
+            // The preposition, or inches.
+            "in" => words.get(i + 1).is_none_or(|next| UNITS.contains(next)),
+            word => UNITS.contains(&word),
+        });
+        said.then(|| comment.chars().take(60).collect())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_in_comments() {
+        for (format, head, said) in [
+            (Format::Obj, "# made by hand\n# File units = millimeters\nv 0 0 0\n", Some("File units = millimeters")),
+            (Format::Obj, "# Units: in\r\nv 0 0 0\r\n", Some("Units: in")),
+            (Format::Obj, "# units in cm\nv 0 0 0\n", Some("units in cm")),
+            (Format::Obj, "# File units = meters\nv 0 0 0\n", None),
+            (Format::Obj, "# published coordinates (mm) in metres\nv 0 0 0\n", None),
+            (Format::Obj, "# unit cube in mm\nv 0 0 0\n", None),
+            (Format::Obj, "# units in metres\nv 0 0 0\n", None),
+            (Format::Obj, "o units mm\n", None),
+            (Format::Ply, "ply\nformat ascii 1.0\ncomment unit: mm\n", Some("unit: mm")),
+            (Format::Stl, "made by a slicer UNITS=mm\0\0", Some("made by a slicer UNITS=mm")),
+            (Format::Stl, "solid part\nfacet", None),
+        ] {
+            assert_eq!(stated_unit(format, head.as_bytes()).as_deref(), said, "{head}");
         }
     }
 }

@@ -72,7 +72,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, Box<Problem>> {
         return Err(problem(None, "has no faces"));
     }
     let flaws = polygons.flaws;
-    Ok(Mesh { parts, without_surface: feeder.without_surface, flaws, notes: Vec::new() })
+    Ok(Mesh { parts, without_surface: feeder.without_surface, flaws, unit: None, notes: Vec::new() })
 }
 
 /// The lines of a file whose lines end as those of old Macs do, as everybody's.

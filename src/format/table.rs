@@ -427,7 +427,11 @@ impl Table<'_> {
             let row = &self.rows[self.rows.len().min(2) - 1];
             let cell = shown(row.cells.get(0).unwrap_or(""));
             let message = format!("`{cell}` is not a finite number, and no line begins with one");
-            self.problem(Some(row.line), message, "write lines of `nm,value`")
+            let help = match cell.contains(',') {
+                true => "write decimal points, and no commas within numbers",
+                false => "write lines of `nm,value`",
+            };
+            self.problem(Some(row.line), message, help)
         })
     }
 

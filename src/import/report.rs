@@ -71,6 +71,15 @@ impl Report {
         self.say(Fate::LeftOut, Some(place), what);
     }
 
+    /// `value`, or the nearest in `range` with a word on it.
+    pub fn within(&mut self, place: Place, what: &str, value: f64, range: [f64; 2]) -> f64 {
+        let taken = value.clamp(range[0], range[1]);
+        if taken != value {
+            self.approximated(place, format!("{what} of {value} as {taken}"));
+        }
+        taken
+    }
+
     pub fn chosen(&mut self, what: impl Into<String>) {
         self.say(Fate::Chosen, None, what);
     }

@@ -101,6 +101,15 @@ impl<'s, 'a> Objects<'s, 'a> {
         if shape.path.ends_with(".mesh") {
             let Some((format, mesh)) = self.read(&shape, group.as_ref(), node.as_ref()) else { return };
             let Some(parts) = pick(&mesh, &shape, group.as_ref()) else { return };
+            // A transform, or that of an instance, makes of it what its writer wants.
+            if let Some(said) = mesh.unit.as_ref().filter(|_| !fields.has("transform") && self.assembly.is_none()) {
+                fields.cx.warn(format!(
+                    "{} says \"{}\", but its numbers are taken as metres: give the object a `transform` with the `scale` \
+                     that makes metres of them (1 if they are)",
+                    file_name(&shape),
+                    said.escape_debug()
+                ));
+            }
             if fields.has("interior") {
                 common.interior = self.filling(&fields, &Shape::Mesh(shape::join(&parts, Needs::default()).0));
             }

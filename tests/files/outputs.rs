@@ -299,6 +299,19 @@ fn plots_follow_the_rule() {
     assert!(reader.wait_with_output().expect("read").stdout == fs::read(place.at("a.svg")).expect("read"));
 }
 
+#[test]
+fn nothing_else_is_written_into_a_cube() {
+    let place = Place::new();
+    place.succeeds(&["export", "cube.zarr", "-o", "picture.png"]);
+    symlink("cube.zarr/radiance", place.at("inside")).expect("linked");
+    for name in ["cube.zarr/spectrum.csv", "cube.zarr/radiance/spectrum.csv", "inside/spectrum.csv"] {
+        let arguments = ["export", "cube.zarr", "-o", name];
+        place.refuses(&arguments, "lies in the cube ");
+    }
+    place.refuses(&["render", "scene.toml", "-o", "cube.zarr/new.zarr", "--spp", "1"], "lies in the cube ");
+    place.refuses(&["export", "cube.zarr", "-o", "cube.zarr/picture.png"], "lies in the cube ");
+}
+
 /// All of these are refused before a device is opened.
 #[test]
 fn previews_and_cubes_follow_the_rule() {

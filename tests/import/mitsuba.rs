@@ -204,6 +204,21 @@ fn what_is_clipped_or_left_out_is_told() {
     let told = &found.page;
     assert!(told.contains("and the medium that it bounds"), "{told}");
     assert!(told.contains("of 1.600 in all, both scaled to 1 in all"), "{told}");
+    let found = imported(
+        r#"<emitter type="spot"><float name="cutoff_angle" value="200"/><float name="beam_width" value="190"/></emitter>
+        <shape type="sphere"><bsdf type="principled">
+            <float name="metallic" value="1.25"/><float name="specular" value="-0.5"/>
+        </bsdf></shape>"#,
+    );
+    let told = &found.page;
+    for words in [
+        "- `cutoff_angle` of 200 as 180 (",
+        "- `beam_width` of 190 as 180 (",
+        "- `metallic` of a principled BSDF of 1.25 as 1 (",
+        "- `specular` of a principled BSDF of -0.5 as 0 (",
+    ] {
+        assert!(told.contains(words), "{words}: {told}");
+    }
     let both = scene("").replace("<film", "<string name=\"focal_length\" value=\"50mm\"/><film");
     let (_folder, path) = written("scene.xml", &both);
     let error = spectile::import::import(&path, &path.with_extension("out")).expect_err("both").to_string();

@@ -230,6 +230,14 @@ fn what_is_clipped_is_told() {
             ),
             "of 1.600 in all, both scaled to 1 in all",
         ),
+        (
+            "LightSource \"spot\" \"float coneangle\" 30 \"float conedeltaangle\" 40".to_owned(),
+            "`conedeltaangle` of 40 as 30",
+        ),
+        (
+            format!("Material \"conductor\" \"float roughness\" 1.5 \"bool remaproughness\" false\n{sphere}"),
+            "a roughness of 1.5 as 1",
+        ),
     ] {
         let page = imported(&inner).page;
         assert!(page.contains(words), "{inner}: {page}");

@@ -42,6 +42,17 @@ fn formats_are_told_by_name_or_content() {
 }
 
 #[test]
+fn units_of_a_mesh_in_comments_are_told() {
+    let ply = PLY.replace("element vertex", "comment File units = millimeters\nelement vertex");
+    for (more, told) in [("", 1), ("\ntransform = { scale = 0.001 }", 0)] {
+        let scene = good(&with("m.ply", &format!("material = \"soot\"{more}")), &[("m.ply", &ply)], &[]);
+        let warnings: Vec<&String> = scene.warnings.iter().filter(|w| w.contains("millimeters")).collect();
+        assert_eq!(warnings.len(), told, "{warnings:?}");
+        assert!(warnings.iter().all(|w| w.contains("taken as metres: give the object a `transform`")), "{warnings:?}");
+    }
+}
+
+#[test]
 fn nodes_and_materials_of_gltf() {
     let scene = good(&with("m.gltf", ""), &[("m.gltf", GLTF)], &[]);
     let names: Vec<&str> = scene.objects[1..].iter().map(|object| object.name.as_str()).collect();

@@ -69,6 +69,7 @@ fn headers_are_found_where_they_stand() {
 fn what_can_be_read_in_two_ways_is_refused() {
     for (text, line, words) in [
         ("nm\tv\n1,000\t2,000\n1,100\t2,100\n", 2, "decimal comma or a comma between thousands"),
+        ("nm,v\n\"1,000\",0.5\n\"1,100\",0.6\n", 2, "no commas within numbers"),
         ("nm;v\n1,5;2.5\n2,5;3.5\n", 2, "decimal comma"),
         ("Scale factor: 100\nnm,v\n400,1\n500,1\n", 1, "not applied"),
         ("X Units: um\nwl,v\n400,1\n500,1\n", 1, "not applied"),
@@ -82,7 +83,7 @@ fn what_can_be_read_in_two_ways_is_refused() {
         ("nm,v,w,x\n400,1\n500,1\n", 1, "4 cells where the numbers below have 2"),
     ] {
         let problem = read(text.as_bytes(), Path::new("t.csv")).unwrap_err();
-        assert!(problem.message.contains(words) && problem.line == Some(line), "{text}: {problem}");
+        assert!(problem.to_string().contains(words) && problem.line == Some(line), "{text}: {problem}");
     }
     // What Windows prints of no number, which is no comment.
     for cell in ["1.#QNAN", "-1.#IND", "1.#INF", "1.#INF00"] {

@@ -165,12 +165,10 @@ impl Importer<'_, '_> {
                 let [inner, outer] = light.spot.as_ref().map_or([0.0, std::f64::consts::FRAC_PI_4], |spot| {
                     [spot.inner_cone_angle, spot.outer_cone_angle].map(f64::from)
                 });
-                let half = outer.to_degrees().clamp(1e-3, 90.0);
-                let falloff = inner.to_degrees().clamp(0.0, half);
-                self.scene.report.approximated(
-                    self.place(path.clone()),
-                    "the edge of a spot: t² (3 - 2 t) for t², t linear in the cosine",
-                );
+                let at = self.place(path.clone());
+                let half = self.scene.report.within(at.clone(), "`outerConeAngle`", outer.to_degrees(), [1e-3, 90.0]);
+                let falloff = self.scene.report.within(at.clone(), "`innerConeAngle`", inner.to_degrees(), [0.0, half]);
+                self.scene.report.approximated(at, "the edge of a spot: t² (3 - 2 t) for t², t linear in the cosine");
                 let angles = format!("half_angle = {}, falloff = {}", text::rounded(half), text::rounded(falloff));
                 (
                     "spot",

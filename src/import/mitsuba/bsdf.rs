@@ -394,7 +394,8 @@ impl<'n> Importer<'n, '_> {
         self.scene.report.approximated(plugin.place(), what);
         let mut section = Section::default();
         section.set("reflectance", colour.toml(self.scene, name)?);
-        section.set("eta", text::rounded(eta.max(1.0)));
+        let eta = self.scene.report.within(plugin.place(), "the relative index of a plastic", eta, [1.0, f64::MAX]);
+        section.set("eta", text::rounded(eta));
         if let Some([u, v]) = roughness {
             section.set("roughness", text::rounded((u * v).sqrt()));
         }

@@ -40,8 +40,10 @@ impl<'n> Importer<'n, '_> {
             }
             "spot" => {
                 let intensity = self.light(&plugin, "intensity", &name)?;
-                let half = plugin.float("cutoff_angle")?.unwrap_or(20.0).clamp(1e-3, 180.0);
-                let beam = plugin.float("beam_width")?.unwrap_or(0.75 * half).clamp(0.0, half);
+                let half = plugin.float("cutoff_angle")?.unwrap_or(20.0);
+                let half = self.scene.report.within(plugin.place(), "`cutoff_angle`", half, [1e-3, 180.0]);
+                let beam = plugin.float("beam_width")?.unwrap_or(0.75 * half);
+                let beam = self.scene.report.within(plugin.place(), "`beam_width`", beam, [0.0, half]);
                 let value = format!(
                     "{{ position = {}, direction = {}, intensity = {intensity}, half_angle = {}, falloff = {}, profile = \"linear\" }}",
                     text::vector(to_world.translation),

@@ -20,6 +20,7 @@ use self::xml::Node;
 use super::scene::{Scene, Section};
 use super::text;
 use crate::error::Problem;
+use crate::scene::MAX_BOUNCES;
 use crate::{Error, Result};
 
 /// Shapes that instances may become where they are copies.
@@ -140,7 +141,15 @@ impl<'n> Importer<'n, '_> {
         }
         let bounces = match (plugin.kind(), depth) {
             ("direct", _) => 1,
-            (_, Some(depth)) if depth >= 0 => (depth - 1).clamp(0, 16_383),
+            (_, Some(depth)) if depth >= 0 => {
+                self.scene.report.within(
+                    plugin.place(),
+                    "`max_depth`",
+                    depth as f64,
+                    [1.0, f64::from(MAX_BOUNCES) + 1.0],
+                ) as i64
+                    - 1
+            }
             _ => {
                 self.scene
                     .report
@@ -151,7 +160,9 @@ impl<'n> Importer<'n, '_> {
         section.set("max_bounces", bounces.to_string());
         if bounces >= 32 {
             // Mitsuba's counts segments, and begins at 5 unless told otherwise.
-            section.set("russian_roulette_start", roulette.unwrap_or(5).clamp(1, 16_383).to_string());
+            let start = roulette.unwrap_or(5) as f64;
+            let start = self.scene.report.within(plugin.place(), "`rr_depth`", start, [1.0, f64::from(MAX_BOUNCES)]);
+            section.set("russian_roulette_start", start.to_string());
         }
         plugin.finish(&mut self.scene.report);
         self.scene.report.translated(format!("integrator `{}`", values::shown(plugin.kind())), plugin.place());

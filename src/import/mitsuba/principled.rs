@@ -43,16 +43,20 @@ pub fn principled<'n>(
     flip: bool,
 ) -> Result<Made> {
     let colour = importer.colour(plugin, "base_color", Of::Reflectance, flip)?.unwrap_or(Colour::grey(0.5));
-    let roughness = importer.mean_number(plugin, "roughness", 0.5)?.clamp(0.0, 1.0);
-    let metallic = importer.mean_number(plugin, "metallic", 0.0)?.clamp(0.0, 1.0);
-    let glass = importer.mean_number(plugin, "spec_trans", 0.0)?.clamp(0.0, 1.0);
-    let specular = plugin.float("specular")?.unwrap_or(0.5).max(0.0);
+    let mut share = |key: &str, default: f64| -> Result<f64> {
+        let value = importer.mean_number(plugin, key, default)?;
+        Ok(importer.scene.report.within(plugin.place(), &format!("`{key}` of a principled BSDF"), value, [0.0, 1.0]))
+    };
+    let (roughness, metallic, glass) = (share("roughness", 0.5)?, share("metallic", 0.0)?, share("spec_trans", 0.0)?);
+    let specular = plugin.float("specular")?.unwrap_or(0.5);
+    let specular =
+        importer.scene.report.within(plugin.place(), "`specular` of a principled BSDF", specular, [0.0, f64::MAX]);
     let eta = match plugin.float("eta")? {
         Some(eta) => eta,
         // Burley 2015: the reflectance at normal incidence is 0.08 specular.
         None => surfaces::index_of(0.08 * specular),
     };
-    let eta = eta.clamp(1.0, 1000.0);
+    let eta = importer.scene.report.within(plugin.place(), "`eta` of a principled BSDF", eta, [1.0, 1000.0]);
     for key in ["anisotropic", "sheen", "clearcoat", "flatness", "spec_tint"] {
         if importer.mean_number(plugin, key, 0.0)? != 0.0 {
             importer.scene.report.left_out(plugin.place(), format!("`{key}` of a principled BSDF"));

@@ -52,8 +52,10 @@ impl Importer<'_> {
                 self.scene.lights.push(Section::new("[[lights]]").with("point", value));
             }
             "spot" => {
-                let half = parameters.number("coneangle")?.unwrap_or(30.0).clamp(1e-3, 180.0);
-                let falloff = (half - parameters.number("conedeltaangle")?.unwrap_or(5.0)).clamp(0.0, half);
+                let half = parameters.number("coneangle")?.unwrap_or(30.0);
+                let half = self.scene.report.within(at.place(), "`coneangle`", half, [1e-3, 180.0]);
+                let edge = parameters.number("conedeltaangle")?.unwrap_or(5.0);
+                let falloff = half - self.scene.report.within(at.place(), "`conedeltaangle`", edge, [0.0, half]);
                 let (start, end) = (falloff.to_radians().cos(), half.to_radians().cos());
                 let scale =
                     self.photometric(parameters, "power", "I", 2.0 * pi * (1.0 - start + 0.5 * (start - end)))?;

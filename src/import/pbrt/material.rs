@@ -115,11 +115,10 @@ impl Importer<'_> {
             |key: &str| -> Result<f64> { Ok(self.mean_number(parameters, &format!("{prefix}{key}"))?.unwrap_or(both)) };
         let pair = [of("uroughness")?, of("vroughness")?];
         let remap = parameters.boolean("remaproughness", true)?;
-        let pair = pair.map(|roughness| if remap { roughness.max(0.0).sqrt() } else { roughness.max(0.0) });
-        if pair.iter().any(|alpha| *alpha > 1.0) {
-            self.scene.report.approximated(at.place(), "an alpha above 1 as 1");
-        }
-        Ok(pair.map(|alpha| alpha.min(1.0)))
+        Ok(pair.map(|roughness| {
+            let roughness = self.scene.report.within(at.place(), "a roughness", roughness, [0.0, 1.0]);
+            if remap { roughness.sqrt() } else { roughness }
+        }))
     }
 
     fn one_roughness(&mut self, section: &mut Section, prefix: &str, parameters: &Parameters, at: &At) -> Result<()> {

@@ -19,6 +19,7 @@ use super::picture::Colour;
 use super::scene::{Scene, Section};
 use super::text;
 use crate::error::Problem;
+use crate::scene::MAX_BOUNCES;
 use crate::{Error, Result};
 
 /// Shapes that instances may become, and files that a scene may be made of.
@@ -537,7 +538,8 @@ impl Importer<'_> {
         if !["path", "volpath", "bdpt", "mlt", "sppm", "simplepath", "simplevolpath"].contains(&kind) {
             self.scene.report.approximated(at.place(), format!("the integrator `{}` as a path tracer", shown(kind)));
         }
-        let depth = parameters.number("maxdepth")?.unwrap_or(5.0).clamp(0.0, 16_383.0);
+        let depth = parameters.number("maxdepth")?.unwrap_or(5.0);
+        let depth = self.scene.report.within(at.place(), "`maxdepth`", depth, [0.0, f64::from(MAX_BOUNCES)]);
         parameters.ask_for_all();
         self.scene.report.translated(format!("Integrator `{}`", shown(kind)), at.place());
         self.scene.integrator = Some(Section::new("[integrator]").with("max_bounces", (depth as u32).to_string()));

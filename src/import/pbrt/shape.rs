@@ -162,7 +162,8 @@ impl Importer<'_> {
             "trianglemesh" => triangles(parameters, at)?,
             "bilinearmesh" => self.patches(parameters, at)?,
             "loopsubdiv" => {
-                let levels = parameters.number("levels")?.unwrap_or(3.0).clamp(0.0, 10.0) as u32;
+                let levels = parameters.number("levels")?.unwrap_or(3.0);
+                let levels = self.scene.report.within(at.place(), "`levels`", levels, [0.0, 10.0]) as u32;
                 parameters.get("scheme");
                 let base = triangles(parameters, at)?;
                 self.scene.report.approximated(
