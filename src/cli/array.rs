@@ -121,7 +121,7 @@ pub fn task(args: &Args, output: &Output) -> Result<()> {
         error => error,
     };
     // So that whoever looks at the cube sees why nothing comes of these tiles.
-    let mut run = Run { started_s: began, ..Run::begin(&tiles, Some(job.samples)) };
+    let mut run = Run { started_s: began, ..Run::begin(&tiles, Some(job.samples), job.tile_error) };
     run.end(Err(&error));
     if let Err(unwritten) = RunFile::create(&args.cube, run) {
         say(&format!("warning: {unwritten}"));
@@ -167,7 +167,12 @@ fn render(cube: &Path, job: &Job, number: u32, interrupt: &std::sync::Arc<Interr
         tile: job.tile,
         uncertainty: job.uncertainty,
         layers: job.layers.clone(),
-        stop: StopRule { samples: Some(job.samples), ..StopRule::default() },
+        stop: StopRule {
+            samples: Some(job.samples),
+            time: None,
+            error: job.tile_error,
+            per_tile: job.tile_error.is_some(),
+        },
         preview: None,
         profile: false,
         devices,
@@ -208,7 +213,7 @@ pub fn end(args: &Args) -> Result<()> {
     let work = Work::of(&cube, &samples, Some(job.samples))?;
     let verified = cube.verify()?;
     let mut wanted: BTreeSet<u32> = verified.tiles.iter().copied().collect();
-    wanted.extend((0..).zip(&samples).filter(|(_, n)| **n < job.samples).map(|(tile, _)| tile));
+    wanted.extend(cube.unfinished(job.samples, job.tile_error)?);
     let last = arrays.last().copied();
     let tasks = slurm::array_spec(&job.tasks_of(wanted.iter().copied()));
     let verdict = if wanted.is_empty() && verified.damage.is_empty() {
@@ -269,7 +274,8 @@ fn summarise(cube: &Path, job: &Job, work: &Work, verified: &Verification, wante
         "result",
         match verdict {
             Verdict::Complete => {
-                format!("complete: {all} tiles of {} samples per pixel, every checksum is right", job.samples)
+                let until = job.tile_error.map_or_else(String::new, |error| format!(", or errors of {error}"));
+                format!("complete: {all} tiles of {} samples per pixel{until}, every checksum is right", job.samples)
             }
             Verdict::Again { .. } => {
                 format!("{wanted} of {all} tiles are missing or damaged; they are submitted again")
@@ -341,7 +347,7 @@ mod tests {
 
     fn run(node: &str, state: RunState, units: u64) -> Run {
         let slurm = SlurmTask { array: Some(12), task: Some(0), job: 13, restarts: 0 };
-        Run { node: node.into(), state, units, slurm: Some(slurm), ..Run::begin(&(0..4), Some(64)) }
+        Run { node: node.into(), state, units, slurm: Some(slurm), ..Run::begin(&(0..4), Some(64), None) }
     }
 
     /// Black holes, nodes where every task fails at once, are left out; a mistake that every node shares ends it.

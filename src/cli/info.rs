@@ -219,7 +219,7 @@ impl Found {
         if !progress.missing.is_empty() && progress.tiles_started > 0 {
             row("missing tiles", list(&progress.missing));
         }
-        if !progress.behind.is_empty() {
+        if !progress.behind.is_empty() && !self.work.has_own_ends() {
             row("tiles behind", list(&progress.behind));
         }
         if !self.lost.is_empty() {

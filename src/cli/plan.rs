@@ -95,7 +95,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         false => (Arc::new(prepared), None),
         true if gpus.is_empty() => return Err(Error::NoDevice("--pilot follows paths, and there is no device".into())),
         true => {
-            let pilot = Pilot {
+            let mut pilot = Pilot {
                 scene: &scene,
                 gpus: &mut gpus,
                 memory: args.memory,

@@ -139,6 +139,7 @@ impl<'a> Reporter<'a> {
                 "size": [width, height], "channels": channels, "tile": tile, "disk_bytes": disk,
                 "tiles": job.tiles.as_ref().map(|tiles| [tiles.start, tiles.end]), "samples_asked": job.stop.samples, "samples_limit": samples_limit,
                 "time_limit_s": job.stop.time.map(|t| t.as_secs_f64()), "error_limit": job.stop.error,
+                "error_per": job.stop.error.map(|_| if job.stop.per_tile { "tile" } else { "image" }),
             }),
         )
     }
@@ -188,7 +189,10 @@ impl<'a> Reporter<'a> {
     /// How far the current epoch is.
     fn describe_epoch(&self, status: &Status) -> String {
         let (done, all) = status.units;
-        format!("{done}/{all} units of {}", self.describe(status, status.samples_next))
+        match status.tiles {
+            Some(_) => self.describe(status, status.samples),
+            None => format!("{done}/{all} units of {}", self.describe(status, status.samples_next)),
+        }
     }
 
     fn describe(&self, status: &Status, samples: u32) -> String {
@@ -197,6 +201,9 @@ impl<'a> Reporter<'a> {
         if let Some(error) = status.error_estimate {
             let rough = if status.samples / self.epoch < ROUGH_BELOW { " (rough)" } else { "" };
             text += &format!("  error {:.2} %{rough}", 100.0 * error);
+        }
+        if let Some(ends) = status.tiles {
+            text += &format!("  {}", ends.describe());
         }
         if let Some(left) = status.remaining.filter(|left| !left.is_zero()) {
             text += &format!("  {} left", short(left));
@@ -237,12 +244,16 @@ impl<'a> Reporter<'a> {
             return Ok(());
         }
         let mut text = format!(
-            "{}: {} samples/pixel in {}, {} paths\n",
+            "{}: {}{} samples/pixel in {}, {} paths\n",
             job.output.display(),
+            if status.tiles.is_some() { "at least " } else { "" },
             status.samples,
             short(status.elapsed),
             HumanCount(status.paths)
         );
+        if let Some(ends) = &status.tiles {
+            text += &format!("--error-per tile: {}\n", ends.describe());
+        }
         if let Some((samples, seconds)) = summary.too_long {
             let about = short(Duration::from_secs_f64(seconds));
             text += &format!("--time: the next {samples} samples/pixel, of about {about}, do not fit any more\n");
@@ -314,6 +325,7 @@ fn fields(status: &Status) -> Value {
         "paths_per_s": status.paths as f64 / status.rendering_s.max(1e-9),
         "rays": status.rays,
         "error_estimate": status.error_estimate,
+        "tile_ends": status.tiles.map(|ends| ends.facts()),
         "remaining_s": status.remaining.map(|d| d.as_secs_f64()),
         "devices": devices.collect::<Vec<_>>(),
     })

@@ -65,6 +65,15 @@ pub struct Args {
     #[arg(long, value_name = "E", value_parser = parse_error)]
     pub error: Option<f64>,
 
+    /// What --error is the error of: the whole image, or each tile by itself
+    ///
+    /// `tile`: each tile ends where its own error is at most E in every channel, so that quiet tiles cost little and noisy ones get the
+    /// samples; the others go on. It is looked at after 8, 10, 12, 14, 16, 20, 24, 28, 32, 40 … epochs, and must hold at two looks in a
+    /// row. A tile darker than a tenth of the picture's mean (as a few samples tell it) is held to that. With --spp a tile ends there
+    /// at the latest. Which tile gets how many samples follows from its own values alone, and stands in the array `samples`.
+    #[arg(long, value_name = "image|tile", value_enum, default_value = "image", requires = "error")]
+    pub error_per: ErrorOf,
+
     /// Store the standard error of every pixel and channel too
     ///
     /// In a second array, `standard_error`, from the spread of the epochs of 64 samples (or of integrator.epoch): it needs two,
@@ -121,8 +130,8 @@ pub struct Args {
     /// Several processes, also on several machines with a shared file system, may render disjoint tiles of one cube: the
     /// first makes it, the others join, and nothing has to be put together at the end. A tile that another process works
     /// on is refused, one that is finished is left as it is. `spectile info` lists the tiles that are missing. The limit
-    /// is --spp, since --time and --error would end the tiles at different samples.
-    #[arg(long, value_name = "A..B", value_parser = parse_tiles, conflicts_with_all = ["time", "error", "overwrite"])]
+    /// is --spp, or --error with --error-per tile: nobody sees the whole picture.
+    #[arg(long, value_name = "A..B", value_parser = parse_tiles, conflicts_with_all = ["time", "overwrite"])]
     pub tiles: Option<std::ops::Range<u32>>,
 
     #[command(flatten)]
@@ -194,7 +203,18 @@ pub struct Args {
     pub quiet: bool,
 }
 
+/// What an error is one of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum ErrorOf {
+    Image,
+    Tile,
+}
+
 pub fn run(args: &Args, output: &Output) -> Result<()> {
+    if args.tiles.is_some() && args.error.is_some() && args.error_per == ErrorOf::Image {
+        let what = "--tiles goes with --error only where each tile has its own end: add --error-per tile";
+        return Err(Error::Usage(what.into()));
+    }
     if args.exposure.is_some() && args.preview.is_none() && args.listen.is_none() {
         return Err(Error::Usage("--exposure is that of --preview or --listen, and neither is there".into()));
     }
@@ -225,7 +245,12 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         tiles: args.tiles.clone(),
         seed: args.seed,
         tile: args.scene.tile,
-        stop: StopRule { samples: args.spp, time: args.time, error: args.error },
+        stop: StopRule {
+            samples: args.spp,
+            time: args.time,
+            error: args.error,
+            per_tile: args.error_per == ErrorOf::Tile,
+        },
         uncertainty: args.uncertainty,
         layers: args.layers.clone(),
         preview: args.preview.clone().map(|file| Preview { file, exposure: args.exposure }),
@@ -274,7 +299,7 @@ pub(super) fn parse_layer(text: &str) -> std::result::Result<Layer, String> {
 }
 
 /// An error estimate to reach.
-fn parse_error(text: &str) -> std::result::Result<f64, String> {
+pub(super) fn parse_error(text: &str) -> std::result::Result<f64, String> {
     let error = text.parse::<f64>().ok().filter(|error| *error > 0.0 && error.is_finite());
     error.ok_or_else(|| "an error is a positive number, such as 0.01 for 1 %".into())
 }

@@ -8,6 +8,7 @@ use serde_json::json;
 
 use super::Output;
 use super::output::say;
+use super::render::ErrorOf;
 use super::scene::SceneArgs;
 use crate::cube::{Cube, Existing, Header, Layer, check_target, make, now_s};
 use crate::device::prepared::Prepared;
@@ -47,6 +48,14 @@ pub struct Args {
     /// Samples per pixel, rounded up as by `render`
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub spp: u32,
+
+    /// End each tile where its own error is at most E in every channel, at --spp at the latest; with --error-per tile, as for `render`
+    #[arg(long, value_name = "E", value_parser = super::render::parse_error, requires = "error_per")]
+    pub error: Option<f64>,
+
+    /// What --error is the error of: a task sees its own tiles only
+    #[arg(long, value_name = "tile", value_enum, requires = "error")]
+    pub error_per: Option<ErrorOf>,
 
     /// Seed of all random numbers, as for `render`
     #[arg(long, value_name = "N", default_value_t = 0)]
@@ -189,6 +198,10 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     let mut header = plan::header(&scene, tile, args.seed, args.uncertainty, &args.layers)?;
     plan::record_evaluator(&mut header, plan::evaluator(&scene, None, args.gpus_per_task == 0)?);
     header.validate().map_err(Error::Usage)?;
+    if args.error_per == Some(ErrorOf::Image) {
+        let what = "--error-per image: a task sees its own tiles only; take --error-per tile";
+        return Err(Error::Usage(what.into()));
+    }
     let existing = match args.overwrite {
         true => Existing::Replace,
         false if args.resume => Existing::Resume,
@@ -217,6 +230,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         memory: args.memory,
         allow_software: args.allow_software || args.gpus_per_task == 0,
         samples,
+        tile_error: args.error,
         tiles,
         tasks: tasks(args, &header, samples)?,
         request: Request {
@@ -231,7 +245,8 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     let wanted = if args.resume && cube.exists() { lacking(&job, &cube)? } else { (0..job.tasks).collect() };
     if wanted.is_empty() {
         output.event("done", facts(&job, &cube, "", None, args.dry_run))?;
-        let all = format!("all {tiles} tiles have {samples} samples per pixel");
+        let or = args.error.map_or_else(String::new, |error| format!(", or errors of at most {error}"));
+        let all = format!("all {tiles} tiles have {samples} samples per pixel{or}");
         return output.text(&format!("{}: {all}; there is nothing to submit\n", cube.display()));
     }
     let tasks = slurm::array_spec(&wanted);
@@ -288,9 +303,7 @@ fn refuse_while_at_work(cube: &Path) -> Result<()> {
 
 /// Tasks with tiles that lack samples.
 fn lacking(job: &Job, cube: &Path) -> Result<Vec<u32>> {
-    let samples = Cube::open(cube)?.all_samples()?;
-    let lacking = (0..).zip(samples).filter(|(_, n)| *n < job.samples).map(|(tile, _)| tile);
-    Ok(job.tasks_of(lacking))
+    Ok(job.tasks_of(Cube::open(cube)?.unfinished(job.samples, job.tile_error)?))
 }
 
 struct Submission {

@@ -57,6 +57,11 @@ impl TileStates {
         Ok(TileStates { work, job, queue })
     }
 
+    /// Whether tiles end by their own errors, so that their samples differ.
+    pub fn has_own_ends(&self) -> bool {
+        self.work.goal.is_some()
+    }
+
     pub fn is_done(&self) -> bool {
         self.work.is_done()
     }
@@ -87,7 +92,24 @@ impl TileStates {
     /// Name and value of every line.
     pub fn rows(&self) -> Vec<(&'static str, String)> {
         let (work, mut rows) = (&self.work, Vec::new());
-        let Some(target) = work.target else { return rows };
+        if let Some(goal) = work.goal {
+            let mut text = format!("{} of {} are within {:.3} %", work.exact, work.stands.len(), 100.0 * goal);
+            if let Some(worst) = work.worst {
+                let full = work.count(is_done).saturating_sub(work.exact);
+                text += &format!(", {full} ended by their samples; the worst has ");
+                text += &if worst.is_finite() {
+                    format!("{:.3} %", 100.0 * worst)
+                } else {
+                    "not been looked at".to_owned()
+                };
+            }
+            rows.push(("tile errors", text));
+        }
+        let whole = match (work.target, work.goal) {
+            (None, None) => return rows,
+            (Some(target), None) => format!("tiles have {target} samples per pixel"),
+            (_, Some(_)) => "tiles".to_owned(),
+        };
         let done = work.count(is_done);
         let mut by: Vec<String> = self.done_by().into_iter().map(|(node, tiles)| format!("{node} {tiles}")).collect();
         if by.len() > SHOWN {
@@ -96,7 +118,7 @@ impl TileStates {
             by.push(format!("and {more} more nodes"));
         }
         let by = if by.is_empty() { String::new() } else { format!(": {}", by.join(", ")) };
-        rows.push(("done", format!("{done} of {} tiles have {target} samples per pixel{by}", work.stands.len())));
+        rows.push(("done", format!("{done} of {} {whole}{by}", work.stands.len())));
         let with_whom = |name, such: fn(Stand) -> bool, rows: &mut Vec<_>| {
             let ranges = work.ranges(such);
             for (tiles, stand) in ranges.iter().take(SHOWN) {
@@ -178,6 +200,9 @@ impl TileStates {
         let submitted = self.job.as_ref().and_then(|job| job.submitted.last());
         json!({
             "samples_wanted": work.target,
+            "tile_error_wanted": work.goal,
+            "tiles_exact": work.goal.map(|_| work.exact),
+            "worst_tile_error": work.worst.filter(|worst| worst.is_finite()),
             "tiles": work.stands.len(),
             "tiles_done": work.count(is_done),
             "done": ranges(is_done),

@@ -5,12 +5,14 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::Path;
 
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::store::{Cube, PRIVATE};
 use crate::{Error, Result, files};
 
-const FILE: &str = "choices.json";
+const CHOICES: &str = "choices.json";
+const BRIGHTNESS: &str = "brightness.json";
 
 /// Written once, in `.spectile/choices.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -93,42 +95,83 @@ impl Choices {
 
     /// Those of the cube at `path`, if it has any.
     pub fn read(path: &Path) -> Result<Option<Choices>> {
-        let file = path.join(PRIVATE).join(FILE);
-        let text = match fs::read(&file) {
-            Ok(text) => text,
-            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
-            Err(error) => return Err(Error::storage(&file, format!("cannot be read: {error}"))),
-        };
-        let what = "is damaged: render the scene into a new cube, or put the file back";
-        serde_json::from_slice(&text).map(Some).map_err(|error| Error::storage(&file, format!("{what} ({error})")))
+        read(path, CHOICES)
     }
 
     /// Writes them into the cube, unless it has some: those that it has then.
     pub fn record(self, cube: &Cube) -> Result<Choices> {
-        let file = cube.private().join(FILE);
-        let aside = files::sibling(&file, "creating");
-        let failed = |error: std::io::Error| Error::storage(&file, format!("cannot be written: {error}"));
-        let text = serde_json::to_string(&self).expect("plain values");
-        files::write_durably(&aside, text.as_bytes()).map_err(failed)?;
-        // The first one stays, whole: a link fails where there is something.
-        let linked = fs::hard_link(&aside, &file);
-        let _ = fs::remove_file(&aside);
-        match linked {
-            Ok(()) => {
-                files::sync_folder(files::parent(&file)).map_err(failed)?;
-                Ok(self)
+        record(self, cube, CHOICES)
+    }
+}
+
+/// How bright the picture is, as far as a few samples tell: what the errors of its tiles are measured by.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Brightness {
+    /// In every channel of the cube, W m⁻² sr⁻¹ nm⁻¹ (or what its channels integrate).
+    pub mean_radiance: Vec<f64>,
+    /// All pixels together.
+    pub samples: u32,
+}
+
+impl Brightness {
+    /// That of the cube at `path`, if somebody has noted it.
+    pub fn read(path: &Path) -> Result<Option<Brightness>> {
+        read(path, BRIGHTNESS)
+    }
+
+    /// Writes it into the cube, unless it has one: that one then.
+    pub(super) fn record(self, cube: &Cube) -> Result<Brightness> {
+        record(self, cube, BRIGHTNESS)?.checked(cube)
+    }
+
+    /// The same, of as many channels as the cube has.
+    pub(super) fn checked(self, cube: &Cube) -> Result<Brightness> {
+        let (told, channels) = (self.mean_radiance.len(), cube.channels().len());
+        if told == channels && self.mean_radiance.iter().all(|mean| mean.is_finite()) {
+            return Ok(self);
+        }
+        let what = format!("tells the brightness of {told} channels where the cube has {channels}: put the file back");
+        Err(Error::storage(&cube.private().join(BRIGHTNESS), what))
+    }
+}
+
+fn read<T: DeserializeOwned>(path: &Path, name: &str) -> Result<Option<T>> {
+    let file = path.join(PRIVATE).join(name);
+    let text = match fs::read(&file) {
+        Ok(text) => text,
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(Error::storage(&file, format!("cannot be read: {error}"))),
+    };
+    let what = "is damaged: render the scene into a new cube, or put the file back";
+    serde_json::from_slice(&text).map(Some).map_err(|error| Error::storage(&file, format!("{what} ({error})")))
+}
+
+/// Writes `value` into the cube under `name`, unless there is something, which it gives then.
+fn record<T: Serialize + DeserializeOwned>(value: T, cube: &Cube, name: &str) -> Result<T> {
+    let file = cube.private().join(name);
+    let aside = files::sibling(&file, "creating");
+    let failed = |error: std::io::Error| Error::storage(&file, format!("cannot be written: {error}"));
+    let text = serde_json::to_string(&value).expect("plain values");
+    files::write_durably(&aside, text.as_bytes()).map_err(failed)?;
+    // The first one stays, whole: a link fails where there is something.
+    let linked = fs::hard_link(&aside, &file);
+    let _ = fs::remove_file(&aside);
+    match linked {
+        Ok(()) => {
+            files::sync_folder(files::parent(&file)).map_err(failed)?;
+            Ok(value)
+        }
+        Err(error) if error.kind() == ErrorKind::AlreadyExists => {
+            read(cube.path(), name)?.ok_or_else(|| failed(ErrorKind::NotFound.into()))
+        }
+        // No links here: whoever of two is second replaces the first one's, which says the same where they are of one kind.
+        Err(_) => {
+            if let Some(there) = read(cube.path(), name)? {
+                return Ok(there);
             }
-            Err(error) if error.kind() == ErrorKind::AlreadyExists => {
-                Choices::read(cube.path())?.ok_or_else(|| failed(ErrorKind::NotFound.into()))
-            }
-            // No links here: whoever of two is second replaces the first one's, which says the same where they are of one kind.
-            Err(_) => {
-                if let Some(there) = Choices::read(cube.path())? {
-                    return Ok(there);
-                }
-                files::write_atomically(&file, text.as_bytes())?;
-                Ok(self)
-            }
+            files::write_atomically(&file, text.as_bytes())?;
+            Ok(value)
         }
     }
 }

@@ -294,7 +294,7 @@ fn is_cube_alone(path: &Path) -> std::result::Result<(), String> {
     let private = path.join(PRIVATE);
     if private.is_dir() {
         // What a process that was killed left aside begins with these names too.
-        let of_cube = ["cube.json", "lock", "journal", "choices.json", "aside", "slurm", "run-"];
+        let of_cube = ["cube.json", "lock", "journal", "choices.json", "brightness.json", "aside", "slurm", "run-"];
         only_holds(&private, |name| of_cube.iter().any(|known| name.trim_start_matches('.').starts_with(known)))?;
     }
     if let Some(name) = cube.foreign_attribute().map_err(|error| error.to_string())? {

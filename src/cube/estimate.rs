@@ -68,6 +68,62 @@ impl Totals {
     }
 }
 
+/// What tiles are held to that end by their own errors (`--error-per tile`): a tenth of the picture's mean, so that what is dark need
+/// not be as exact as what is bright.
+#[derive(Debug, Clone)]
+pub(super) struct Floor {
+    /// (0.1 L)² of the mean radiance L of each channel.
+    squares: Vec<f64>,
+}
+
+/// Of the picture's mean, below which no tile's mean is taken for its error.
+const LEAST_SHARE: f64 = 0.1;
+
+/// Full epochs at the first look.
+pub const FIRST_LOOK: u32 = 8;
+
+/// Whether the error of a tile is looked at after so many full epochs: 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, … Whoever looked after each
+/// would sooner or later stop where the mean, or its spread, happens to be low.
+fn is_look(epochs: u32) -> bool {
+    epochs >= FIRST_LOOK && epochs.is_multiple_of(between(epochs))
+}
+
+/// From one look to the next, from so many full epochs on.
+fn between(epochs: u32) -> u32 {
+    (1 << epochs.ilog2()) / 4
+}
+
+/// Full epochs at the first look after `epochs` of them.
+pub fn next_look(epochs: u32) -> u32 {
+    if epochs < FIRST_LOOK { FIRST_LOOK } else { (epochs / between(epochs) + 1).saturating_mul(between(epochs)) }
+}
+
+impl Floor {
+    /// For a picture of this mean radiance, W m⁻² sr⁻¹ nm⁻¹, in each channel.
+    pub fn of(mean_radiance: &[f64]) -> Floor {
+        Floor { squares: mean_radiance.iter().map(|mean| (LEAST_SHARE * mean).powi(2)).collect() }
+    }
+
+    /// The largest error of a channel of a tile of `pixels` pixels: sqrt(Σ variance of the mean / max(Σ mean², n (0.1 L)²)), sums over
+    /// its n pixels, by `epochs` full epochs, two at least.
+    fn error(&self, record: &Record, epochs: u32, pixels: u64) -> f32 {
+        let b = f64::from(epochs);
+        let of_channel = |((&spread, &square), floor): ((&f64, &f64), &f64)| {
+            let variance = spread.max(0.0) / (b * (b - 1.0));
+            let least = square.max(pixels as f64 * floor);
+            // All zero, in every epoch and in the picture: as converged as can be.
+            if variance <= 0.0 { 0.0 } else { (variance / least).sqrt() }
+        };
+        record.spread.iter().zip(&record.square).zip(&self.squares).map(of_channel).fold(0.0, f64::max) as f32
+    }
+
+    /// What was seen at the last two looks, `before` this record being what had been seen until then.
+    pub fn looks(&self, before: [f32; 2], record: &Record, epoch: u32, pixels: u64) -> [f32; 2] {
+        let epochs = record.samples / epoch;
+        if !is_look(epochs) { before } else { [before[1], self.error(record, epochs, pixels)] }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -79,10 +135,33 @@ mod tests {
             samples,
             epoch: 0,
             suffix: 0,
+            looks: [f32::INFINITY; 2],
             checksums: [0; TileArray::MOST],
             spread: vec![2.0, 0.0, 0.0],
             square: vec![9.0, 5.0, 0.0],
         }
+    }
+
+    #[test]
+    fn looks_grow_apart() {
+        let looks: Vec<u32> = (0..100).filter(|&epochs| is_look(epochs)).collect();
+        assert_eq!(looks, [8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, 64, 80, 96]);
+        for epochs in 0..96 {
+            assert_eq!(next_look(epochs), *looks.iter().find(|look| **look > epochs).expect("a look"));
+        }
+    }
+
+    #[test]
+    fn errors_of_tiles_have_a_floor() {
+        let record = |samples| Record { spread: vec![8.0, 0.0, 0.5], square: vec![16.0, 5.0, 0.0], ..record(samples) };
+        let looks = |mean: [f64; 3], samples| Floor::of(&mean).looks([0.5, 0.25], &record(samples), 64, 4);
+        // 8 / (8 x 7) over 16, in the first channel; over 4 (0.1 x 40)² = 64; and 0.5 / 56 over 4 (0.1 x 1)² in the third.
+        assert_eq!(looks([0.0, 0.0, 1e9], 512), [0.25, (1.0 / 7.0 / 16.0f64).sqrt() as f32]);
+        assert_eq!(looks([40.0, 0.0, 1e9], 512), [0.25, (1.0 / 7.0 / 64.0f64).sqrt() as f32]);
+        assert_eq!(looks([40.0, 0.0, 1.0], 512), [0.25, (0.5 / 56.0 / 0.04f64).sqrt() as f32]);
+        assert_eq!(looks([40.0, 0.0, 0.0], 512)[1], f32::INFINITY);
+        // Nobody looks in between.
+        assert_eq!(looks([40.0, 0.0, 1.0], 576), [0.5, 0.25]);
     }
 
     #[test]

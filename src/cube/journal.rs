@@ -1,6 +1,7 @@
 //! The journal of a tile: what its files must be, one fixed-size record for every commit.
 //!
-//! A record, little-endian: magic, tile, K, samples per pixel, index of the last epoch merged, suffix of the files aside,
+//! A record, little-endian: magic, tile, K, samples per pixel, index of the last epoch merged, suffix of the files aside, the tile's
+//! error at its last two looks (not in journals that older versions began, whose magic ends in 1),
 //! five 128-bit checksums (one per [`TileArray`], zero for one that the cube has not; in cubes with layers six more), per channel Σ M2 and Σ mean² for the error estimate, and the
 //! checksum of all that. Checksums are XXH3 (Y. Collet, xxHash), which finds damage and is no protection against intent.
 
@@ -13,15 +14,17 @@ use super::faults::step;
 use super::store::{Cube, TileArray};
 use crate::{Error, Result, files};
 
-const MAGIC: [u8; 8] = *b"SPTJRNL1";
-/// Up to the checksums.
+const MAGIC: [u8; 8] = *b"SPTJRNL2";
+/// Of records that say nothing of looks.
+const MAGIC_WITHOUT_LOOKS: [u8; 8] = *b"SPTJRNL1";
+/// Up to the looks.
 const HEAD_BYTES: usize = 32;
 /// A journal that is this long is written anew with its last record only, so that it stays small beside its tile.
 const MAX_RECORDS: u64 = 16;
 
 /// The most that a journal takes.
 pub(super) fn most_bytes(channels: usize, has_layers: bool) -> u64 {
-    MAX_RECORDS * Shape { channels, has_layers }.bytes() as u64
+    MAX_RECORDS * Shape { channels, has_layers, has_looks: true }.bytes() as u64
 }
 
 /// What decides how long a record is.
@@ -29,16 +32,26 @@ pub(super) fn most_bytes(channels: usize, has_layers: bool) -> u64 {
 struct Shape {
     channels: usize,
     has_layers: bool,
+    has_looks: bool,
 }
 
 impl Shape {
+    fn magic(self) -> [u8; 8] {
+        if self.has_looks { MAGIC } else { MAGIC_WITHOUT_LOOKS }
+    }
+
+    /// Where the checksums begin.
+    fn sums_at(self) -> usize {
+        HEAD_BYTES + if self.has_looks { 8 } else { 0 }
+    }
+
     /// Checksums of a record.
     fn files(self) -> usize {
         if self.has_layers { TileArray::MOST } else { TileArray::WITHOUT_LAYERS }
     }
 
     fn head_bytes(self) -> usize {
-        HEAD_BYTES + 16 * self.files()
+        self.sums_at() + 16 * self.files()
     }
 
     /// Bytes of a record.
@@ -57,6 +70,8 @@ pub(super) struct Record {
     pub epoch: u32,
     /// The name that the files had aside; no two commits have the same.
     pub suffix: u64,
+    /// The tile's error at the last look but one and at the last ([`super::estimate::Floor::error`]); infinite before there was one.
+    pub looks: [f32; 2],
     /// Of the tile's files, by [`TileArray::place`].
     pub checksums: [u128; TileArray::MOST],
     /// Per channel: Σ over pixels of Welford's M2 = Σ (epoch mean - mean)² over the epochs so far.
@@ -67,11 +82,14 @@ pub(super) struct Record {
 
 impl Record {
     fn encode(&self, shape: Shape) -> Vec<u8> {
-        let mut bytes = MAGIC.to_vec();
+        let mut bytes = shape.magic().to_vec();
         for word in [self.tile, self.square.len() as u32, self.samples, self.epoch] {
             bytes.extend(word.to_le_bytes());
         }
         bytes.extend(self.suffix.to_le_bytes());
+        if shape.has_looks {
+            bytes.extend(self.looks.iter().flat_map(|look| look.to_le_bytes()));
+        }
         self.checksums[..shape.files()].iter().for_each(|sum| bytes.extend(sum.to_le_bytes()));
         bytes.extend(self.spread.iter().chain(&self.square).flat_map(|v| v.to_le_bytes()));
         let checksum = checksums::of(&bytes);
@@ -85,7 +103,7 @@ impl Record {
         let (content, checksum) = bytes.split_last_chunk::<16>()?;
         let (head, sums) = content.split_at_checked(shape.head_bytes())?;
         let word = |at: usize| u32::from_le_bytes(head[at..at + 4].try_into().expect("four bytes"));
-        let valid = head[..8] == MAGIC
+        let valid = head[..8] == shape.magic()
             && word(8) == tile
             && word(12) as usize == channels
             && sums.len() == 16 * channels
@@ -93,7 +111,8 @@ impl Record {
         if !valid {
             return None;
         }
-        let sum_at = |i: usize| u128::from_le_bytes(head[32 + 16 * i..][..16].try_into().expect("sixteen bytes"));
+        let sum_at =
+            |i: usize| u128::from_le_bytes(head[shape.sums_at() + 16 * i..][..16].try_into().expect("sixteen bytes"));
         let mut spread: Vec<f64> = sums.as_chunks().0.iter().map(|b| f64::from_le_bytes(*b)).collect();
         let square = spread.split_off(channels);
         Some(Record {
@@ -101,6 +120,7 @@ impl Record {
             samples: word(16),
             epoch: word(20),
             suffix: u64::from_le_bytes(head[24..32].try_into().expect("eight bytes")),
+            looks: if shape.has_looks { [32, 36].map(|at| f32::from_bits(word(at))) } else { [f32::INFINITY; 2] },
             checksums: std::array::from_fn(|i| if i < shape.files() { sum_at(i) } else { 0 }),
             spread,
             square,
@@ -112,22 +132,35 @@ impl Record {
 pub(super) struct Journal {
     path: PathBuf,
     tile: u32,
+    /// Of the records that are written now.
     shape: Shape,
 }
 
 impl Journal {
     pub fn of(cube: &Cube, tile: u32) -> Journal {
         let path = cube.journal_folder().join(tile.to_string());
-        let shape = Shape { channels: cube.channels().len(), has_layers: !cube.layers().is_empty() };
+        let shape = Shape { channels: cube.channels().len(), has_layers: !cube.layers().is_empty(), has_looks: true };
         Journal { path, tile, shape }
+    }
+
+    /// Of the records of a file that begins so: all of it is of one shape.
+    fn shape_of(&self, beginning: &[u8]) -> Shape {
+        Shape { has_looks: !beginning.starts_with(&MAGIC_WITHOUT_LOOKS), ..self.shape }
+    }
+
+    /// The same of the file that is there.
+    fn shape_there(&self) -> io::Result<Shape> {
+        let mut beginning = Vec::new();
+        match File::open(&self.path) {
+            Ok(file) => file.take(MAGIC.len() as u64).read_to_end(&mut beginning)?,
+            Err(error) if error.kind() == ErrorKind::NotFound => 0,
+            Err(error) => return Err(error),
+        };
+        Ok(self.shape_of(&beginning))
     }
 
     fn failed(&self, error: io::Error) -> Error {
         Error::storage(&self.path, error)
-    }
-
-    fn decode(&self, bytes: &[u8]) -> Option<Record> {
-        Record::decode(bytes, self.tile, self.shape)
     }
 
     /// Every whole slot of the file, `None` where it is damaged, and whether the file ends with a whole valid record.
@@ -137,16 +170,18 @@ impl Journal {
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok((Vec::new(), true)),
             Err(error) => return Err(self.failed(error)),
         };
-        let slots = bytes.chunks_exact(self.shape.bytes());
+        let shape = self.shape_of(&bytes);
+        let slots = bytes.chunks_exact(shape.bytes());
         let whole = slots.remainder().is_empty();
-        let records: Vec<_> = slots.map(|slot| self.decode(slot)).collect();
+        let records: Vec<_> = slots.map(|slot| Record::decode(slot, self.tile, shape)).collect();
         let sound = whole && records.last().is_none_or(Option::is_some);
         Ok((records, sound))
     }
 
     /// The last valid record: the one with the most samples, since samples never decrease.
     pub fn last(&self) -> Result<Option<Record>> {
-        let size = self.shape.bytes() as u64;
+        let shape = self.shape_there().map_err(|error| self.failed(error))?;
+        let size = shape.bytes() as u64;
         let mut file = match File::open(&self.path) {
             Ok(file) => file,
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
@@ -159,7 +194,7 @@ impl Journal {
             for slot in (0..slots).rev() {
                 file.seek(SeekFrom::Start(slot * size))?;
                 file.read_exact(&mut bytes)?;
-                if let Some(record) = self.decode(&bytes) {
+                if let Some(record) = Record::decode(&bytes, self.tile, shape) {
                     return Ok(Some(record));
                 }
             }
@@ -175,7 +210,8 @@ impl Journal {
         let size = self.shape.bytes() as u64;
         let existed = self.path.exists();
         let length = if existed { fs::metadata(&self.path).map_err(|e| self.failed(e))?.len() } else { 0 };
-        if length >= MAX_RECORDS * size {
+        let is_older = self.shape_there().map_err(|e| self.failed(e))? != self.shape;
+        if is_older || length >= MAX_RECORDS * size {
             let last = self.last()?.map(|last| last.encode(self.shape)).unwrap_or_default();
             return self.replace(&[last, record.encode(self.shape)].concat());
         }
@@ -218,8 +254,9 @@ impl Journal {
     pub fn cut(&self, records: &[Option<Record>]) -> Result<()> {
         let kept = records.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
         let cut = || -> io::Result<()> {
+            let size = self.shape_there()?.bytes();
             let file = OpenOptions::new().write(true).open(&self.path)?;
-            file.set_len((kept * self.shape.bytes()) as u64)?;
+            file.set_len((kept * size) as u64)?;
             step("journal cut")?;
             file.sync_all()
         };
@@ -259,7 +296,7 @@ impl Journal {
 mod tests {
     use super::*;
 
-    const SHAPE: Shape = Shape { channels: 3, has_layers: false };
+    const SHAPE: Shape = Shape { channels: 3, has_layers: false, has_looks: true };
 
     fn record(samples: u32) -> Record {
         Record {
@@ -267,6 +304,7 @@ mod tests {
             samples,
             epoch: 8,
             suffix: u64::from(samples) << 32 | 5,
+            looks: [0.25, f32::INFINITY],
             checksums: [1, 2 << 100, 3, u128::MAX, 0, 0, 0, 0, 0, 0, 0],
             spread: vec![0.5, -0.0, 1e300],
             square: vec![9.0, 5.0, 0.0],
@@ -286,6 +324,23 @@ mod tests {
             assert_eq!(Record::decode(&damaged, 7, SHAPE), None, "byte {i}");
             assert_eq!(Record::decode(&bytes[..i], 7, SHAPE), None, "cut at {i}");
         }
+    }
+
+    #[test]
+    fn journals_of_older_versions_are_read_and_written_anew() {
+        let folder = tempfile::tempdir().expect("folder");
+        let journal = Journal { path: folder.path().join("7"), tile: 7, shape: SHAPE };
+        let older = Shape { has_looks: false, ..SHAPE };
+        let unseen = |samples| Record { looks: [f32::INFINITY; 2], ..record(samples) };
+        let bytes = [record(64).encode(older), record(128).encode(older)].concat();
+        assert!(bytes.starts_with(b"SPTJRNL1") && bytes.len() == 2 * (SHAPE.bytes() - 8));
+        fs::write(&journal.path, [&bytes[..], &[1; 30]].concat()).expect("written");
+        let (records, sound) = journal.records().expect("read");
+        assert!(!sound && records == [Some(unseen(64)), Some(unseen(128))]);
+        journal.cut(&records).expect("cut");
+        assert_eq!(fs::read(&journal.path).expect("read"), bytes);
+        journal.append(&record(192), Some(unseen(128).suffix)).expect("appended");
+        assert_eq!(journal.records().expect("read"), (vec![Some(unseen(128)), Some(record(192))], true));
     }
 
     #[test]

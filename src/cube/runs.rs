@@ -47,6 +47,9 @@ pub struct Run {
     pub tiles: [u32; 2],
     /// Samples per pixel that it works towards.
     pub samples_limit: Option<u32>,
+    /// The error to which it works in each tile, where tiles have ends of their own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tile_error: Option<f64>,
     /// Units merged.
     pub units: u64,
     /// Unix times in seconds.
@@ -59,7 +62,7 @@ pub struct Run {
 
 impl Run {
     /// A run of this process that begins now.
-    pub fn begin(tiles: &Range<u32>, samples_limit: Option<u32>) -> Run {
+    pub fn begin(tiles: &Range<u32>, samples_limit: Option<u32>, tile_error: Option<f64>) -> Run {
         Run {
             state: RunState::Running,
             message: None,
@@ -69,6 +72,7 @@ impl Run {
             slurm: SlurmTask::of_this_process(),
             tiles: [tiles.start, tiles.end],
             samples_limit,
+            tile_error,
             units: 0,
             started_s: now_s(),
             ended_s: None,
@@ -164,6 +168,11 @@ impl RunFile {
 pub struct Work {
     /// Samples per pixel that a tile must have to be done; `None` where nobody has said.
     pub target: Option<u32>,
+    /// The error that makes it done before; `None` where nobody has asked for one.
+    pub goal: Option<f64>,
+    /// Tiles that are as exact as that, and the largest error of the others.
+    pub exact: usize,
+    pub worst: Option<f32>,
     pub runs: Vec<Run>,
     /// By tile.
     pub stands: Vec<Stand>,
@@ -186,10 +195,18 @@ impl Work {
     pub fn of(cube: &Cube, samples: &[u32], target: Option<u32>) -> Result<Work> {
         // Locks first: a run that ends meanwhile is then seen as one that still works, not as one that was lost.
         let held = cube.all_in_use();
-        Ok(Work::judge(samples, &held, cube.runs()?, target))
+        let runs = cube.runs()?;
+        let looks = if runs.iter().any(|run| run.tile_error.is_some()) { cube.all_looks()? } else { Vec::new() };
+        Ok(Work::judge(samples, &looks, &held, runs, target))
     }
 
-    fn judge(samples: &[u32], held: &[Range<u32>], runs: Vec<Run>, target: Option<u32>) -> Work {
+    /// `looks`: the errors of all tiles at their last two looks, where they are needed.
+    fn judge(samples: &[u32], looks: &[[f32; 2]], held: &[Range<u32>], runs: Vec<Run>, target: Option<u32>) -> Work {
+        let goal = runs.iter().filter_map(|run| run.tile_error).reduce(f64::min);
+        let is_within = |looks: &[f32; 2]| goal.is_some_and(|goal| looks.iter().all(|look| f64::from(*look) <= goal));
+        let is_exact = |tile: usize| looks.get(tile).is_some_and(is_within);
+        let worst = looks.iter().filter(|looks| !is_within(looks)).map(|looks| looks[1]).reduce(f32::max);
+        let exact = (0..samples.len()).filter(|tile| is_exact(*tile)).count();
         let target = target.or_else(|| runs.iter().filter_map(|run| run.samples_limit).max());
         // The last run by tile, and the last that merged anything there.
         let (mut last, mut worked) = (vec![None; samples.len()], vec![None; samples.len()]);
@@ -207,7 +224,8 @@ impl Work {
         }
         let stand = |(tile, &n): (usize, &u32)| match (target, last[tile]) {
             (Some(target), _) if n >= target => Stand::Done(worked[tile]),
-            (None, _) if n > 0 && !is_held[tile] => Stand::Done(worked[tile]),
+            _ if is_exact(tile) => Stand::Done(worked[tile]),
+            (None, _) if n > 0 && !is_held[tile] && goal.is_none() => Stand::Done(worked[tile]),
             (_, last) if is_held[tile] => {
                 let of_now = |i: &usize| runs[*i].state == RunState::Running && runs[*i].has(tile as u32);
                 Stand::Running(last.filter(of_now).or_else(|| (0..runs.len()).rev().find(of_now)))
@@ -216,7 +234,7 @@ impl Work {
             _ => Stand::Missing,
         };
         let stands = samples.iter().enumerate().map(stand).collect();
-        Work { target, runs, stands }
+        Work { target, goal, exact, worst, runs, stands }
     }
 
     /// Tiles that stand so, those that follow each other and stand alike together.
@@ -275,7 +293,7 @@ mod tests {
     use super::*;
 
     fn run(state: RunState, tiles: Range<u32>, units: u64) -> Run {
-        Run { state, units, ..Run::begin(&tiles, Some(64)) }
+        Run { state, units, ..Run::begin(&tiles, Some(64), None) }
     }
 
     #[test]
@@ -290,7 +308,7 @@ mod tests {
             run(RunState::Done, 0..3, 0),
         ];
         let samples = [64, 64, 16, 64, 64, 0, 0, 0, 32, 0];
-        let work = Work::judge(&samples, std::slice::from_ref(&(6..8)), runs.clone(), None);
+        let work = Work::judge(&samples, &[], std::slice::from_ref(&(6..8)), runs.clone(), None);
         let expected = [
             Stand::Done(Some(0)),
             Stand::Done(Some(0)),
@@ -307,13 +325,27 @@ mod tests {
         assert!(!work.is_done() && work.count(|s| matches!(s, Stand::Done(_))) == 4);
         let running = work.ranges(|stand| matches!(stand, Stand::Running(_)));
         assert_eq!(running, [(6..8, Stand::Running(Some(3)))]);
-        let more = Work::judge(&samples, &[], runs, Some(128));
+        let more = Work::judge(&samples, &[], &[], runs, Some(128));
         assert_eq!(more.count(|s| matches!(s, Stand::Done(_))), 0);
     }
 
     #[test]
+    fn tiles_with_ends_of_their_own_are_done_where_they_are_exact() {
+        let of = |limit, error| Run { state: RunState::Interrupted, units: 9, ..Run::begin(&(0..4), limit, error) };
+        let (samples, looks) =
+            ([640, 64, 512, 4096], [[0.02, 0.01], [f32::INFINITY; 2], [f32::INFINITY, 0.01], [0.09, 0.05]]);
+        let judge =
+            |limit| Work::judge(&samples, &looks, &[], vec![of(limit, Some(0.03)), of(limit, Some(0.02))], None);
+        let (done, missing) = (Stand::Done(Some(1)), Stand::Missing);
+        let work = judge(None);
+        assert_eq!((work.goal, work.exact, work.worst), (Some(0.02), 1, Some(f32::INFINITY)));
+        assert_eq!(work.stands, [done, missing, missing, missing]);
+        assert_eq!(judge(Some(4096)).stands, [done, missing, missing, done]);
+    }
+
+    #[test]
     fn runs_are_read_as_they_were_written() {
-        let mut run = Run::begin(&(3..7), None);
+        let mut run = Run::begin(&(3..7), None, None);
         run.facts.insert("merge_seconds".into(), serde_json::json!(1.5));
         run.end(Err(&Error::Interrupted { signal: 15 }));
         assert_eq!((run.state, run.exit_code, &run.message), (RunState::Interrupted, Some(143), &None));

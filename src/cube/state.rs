@@ -165,6 +165,22 @@ impl<'a> CubeState<'a> {
         Ok(there.then_some(spectrum))
     }
 
+    /// Samples per pixel of the pixels that share a block of `factor` x `factor` with `rect`: means; NaN where nothing is rendered.
+    pub fn sample_counts(&self, rect: Rect, factor: u32) -> Result<Window> {
+        let grid = self.cube.grid();
+        let mut sums = Sums::new(rect, factor, 1);
+        let all = sums.pixels(grid);
+        for tile in grid.tiles_in(all) {
+            let (Some(part), samples) = (grid.rect(tile).intersection(&all), self.samples(tile)?) else { continue };
+            if samples > 0 {
+                for (x, y) in (part.y0..part.y1).flat_map(|y| (part.x0..part.x1).map(move |x| (x, y))) {
+                    sums.add(x, y, 1, &[samples as f32]);
+                }
+            }
+        }
+        Ok(sums.means())
+    }
+
     /// Linear R, G, B as the preview shows them, in means of `factor` x `factor` pixels counted from the picture's top left;
     /// those that share pixels with `rect`. From 8 on, a multiple of 8, only `overview` is read.
     pub fn colour(&self, rect: Rect, factor: u32) -> Result<Window> {

@@ -5,13 +5,14 @@ use std::fs::{self, File};
 use std::io::Write;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::checksums::{self, Summing};
+use super::choices::Brightness;
 use super::create::{Existing, open_or_create, open_same};
 use super::epochs::epochs_in;
-use super::estimate::Totals;
+use super::estimate::{Floor, Totals};
 use super::faults::step;
 use super::journal::{Journal, Record};
 use super::layer::{Layer, TileLayers};
@@ -41,6 +42,8 @@ pub struct Writer {
     tiles: Range<u32>,
     /// Samples per pixel that each of `tiles` had when this writer came.
     found: Vec<u32>,
+    /// In cubes whose tiles have ends of their own.
+    floor: OnceLock<Floor>,
     state: Mutex<State>,
     changed: Condvar,
     /// Layers of tiles whose first unit is about to be merged.
@@ -58,6 +61,8 @@ struct State {
     committing: BTreeMap<u32, Arc<Pending>>,
     last_commit: Option<Instant>,
     totals: Totals,
+    /// Of each of the writer's tiles, [`Record::looks`].
+    looks: Vec<[f32; 2]>,
     /// A commit has failed; nothing more is merged.
     failed: Option<(PathBuf, String)>,
     closed: bool,
@@ -132,10 +137,11 @@ impl Writer {
         let cube = open_same(cube.path(), header)?;
         restore::restore(&cube)?;
         let mut totals = Totals::new(cube.channels().len(), cube.header().epoch);
-        let mut found = Vec::with_capacity(tiles.len());
+        let (mut found, mut looks) = (Vec::with_capacity(tiles.len()), Vec::with_capacity(tiles.len()));
         for record in recover::recover(&cube, tiles.clone(), warn)? {
             let record = record?;
             found.push(record.as_ref().map_or(0, |record| record.samples));
+            looks.push(record.as_ref().map_or([f32::INFINITY; 2], |record| record.looks));
             if let Some(record) = record {
                 totals.replace(None, &record);
             }
@@ -145,13 +151,20 @@ impl Writer {
             committing: BTreeMap::new(),
             last_commit: None,
             totals,
+            looks,
             failed: None,
             closed: false,
         };
+        let floor = OnceLock::new();
+        if let Some(brightness) = Brightness::read(cube.path())? {
+            let known = Floor::of(&brightness.checked(&cube)?.mean_radiance);
+            floor.get_or_init(|| known);
+        }
         Ok(Writer {
             cube,
             tiles,
             found,
+            floor,
             state: Mutex::new(state),
             changed: Condvar::new(),
             layers: Mutex::default(),
@@ -179,6 +192,21 @@ impl Writer {
     /// [`Cube::error_estimate`].
     pub fn error_estimate(&self) -> Vec<f64> {
         self.lock().totals.error_estimate()
+    }
+
+    /// Notes how bright the picture is, as far as a few samples tell, unless the cube knows it: from now on the errors of tiles are
+    /// looked at. Gives what it knows.
+    pub fn note_brightness(&self, brightness: Brightness) -> Result<Brightness> {
+        let known = brightness.record(&self.cube)?;
+        let floor = Floor::of(&known.mean_radiance);
+        self.floor.get_or_init(|| floor);
+        Ok(known)
+    }
+
+    /// The errors of a tile of this writer at the last two looks (docs/METHOD.md, Errors), units not committed yet included; infinite
+    /// before them.
+    pub fn looks(&self, tile: u32) -> [f32; 2] {
+        self.lock().looks[(tile - self.tiles.start) as usize]
     }
 
     /// Whether every value merged so far is zero.
@@ -250,6 +278,7 @@ impl Writer {
         let _held = self.merging[tile as usize % self.merging.len()].lock().unwrap_or_else(PoisonError::into_inner);
         let base = self.base(tile)?;
         let n_found = base.as_ref().map_or(0, |base| base.record().samples);
+        let base_looks = base.as_ref().map_or([f32::INFINITY; 2], |base| base.record().looks);
         if n_found != n_before {
             let what = format!(
                 "tile {tile} has {n_found} samples per pixel where {n_before} were expected: another process works on it"
@@ -277,6 +306,11 @@ impl Writer {
             Unit::Weights(unit) => (aside.write_weights(base.as_ref(), samples, n_unit, unit)?, Held::Weights),
         };
         record.checksums[TileArray::WITHOUT_LAYERS..].copy_from_slice(&layers);
+        record.looks = base_looks;
+        if let Some(floor) = self.floor.get() {
+            let pixels = cube.grid().rect(tile).pixels();
+            record.looks = floor.looks(record.looks, &record, cube.header().epoch, pixels);
+        }
         self.insert(aside, base, record, held);
         Ok(())
     }
@@ -327,6 +361,7 @@ impl Writer {
             (Some(base), _) => Some(base.record().suffix),
         };
         state.totals.replace(base.as_ref().map(Base::record), &record);
+        state.looks[(tile - self.tiles.start) as usize] = record.looks;
         state.open.insert(tile, Arc::new(Pending { record, previous, held }));
         drop(state);
         aside.keep();
@@ -557,6 +592,7 @@ impl<'a> Aside<'a> {
             samples,
             epoch: epochs_in(samples, cube.header().epoch).saturating_sub(1),
             suffix: self.suffix,
+            looks: [f32::INFINITY; 2],
             checksums: checksums_of([radiance, samples_sum, preview, overview, errors]),
             spread,
             square,
@@ -599,6 +635,7 @@ impl<'a> Aside<'a> {
             samples,
             epoch: epochs_in(samples, epoch).saturating_sub(1),
             suffix: self.suffix,
+            looks: [f32::INFINITY; 2],
             checksums: checksums_of([weights_sum, samples_sum, preview, overview, products_sum]),
             spread,
             square,

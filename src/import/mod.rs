@@ -34,6 +34,9 @@ pub const FOLDER: Product = Product {
     check: |_| Err("is there already".into()),
 };
 
+/// Bounces that scene files may ask for (docs/scene.md).
+const MOST_BOUNCES: f64 = 16_383.0;
+
 /// How many things of a scene became what.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Summary {

@@ -320,6 +320,7 @@ mod tests {
             elapsed: Duration::ZERO,
             rendering_s: f64::from(samples),
             error_estimate: Some(1.0 / f64::from(samples.max(1))),
+            tiles: None,
             remaining: None,
             devices: Vec::new(),
         }

@@ -12,7 +12,7 @@ pub mod web;
 
 pub use disk::follow;
 pub use feed::{Control, ErrorPoint, Feed, Progress, Snapshot, Source, Stage, Work};
-pub use status::{DeviceStatus, Status};
+pub use status::{DeviceStatus, Status, TileEnds};
 pub use tev::Tev;
 
 /// The picture of a render as a file, replaced in one step again and again.

@@ -20,13 +20,15 @@ pub const DEFAULT_SAMPLES_WITH_UNCERTAINTY: u32 = 512;
 /// Full epochs below which the error estimate is too rough to stop a render.
 pub const SURE_EPOCHS: u32 = 8;
 
-/// When to stop; the first that is reached does, at the end of an epoch of the whole image.
+/// When to stop; the first that is reached does, at the end of an epoch of the whole image, or each tile by itself.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct StopRule {
     pub samples: Option<u32>,
     pub time: Option<Duration>,
     /// The error estimate (docs/METHOD.md, Errors) that no channel is to exceed; asked once there are [`SURE_EPOCHS`].
     pub error: Option<f64>,
+    /// Whether each tile ends where its own estimate is there, or at `samples`.
+    pub per_tile: bool,
 }
 
 /// A picture of the cube that is kept up to date.
@@ -66,14 +68,19 @@ impl StopRule {
     /// The samples per pixel at which a render with full epochs of `full` samples stops; `None`: only time or error do.
     pub fn samples_limit(&self, full: u32, uncertainty: bool) -> Result<Option<u32>> {
         let wanted = match self {
-            StopRule { samples: None, time: None, error: None } if uncertainty => DEFAULT_SAMPLES_WITH_UNCERTAINTY,
-            StopRule { samples: None, time: None, error: None } => DEFAULT_SAMPLES,
+            StopRule { samples: None, time: None, error: None, .. } if uncertainty => DEFAULT_SAMPLES_WITH_UNCERTAINTY,
+            StopRule { samples: None, time: None, error: None, .. } => DEFAULT_SAMPLES,
             StopRule { samples: None, .. } => return Ok(None),
             StopRule { samples: Some(wanted), .. } => *wanted,
         };
         let too_many =
             || Error::Usage(format!("--spp {wanted}: the most that whole epochs make is {}", u32::MAX / full * full));
         whole_epochs(wanted, full).ok_or_else(too_many).map(Some)
+    }
+
+    /// The error at which each tile ends by itself.
+    pub fn tile_error(&self) -> Option<f64> {
+        self.error.filter(|_| self.per_tile)
     }
 
     /// Whether the number of samples alone decides where a render ends.

@@ -1,9 +1,12 @@
-//! Which unit comes next: tiles in order, epochs of a tile in order, a tile on one device at a time.
+//! Which unit comes next: tiles in order, or those first that are needed most; epochs of a tile in order, a tile on one device at a time.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::{Condvar, Mutex, MutexGuard};
 
 use crate::preview::Work;
+
+/// Units of other epochs that are passed over where some of one are taken together, at most.
+const PASSED_OVER: usize = 64;
 
 /// Units that a device takes together: those of some tiles in one epoch, or in all epochs from the first one on that are
 /// merged at once.
@@ -34,12 +37,14 @@ pub struct Queue {
 }
 
 struct State {
-    /// Units that may be taken, the lowest epochs first.
+    /// Units that may be taken, the lowest epochs first, or those of the most needed tiles.
     ready: VecDeque<(u32, u32)>,
-    /// Units of epochs that are not decided yet.
-    undecided: Vec<(u32, u32)>,
+    /// Tiles whose next epoch is not decided yet, and which one that is.
+    undecided: BTreeMap<u32, u32>,
     /// Epochs below this may be rendered.
     allowed: u32,
+    /// Of tiles that are decided by themselves: below which epoch they may be, and how much that is needed.
+    tiles: BTreeMap<u32, (u32, f32)>,
     /// Epochs that a new tile gets at once.
     together: u32,
     paused: bool,
@@ -52,6 +57,20 @@ struct State {
 }
 
 impl State {
+    /// Below which epoch a tile may be rendered.
+    fn limit(&self, tile: u32) -> u32 {
+        self.tiles.get(&tile).map_or(self.allowed, |decided| decided.0)
+    }
+
+    /// Lets units of tiles that are decided by themselves be taken: those needed most first, of others the lowest epochs.
+    fn insert(&mut self, unit: (u32, u32)) {
+        let order =
+            |&(epoch, tile): &(u32, u32)| (-self.tiles.get(&tile).map_or(0.0, |decided| decided.1), epoch, tile);
+        let own = order(&unit);
+        let place = self.ready.partition_point(|there| order(there) < own);
+        self.ready.insert(place, unit);
+    }
+
     /// Units that were taken and not merged come first again.
     fn put_back(&mut self, group: Group) {
         for tile in group.tiles.into_iter().rev() {
@@ -65,8 +84,9 @@ impl Default for Queue {
     fn default() -> Queue {
         let state = State {
             ready: VecDeque::new(),
-            undecided: Vec::new(),
+            undecided: BTreeMap::new(),
             allowed: 0,
+            tiles: BTreeMap::new(),
             together: 1,
             paused: false,
             closed: false,
@@ -84,7 +104,7 @@ impl Queue {
     pub fn fill(&self, tiles: impl IntoIterator<Item = (u32, u32)>, together: u32) {
         let mut state = self.state();
         state.together = together;
-        state.undecided.extend(tiles.into_iter().map(|(tile, epoch)| (epoch, tile)));
+        state.undecided.extend(tiles);
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
@@ -103,8 +123,17 @@ impl Queue {
         let Some(&(epoch, _)) = state.ready.front() else { return Next::Later };
         let epochs = if epoch == 0 { state.together } else { 1 };
         let at_once = at_once(epoch + epochs - 1).max(1);
-        let same = state.ready.iter().take(at_once).take_while(|unit| unit.0 == epoch).count();
-        let tiles = state.ready.drain(..same).map(|unit| unit.1).collect();
+        // Those of the same epoch, also behind a few others.
+        let (mut tiles, mut place) = (Vec::new(), 0);
+        while tiles.len() < at_once && place < state.ready.len().min(PASSED_OVER) {
+            match state.ready[place] {
+                (of, tile) if of == epoch => {
+                    state.ready.remove(place);
+                    tiles.push(tile);
+                }
+                _ => place += 1,
+            }
+        }
         state.attempts += 1;
         let group = Group { attempt: state.attempts, epoch, epochs, tiles };
         state.taken.insert(group.attempt, (device, group.clone()));
@@ -131,11 +160,12 @@ impl Queue {
     pub fn done(&self, group: &Group) {
         let mut state = self.state();
         let next = group.epoch + group.epochs;
-        let units = group.tiles.iter().map(|&tile| (next, tile));
-        if next < state.allowed {
-            state.ready.extend(units);
-        } else {
-            state.undecided.extend(units);
+        for &tile in &group.tiles {
+            match (next < state.limit(tile), state.tiles.contains_key(&tile)) {
+                (false, _) => drop(state.undecided.insert(tile, next)),
+                (true, false) => state.ready.push_back((next, tile)),
+                (true, true) => state.insert((next, tile)),
+            }
         }
         self.changed.notify_all();
     }
@@ -164,11 +194,22 @@ impl Queue {
     pub fn allow(&self, epochs: u32) {
         let mut state = self.state();
         state.allowed = epochs;
-        let (mut now, later): (Vec<_>, Vec<_>) = state.undecided.drain(..).partition(|unit| unit.0 < epochs);
+        let now = state.undecided.extract_if(.., |_, epoch| *epoch < epochs);
+        let mut now: Vec<(u32, u32)> = now.map(|(tile, epoch)| (epoch, tile)).collect();
         // Units of an epoch finish in any order, but are taken in the order of their tiles.
         now.sort_unstable();
         state.ready.extend(now);
-        state.undecided = later;
+        self.changed.notify_all();
+    }
+
+    /// Lets a tile be rendered up to `epoch`, without that one, whatever becomes of others; what is needed more comes first.
+    pub fn allow_tile(&self, tile: u32, epoch: u32, need: f32) {
+        let mut state = self.state();
+        state.tiles.insert(tile, (epoch, need));
+        if let Some(next) = state.undecided.get(&tile).copied().filter(|next| *next < epoch) {
+            state.undecided.remove(&tile);
+            state.insert((next, tile));
+        }
         self.changed.notify_all();
     }
 
@@ -278,6 +319,34 @@ mod tests {
         queue.close();
         queue.wait();
         assert_eq!(queue.next(0, |_| 1), Next::Never);
+    }
+
+    #[test]
+    fn tiles_may_be_decided_one_by_one() {
+        let queue = Queue::default();
+        queue.fill((0..4).map(|tile| (tile, 0)), 1);
+        for tile in 0..4 {
+            queue.allow_tile(tile, 2, f32::INFINITY);
+        }
+        let first = group(queue.next(0, |_| 3));
+        assert_eq!((first.epoch, &first.tiles[..]), (0, &[0, 1, 2][..]));
+        queue.done(&first);
+        // The lowest epochs first, where all are needed as much.
+        let [last, second] = [0, 0].map(|device| group(queue.next(device, |_| 9)));
+        assert_eq!((last.epoch, &last.tiles[..], second.epoch, &second.tiles[..]), (0, &[3][..], 1, &[0, 1, 2][..]));
+        queue.done(&last);
+        queue.done(&second);
+        assert_eq!(units(queue.next(0, |_| 9)), (1, vec![3]));
+        assert_eq!(queue.next(0, |_| 9), Next::Later);
+        // Tile 1 has ended. What is taken together is of one epoch.
+        queue.allow_tile(0, 9, 0.1);
+        queue.allow_tile(2, 9, 0.3);
+        let most = group(queue.next(0, |_| 1));
+        assert_eq!((most.epoch, &most.tiles[..]), (2, &[2][..]));
+        queue.done(&most);
+        assert_eq!(units(queue.next(0, |_| 2)), (3, vec![2]));
+        assert_eq!(units(queue.next(0, |_| 2)), (2, vec![0]));
+        assert_eq!(queue.next(0, |_| 9), Next::Later);
     }
 
     /// Tiles of which something is there already go on from there; only new ones get epochs together.

@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use crate::cube::{Choices, Header, check_target};
+use crate::cube::{Brightness, Choices, Header, check_target};
 use crate::device::prepared::Prepared;
 use crate::gpu::adapter::Gpu;
 use crate::render::interrupt::Interrupt;
@@ -29,6 +29,8 @@ pub(super) struct Ready {
     pub prepared: Arc<Prepared>,
     /// What the pilot chose.
     pub choices: Option<Choices>,
+    /// What it tells of the picture, where tiles have ends of their own.
+    pub brightness: Option<Brightness>,
 }
 
 /// Opens devices, and refuses and decides what can be before anything is written.
@@ -60,15 +62,20 @@ pub(super) fn get_ready(
     plan::record_evaluator(&mut header, evaluator);
     let prepared = Prepared::for_evaluator(&job.scene, job.seed, evaluator)?;
     refuse_too_little(job, &prepared, tile, &gpus)?;
-    let there = there.map(|_| Choices::read(&job.output)).transpose()?.flatten();
-    let pilot = Pilot {
+    let chosen = there.as_ref().map(|_| Choices::read(&job.output)).transpose()?.flatten();
+    let noted = there.as_ref().map(|_| Brightness::read(&job.output)).transpose()?.flatten();
+    let mut pilot = Pilot {
         scene: &job.scene,
         gpus: &mut gpus,
         memory: job.memory,
         interrupt,
         warn: &mut |what| observe(Event::Warning(what)),
     };
-    let (prepared, choices) = pilot.decide(prepared, there)?;
+    let (prepared, choices) = pilot.decide(prepared, chosen)?;
+    let brightness = match noted {
+        None if job.stop.per_tile => Some(pilot.brightness(&prepared)?),
+        noted => noted.filter(|_| job.stop.per_tile),
+    };
     let first = Arc::new(gpus.remove(0));
     let last_bounce = LastBounce::measure(&job.scene, &prepared, &first, job.memory, interrupt);
     gpus.insert(0, Arc::into_inner(first).ok_or_else(|| Error::Internal("a device was kept that was lent".into()))?);
@@ -86,7 +93,7 @@ pub(super) fn get_ready(
             format!("{} triangles without area in f32 were left out: no ray can meet them", prepared.accel.degenerate);
         observe(Event::Warning(what))?;
     }
-    Ok(Ready { header, tiles, samples_limit, gpus, software, evaluator, prepared, choices })
+    Ok(Ready { header, tiles, samples_limit, gpus, software, evaluator, prepared, choices, brightness })
 }
 
 /// Refuses memory that holds the waves of no device, before a pilot's smaller ones fill it.

@@ -1,5 +1,7 @@
 //! The render: epochs of the whole image, decided one after the other; devices that pull their units; what is known so far.
 
+mod by_tile;
+
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, OnceLock};
 use std::thread;
@@ -61,7 +63,7 @@ pub struct Summary {
 /// Renders `job` into a cube, new or gone on with. Errors leave the cube with every unit merged so far.
 pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event) -> Result<()>) -> Result<Summary> {
     let started = Instant::now();
-    let Ready { header, tiles, samples_limit, gpus, software, evaluator, prepared, choices } =
+    let Ready { header, tiles, samples_limit, gpus, software, evaluator, prepared, choices, brightness } =
         get_ready(job, interrupt, observe)?;
     let pool = Arc::new(Pool {
         prepared,
@@ -96,7 +98,10 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
             let what = "was made by another process that chose otherwise which paths are evaluated: run the same command again";
             return Err(Error::storage(opened.cube().path(), what));
         }
-        run = Some(RunFile::create(opened.cube().path(), Run::begin(&opened.tiles(), samples_limit))?);
+        if let Some(brightness) = brightness {
+            opened.note_brightness(brightness)?;
+        }
+        run = Some(RunFile::create(opened.cube().path(), Run::begin(&opened.tiles(), samples_limit, job.stop.tile_error()))?);
         let cube = pool.cube.get_or_init(|| opened);
         if let Some(feed) = &job.feed {
             let there = cube.tiles().zip(cube.found()).filter(|(_, samples)| **samples > 0).map(|(tile, _)| tile);
@@ -105,7 +110,10 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
         let commits = Arc::clone(&pool);
         // What goes wrong there is what the next unit, or the last commit, ends with.
         committer = Some(thread::spawn(move || commits.cube.get().map(Writer::commit_regularly)));
-        render.epochs(cube, &pool.queue, &mut reports, observe)
+        match job.stop.tile_error() {
+            Some(error) => render.tiles_by_error(error, cube, &pool.queue, &mut reports, observe),
+            None => render.epochs(cube, &pool.queue, &mut reports, observe),
+        }
     });
     // At the end nobody has a unit any more; after an error those under way are dropped.
     pool.queue.close();
@@ -147,6 +155,10 @@ pub fn run(job: &Job, interrupt: &Arc<Interrupt>, observe: &mut dyn FnMut(Event)
 fn no_cube() -> Error {
     Error::Internal("the render ended without a cube".into())
 }
+
+/// What is said where an error of 0 says nothing.
+const DARK: &str = "every value of the picture is 0, of which --error knows nothing: either no light reaches the camera, or it is too \
+    rare to have been met yet";
 
 struct Render<'a> {
     job: &'a Job,
@@ -217,6 +229,7 @@ impl<'a> Render<'a> {
                 elapsed: Duration::ZERO,
                 rendering_s: 0.0,
                 error_estimate: None,
+                tiles: None,
                 remaining: None,
                 devices,
             },
@@ -341,9 +354,7 @@ impl<'a> Render<'a> {
             let enough = self.samples_limit.is_some_and(|limit| self.status.samples >= limit);
             let is_accurate = self.is_accurate();
             if is_accurate && cube.is_dark() {
-                let what = "every value of the picture is 0, of which --error knows nothing: either no light reaches the \
-                            camera, or it is too rare to have been met yet";
-                observe(Event::Warning(what.into()))?;
+                observe(Event::Warning(DARK.into()))?;
             }
             if enough || is_accurate {
                 return Ok(());
@@ -454,6 +465,18 @@ impl<'a> Render<'a> {
         }
         self.merged.range_mut(epochs).for_each(|count| *count += merged.group.tiles.len() as u32);
         self.status.units.0 = self.merged[0];
+        self.note_group(cube, queue, device, merged, observe)
+    }
+
+    /// Counts a group of units and tells of it.
+    fn note_group(
+        &mut self,
+        cube: &Writer,
+        queue: &Queue,
+        device: usize,
+        merged: Merged,
+        observe: &mut dyn FnMut(Event) -> Result<()>,
+    ) -> Result<()> {
         self.count(&merged);
         self.update_clock();
         let (rendering_s, rested) = (self.status.rendering_s, self.rested().as_secs_f64());

@@ -24,7 +24,7 @@ use crate::error::{Error, Problem, Result};
 
 /// Evaluations walk all records of a path, two a bounce and one more, in one loop of at most 32,768 iterations,
 /// the most that every driver runs.
-pub const MAX_BOUNCES: u32 = 16_383;
+const MAX_BOUNCES: u32 = 16_383;
 const MAX_EPOCH: u32 = 1024;
 /// Of spectral MIS: the state of a path has a number for each.
 const MOST_TECHNIQUES: u32 = 16;

@@ -43,7 +43,7 @@ use serde::{Deserialize, Serialize};
 pub use assembly::box_around_all;
 pub use decode::join as dotted_key;
 pub use draft::Draft;
-pub use file::{MAX_BOUNCES, load, parse, read};
+pub use file::{load, parse, read};
 pub use integrator::{Evaluation, Evaluator, Integrator, MOST_WAVELENGTHS, Sampler, Wavelengths};
 pub use light::{Cone, Light, Profile};
 pub use transform::box_around;

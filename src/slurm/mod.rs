@@ -58,6 +58,9 @@ pub struct Job {
     pub allow_software: bool,
     /// Samples per pixel at which every tile is done, the end of an epoch.
     pub samples: u32,
+    /// The error of a tile at which it is done before.
+    #[serde(default)]
+    pub tile_error: Option<f64>,
     /// Tiles of the cube, and tasks that share them.
     pub tiles: u32,
     pub tasks: u32,
@@ -208,6 +211,7 @@ impl Job {
         let mut words = vec!["spectile".into(), "render".into(), quote(&self.scene.display().to_string()), "-o".into()];
         words.push(quote(&cube.display().to_string()));
         words.push(format!("--spp {}", self.samples));
+        words.extend(self.tile_error.map(|error| format!("--error {error} --error-per tile")));
         words.extend(self.overrides.iter().map(|(key, value)| format!("--set {}", quote(&format!("{key}={value}")))));
         words.extend(self.size.map(|[width, height]| format!("--size {width}x{height}")));
         words.extend(self.tile.map(|tile| format!("--tile {tile}")));
@@ -280,6 +284,7 @@ pub(crate) mod tests {
             memory: None,
             allow_software: false,
             samples: 256,
+            tile_error: None,
             tiles,
             tasks,
             request: Request {

@@ -222,14 +222,14 @@ fn layers_are_as_the_page_says() {
     let layers: Value = serde_json::from_str(group["attributes"]["layers"].as_str().expect("text")).expect("JSON");
     assert_eq!(layers["objects"], serde_json::json!(["objects.0", "objects.1"]));
     assert_eq!(layers.as_object().map(|all| all.len()), Some(3));
-    // 128 + 16 K without, and the last record of each tile.
+    // 136 + 16 K without, and the last record of each tile.
     let bytes = std::fs::read(path.join(".spectile/journal/1")).expect("a journal");
-    let size = 128 + 96 + 16 * 5;
+    let size = 136 + 96 + 16 * 5;
     assert!(bytes.len().is_multiple_of(size), "{}", bytes.len());
     let record = &bytes[bytes.len() - size..];
     for (i, row) in documented.iter().enumerate() {
         let file = code(&row[7]).replace("ROW", "0").replace("COLUMN", "1");
-        let sum = u128::from_le_bytes(record[112 + 16 * i..][..16].try_into().expect("sixteen bytes"));
+        let sum = u128::from_le_bytes(record[120 + 16 * i..][..16].try_into().expect("sixteen bytes"));
         assert_eq!(sum, xxh3_128(&std::fs::read(path.join(&file)).expect("a file")), "{file}");
     }
 }
@@ -471,7 +471,7 @@ fn journals_are_laid_out_as_the_page_says(cubes: &Cubes) {
         assert_eq!(pair[1].0, end, "{}", pair[1].2);
         end + pair[1].1
     });
-    let said = |bytes: usize| PAGE.contains("128 + 16 K bytes each") && bytes == 128 + 16 * K;
+    let said = |bytes: usize| PAGE.contains("136 + 16 K bytes each") && bytes == 136 + 16 * K;
     assert!(said(record_bytes));
     for name in ["plain", "uncertainty"] {
         let path = cubes.path(name);
@@ -486,7 +486,12 @@ fn journals_are_laid_out_as_the_page_says(cubes: &Cubes) {
                 &record[*from..from + length]
             };
             let word = |words: &str| u32::from_le_bytes(field(words).try_into().expect("four bytes"));
-            assert_eq!(field("`SPTJRNL1`"), b"SPTJRNL1");
+            assert_eq!(field("`SPTJRNL2`"), b"SPTJRNL2");
+            // Nobody has looked.
+            assert_eq!(
+                field("the tile's [error]"),
+                [f32::INFINITY.to_le_bytes(), f32::INFINITY.to_le_bytes()].concat()
+            );
             assert_eq!((word("TILE"), word("K"), word("samples per pixel")), (tile, K as u32, 128));
             // 1, 1, 2, 4, 8, 16, 32, and 64: the eighth has index 7.
             assert_eq!(word("index of the last [epoch]"), 7);

@@ -35,7 +35,7 @@ const download = async (act) => {
 const against_png = () => page.evaluate(async () => {
   const { picture } = window.spectile, { tone, show } = picture;
   const [square] = picture.inSight(picture.scales().base, [0, 0, ...picture.cube.size]), [x0, y0, x1, y1] = square.rect;
-  const shown = show.mode === "temperature" ? `low=${tone.low}&high=${tone.high}` : `ev=${tone.ev}`;
+  const shown = ["temperature", "samples"].includes(show.mode) ? `low=${tone.low}&high=${tone.high}` : `ev=${tone.ev}`;
   const url = `/api/image?${square.what}&x0=${x0}&y0=${y0}&x1=${x1}&y1=${y1}&scale=${square.scale}&${shown}`;
   const bitmap = await createImageBitmap(await (await fetch(url)).blob());
   const { width, height } = square.canvas, copy = new OffscreenCanvas(width, height).getContext("2d");
@@ -100,6 +100,15 @@ if (what === "heat") {
   seen.range = [await page.locator("#low").inputValue(), await page.locator("#high").inputValue()];
   seen.against_png = await against_png();
   await shot("heat");
+  // Where the effort went.
+  seen.samples = await change(() => page.keyboard.press("5"));
+  await browser.settled();
+  await page.mouse.move(...(await browser.at(Number(x) + 1, Number(y))));
+  await page.waitForFunction(() => document.getElementById("cursor").textContent.endsWith(" samples"));
+  seen.samples_cursor = await page.locator("#cursor").textContent();
+  seen.samples_range = [await page.locator("#low").inputValue(), await page.locator("#high").inputValue()].map(Number);
+  seen.samples_against_png = await against_png();
+  await shot("samples");
 } else {
   // A click pins a pixel; its spectrum can be had as a file.
   await page.mouse.click(...(await browser.at(Number(x), Number(y))));

@@ -6,7 +6,7 @@
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use serde_json::Value;
+use serde_json::{Value, json};
 use spectile::cube::{Cube, Header};
 use spectile::spectral::{Channels, planck};
 use tempfile::tempdir;
@@ -142,7 +142,9 @@ fn heat_is_shown_in_kelvins() {
     let kelvin = |x: u32, y: u32| 280.0 + 0.2 * f64::from(x) + 10.0 * (f64::from(y) / 12.0).sin();
     for tile in 0..cube.grid().count() {
         let value = |x, y, k: usize| planck::radiance(0.5 * (bounds[k][0] + bounds[k][1]), kelvin(x, y)) as f32;
-        cube.merge_unit(tile, 1, &unit(&cube, tile, value)).expect("merged");
+        // Of tiles in every other column more than once.
+        let portions = if tile % 2 == 0 { &[1][..] } else { &[1, 1, 2] };
+        portions.iter().for_each(|&n| cube.merge_unit(tile, n, &unit(&cube, tile, value)).expect("merged"));
     }
     let running = Running::start(folder.path(), &["view", "cube.zarr", "--listen", "127.0.0.1:0", "--json"]);
     let Some(seen) = drive("heat", &running.url, [80, 60]) else { return };
@@ -155,6 +157,9 @@ fn heat_is_shown_in_kelvins() {
     assert!((shown - kelvin(80, 60)).abs() < 0.1, "{cursor} {}", kelvin(80, 60));
     let range: Vec<f64> = [0, 1].map(|i| seen["range"][i].as_str().expect("text").parse().expect("a number")).to_vec();
     assert!(range[0] > 269.0 && range[0] < 276.0 && range[1] > 315.0 && range[1] < 323.0, "{range:?}");
+    assert_eq!((&seen["samples"]["changed"], &seen["samples_against_png"]), (&json!(true), &json!(0)));
+    let (cursor, range) = (seen["samples_cursor"].as_str().expect("text"), &seen["samples_range"]);
+    assert!(cursor.ends_with(": 4 samples") && *range == json!([1, 4]), "{cursor} {range}");
 }
 
 /// Where the cube has standard errors, the plot has a band around each spectrum, and the file a column.

@@ -146,6 +146,26 @@ fn thermal_channels_have_brightness_temperatures() {
     assert_eq!(get(address, "/api/channels").json()["thermal"], serde_json::json!([1, 2]));
 }
 
+#[test]
+fn samples_are_shown_by_tile() {
+    let folder = tempdir().expect("folder");
+    let cube = create(folder.path(), "cube.zarr", header([20, 8], [8, 8], 3));
+    for (tile, samples) in [(0, 1), (0, 1), (0, 2), (1, 1)] {
+        cube.merge_unit(tile, samples, &unit(&cube, tile, |_, _, _| 1.0)).expect("merged");
+    }
+    let (_server, address) = serve(cube.path(), "127.0.0.1:0");
+    let row = get(address, "/api/image?show=samples&y1=1&format=f32").floats();
+    let expected: Vec<f32> = (0..20).map(|x| [4.0, 1.0, f32::NAN][x / 8]).collect();
+    assert_eq!(format!("{row:?}"), format!("{expected:?}"));
+    // Means of what is rendered: of columns 8 to 15 one sample, of 16 to 19 none.
+    assert_eq!(get(address, "/api/image?show=samples&scale=16&format=f32").floats()[0], 2.5);
+    let picture = get(address, "/api/image?show=samples");
+    assert_eq!(picture.header("x-range-samples"), Some("1,4"));
+    // Each step is as many times more: 2 is half-way between 1 and 4.
+    let shades = |low: u32| get(address, &format!("/api/image?show=samples&y1=1&low={low}&high=16")).body;
+    assert!(shades(1) != shades(2));
+}
+
 /// A cube that somebody else renders: what is missing is NaN, what comes is told, and nothing twice.
 #[test]
 fn what_grows_on_disk_is_told() {

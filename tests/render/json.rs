@@ -92,6 +92,8 @@ fn the_document_names_every_event_and_field() {
         vec!["sensor", "a.zarr", "--responses", "s.csv", "-o", "s.zarr", "--json"],
         render(&["l.zarr", "--spp", "1", "--layers", "depth"]),
         vec!["export", "l.zarr", "-o", "l.csv", "--layers", "depth", "--json"],
+        render(&["t.zarr", "--spp", "64", "--tile", "8", "--error", "0.5", "--error-per", "tile"]),
+        vec!["info", "t.zarr", "--json"],
         render(&["w.zarr", "--spp", "1", "--factored"]),
         vec!["relight", "w.zarr", "-o", "r.zarr", "--json"],
         vec!["info", "nothing.zarr", "--json"],

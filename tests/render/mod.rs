@@ -2,6 +2,7 @@
 //! there.
 
 mod accuracy;
+mod by_tile;
 mod evaluation;
 mod factored;
 mod georeference;

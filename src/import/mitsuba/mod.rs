@@ -17,10 +17,10 @@ use glam::DAffine3;
 
 use self::values::{Plugin, place};
 use self::xml::Node;
+use super::MOST_BOUNCES;
 use super::scene::{Scene, Section};
 use super::text;
 use crate::error::Problem;
-use crate::scene::MAX_BOUNCES;
 use crate::{Error, Result};
 
 /// Shapes that instances may become where they are copies.
@@ -142,12 +142,7 @@ impl<'n> Importer<'n, '_> {
         let bounces = match (plugin.kind(), depth) {
             ("direct", _) => 1,
             (_, Some(depth)) if depth >= 0 => {
-                self.scene.report.within(
-                    plugin.place(),
-                    "`max_depth`",
-                    depth as f64,
-                    [1.0, f64::from(MAX_BOUNCES) + 1.0],
-                ) as i64
+                self.scene.report.within(plugin.place(), "`max_depth`", depth as f64, [1.0, MOST_BOUNCES + 1.0]) as i64
                     - 1
             }
             _ => {
@@ -161,7 +156,7 @@ impl<'n> Importer<'n, '_> {
         if bounces >= 32 {
             // Mitsuba's counts segments, and begins at 5 unless told otherwise.
             let start = roulette.unwrap_or(5) as f64;
-            let start = self.scene.report.within(plugin.place(), "`rr_depth`", start, [1.0, f64::from(MAX_BOUNCES)]);
+            let start = self.scene.report.within(plugin.place(), "`rr_depth`", start, [1.0, MOST_BOUNCES]);
             section.set("russian_roulette_start", start.to_string());
         }
         plugin.finish(&mut self.scene.report);

@@ -14,12 +14,12 @@ use glam::{DAffine3, DMat3, DVec3};
 
 use self::shape::Form;
 use self::token::{At, Parameters, Token, Tokens, shown};
+use super::MOST_BOUNCES;
 use super::geometry::similarity;
 use super::picture::Colour;
 use super::scene::{Scene, Section};
 use super::text;
 use crate::error::Problem;
-use crate::scene::MAX_BOUNCES;
 use crate::{Error, Result};
 
 /// Shapes that instances may become, and files that a scene may be made of.
@@ -539,7 +539,7 @@ impl Importer<'_> {
             self.scene.report.approximated(at.place(), format!("the integrator `{}` as a path tracer", shown(kind)));
         }
         let depth = parameters.number("maxdepth")?.unwrap_or(5.0);
-        let depth = self.scene.report.within(at.place(), "`maxdepth`", depth, [0.0, f64::from(MAX_BOUNCES)]);
+        let depth = self.scene.report.within(at.place(), "`maxdepth`", depth, [0.0, MOST_BOUNCES]);
         parameters.ask_for_all();
         self.scene.report.translated(format!("Integrator `{}`", shown(kind)), at.place());
         self.scene.integrator = Some(Section::new("[integrator]").with("max_bounces", (depth as u32).to_string()));

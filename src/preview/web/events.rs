@@ -73,6 +73,9 @@ pub fn status(app: &App, snapshot: &Snapshot, curve: bool) -> Value {
         set("rendering_s", json!(status.rendering_s));
         set("remaining_s", json!(status.remaining.map(|left| left.as_secs_f64())));
         set("error_estimate", json!(status.error_estimate));
+        if let Some(ends) = status.tiles {
+            set("tile_ends", ends.facts());
+        }
     }
     if let Some(([least, most], started)) = snapshot.progress.found {
         set("samples", json!(least));

@@ -57,7 +57,7 @@ pub struct Asked {
     #[serde(default)]
     format: Format,
     ev: Option<f64>,
-    /// Kelvins at the ends of the colour map.
+    /// Kelvins, or samples, at the ends of the colour map.
     low: Option<f64>,
     high: Option<f64>,
 }
@@ -70,6 +70,7 @@ enum Show {
     Channel,
     False,
     Temperature,
+    Samples,
 }
 
 #[derive(Deserialize, Default, Clone, Copy, PartialEq)]
@@ -101,7 +102,7 @@ pub async fn image(
         Some(bytes) => ("image/png", bytes),
         None => ("application/octet-stream", bytemuck::cast_slice::<f32, u8>(&window.values).to_vec()),
     };
-    Ok(([(CONTENT_TYPE, kind.into()), size, planes, tone_header(tone)], Body::from(bytes)).into_response())
+    Ok(([(CONTENT_TYPE, kind.into()), size, planes, asked.tone_header(tone)], Body::from(bytes)).into_response())
 }
 
 impl Asked {
@@ -117,7 +118,8 @@ impl Asked {
         let pixels = |scale: u32| side(rect.x0, rect.x1, scale) * side(rect.y0, rect.y1, scale);
         let powers = || (0..=LARGEST_SCALE.ilog2()).map(|n| 1 << n);
         // Without a wish, as fine as it may be; of single channels nothing between pixels and blocks.
-        let allowed = |scale: u32| self.show == Show::Colour || scale == 1 || scale >= BLOCK;
+        let is_fine = matches!(self.show, Show::Colour | Show::Samples);
+        let allowed = |scale: u32| is_fine || scale == 1 || scale >= BLOCK;
         let default = || powers().find(|&s| allowed(s) && pixels(s) <= MOST_PIXELS).unwrap_or(LARGEST_SCALE);
         let scale = self.scale.unwrap_or_else(default);
         if !scale.is_power_of_two() || scale > LARGEST_SCALE {
@@ -135,6 +137,7 @@ impl Asked {
         };
         match self.show {
             Show::Colour => state.colour(rect, scale),
+            Show::Samples => state.sample_counts(rect, scale),
             Show::Channel => state.channels(&[channel("k", self.k)?], rect, scale),
             Show::False => {
                 let rgb = [channel("r", self.r)?, channel("g", self.g)?, channel("b", self.b)?];
@@ -162,6 +165,13 @@ impl Asked {
                 let [low, high] = shown_range(percentiles(&window.values));
                 Tone::Range([self.low.unwrap_or(low), self.high.unwrap_or(high)])
             }
+            Show::Samples => {
+                let lit = || window.values.iter().copied().filter(|n| !n.is_nan());
+                // Always something to see.
+                let least = lit().reduce(f32::min).map_or(1.0, f64::from);
+                let most = lit().reduce(f32::max).map_or(1.0, f64::from).max(2.0 * least);
+                Tone::Range([self.low.unwrap_or(least), self.high.unwrap_or(most)])
+            }
             _ => Tone::Exposure(self.ev.unwrap_or_else(|| auto_exposure(&window.values, window.planes))),
         }
     }
@@ -169,16 +179,24 @@ impl Asked {
     fn png(&self, window: &Window, tone: Tone) -> Result<Vec<u8>> {
         let made = match tone {
             Tone::Exposure(_) if window.planes != 3 => tone.srgb8(&window.clone().into_picture().rgb),
+            // Each step as many times more.
+            Tone::Range(range) if self.show == Show::Samples => {
+                let values: Vec<f32> = window.values.iter().map(|samples| samples.log2()).collect();
+                Tone::Range(range.map(f64::log2)).srgb8(&values)
+            }
             _ => tone.srgb8(&window.values),
         };
         png::encode(window.size, &made).map_err(|error| Error::Internal(format!("PNG: {error}")))
     }
-}
 
-/// What the answer says of how it is shown.
-fn tone_header(tone: Tone) -> (HeaderName, String) {
-    match tone {
-        Tone::Exposure(ev) => (HeaderName::from_static("x-exposure-ev"), ev.to_string()),
-        Tone::Range([low, high]) => (HeaderName::from_static("x-range-k"), format!("{low},{high}")),
+    /// What the answer says of how it is shown.
+    fn tone_header(&self, tone: Tone) -> (HeaderName, String) {
+        match tone {
+            Tone::Exposure(ev) => (HeaderName::from_static("x-exposure-ev"), ev.to_string()),
+            Tone::Range([low, high]) => {
+                let name = if self.show == Show::Samples { "x-range-samples" } else { "x-range-k" };
+                (HeaderName::from_static(name), format!("{low},{high}"))
+            }
+        }
     }
 }

@@ -9,7 +9,7 @@ mod work;
 
 use std::sync::Arc;
 
-use crate::cube::Choices;
+use crate::cube::{Brightness, Choices};
 use crate::device::evaluator::{Costs, evaluation_cost};
 use crate::device::parts::paths::{Thinning, representatives, tried_channels};
 use crate::device::prepared::Prepared;
@@ -45,6 +45,8 @@ const LEAST_COST: f64 = 0.25;
 
 /// Wavelengths of a channel that the pilot compares with one, as far as a path may be evaluated at so many.
 const TRIED_WAVELENGTHS: u32 = 4;
+/// Samples of each of the pilot's pixels that tell how bright the picture is.
+const SAMPLES_OF_BRIGHTNESS: u32 = 32;
 /// Samples of all the pilot's pixels that tell what paths take.
 const COUNTED: u32 = 8;
 /// Where evaluating a path at one wavelength costs this much of generating it, `auto` takes one: sixteen would bring a quarter more at the
@@ -80,7 +82,7 @@ pub struct Pilot<'a> {
 
 impl Pilot<'_> {
     /// `prepared` with what was chosen for the scene: by the cube that is gone on with (`there`), else by rule, else by samples.
-    pub fn decide(mut self, prepared: Prepared, there: Option<Choices>) -> Result<(Arc<Prepared>, Option<Choices>)> {
+    pub fn decide(&mut self, prepared: Prepared, there: Option<Choices>) -> Result<(Arc<Prepared>, Option<Choices>)> {
         let mut prepared = Arc::new(prepared);
         if !is_needed(self.scene, &prepared) {
             return Ok((prepared, None));
@@ -109,6 +111,28 @@ impl Pilot<'_> {
             Arc::get_mut(&mut prepared).ok_or_else(kept)?.thinning = Some(thinning);
         }
         Ok((prepared, Some(choices)))
+    }
+
+    /// How bright the picture of the cube is that `prepared` renders. It need not be known well: it only tells what is dark.
+    pub fn brightness(&mut self, prepared: &Arc<Prepared>) -> Result<Brightness> {
+        // What factored renders bring back is no radiance.
+        let plain = match prepared.evaluator {
+            Evaluator::Factored => {
+                let mut scene = self.scene.clone();
+                scene.integrator.wavelengths_per_channel = Some(1);
+                Arc::new(Prepared::for_evaluator(&scene, 0, Evaluator::DpeptPath)?)
+            }
+            _ => Arc::clone(prepared),
+        };
+        self.on_a_device(|pilot, gpu| {
+            let mut worker = worker(gpu, &plain, pilot.memory, pilot.interrupt)?;
+            let film = &pilot.scene.film;
+            let sums = channel_sums(&mut worker, film, plain.channels, SAMPLES_OF_BRIGHTNESS)?;
+            let samples = pixels(film).len() as u32 * SAMPLES_OF_BRIGHTNESS;
+            let means: Vec<f32> = sums.iter().map(|sum| (sum / f64::from(samples)) as f32).collect();
+            let means = plain.integration.as_ref().map_or_else(|| means.clone(), |parts| parts.sums(&means));
+            Ok(Brightness { mean_radiance: means.into_iter().map(f64::from).collect(), samples })
+        })
     }
 
     /// At how many wavelengths of each channel paths are evaluated.

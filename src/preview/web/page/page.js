@@ -29,7 +29,7 @@ function setMode(mode) {
   if (!channels || (mode === "temperature" && !channels.thermal.length)) return;
   const change = { mode };
   if (mode === "temperature" && !channels.thermal.includes(picture.show.k)) change.k = channels.thermal[0];
-  if (mode === "temperature") picture.tone.map = "inferno";
+  if (isRanged(mode)) Object.assign(picture.tone, { map: "inferno", autoRange: true });
   if (mode === "channel") picture.tone.map = "grey";
   picture.setShow(change);
   showControls();
@@ -67,10 +67,11 @@ function showControls() {
   const single = mode === "channel" || mode === "temperature";
   find("channel-bar").hidden = !single;
   find("rgb-bar").hidden = mode !== "false";
-  find("map-label").hidden = !single;
+  find("map-label").hidden = !single && mode !== "samples";
   find("map").value = picture.tone.map;
-  find("range-label").hidden = mode !== "temperature";
-  find("ev-label").hidden = mode === "temperature";
+  find("range-label").hidden = !isRanged(mode);
+  find("range-unit").textContent = mode === "samples" ? "samples" : "K";
+  find("ev-label").hidden = isRanged(mode);
   if (!channels) return;
   const order = spectra.order.filter((c) => mode !== "temperature" || channels.thermal.includes(c));
   find("channel").max = order.length - 1;
@@ -87,12 +88,12 @@ function showControls() {
 }
 
 function showTone() {
-  const { tone, show } = picture, heat = show.mode === "temperature";
+  const { tone, show } = picture, ranged = isRanged(show.mode);
   const set = (id, text) => document.activeElement === find(id) || (find(id).value = text);
   set("ev", tone.ev.toFixed(2));
   set("low", tone.low.toFixed(1));
   set("high", tone.high.toFixed(1));
-  find("auto").checked = heat ? tone.autoRange : tone.auto;
+  find("auto").checked = ranged ? tone.autoRange : tone.auto;
   const c = find("legend").getContext("2d"), map = MAPS[tone.map];
   for (let x = 0; x < 96; x++) {
     const l = 3 * Math.floor((255 * x) / 95);
@@ -101,7 +102,7 @@ function showTone() {
   }
 }
 
-const setAuto = (on) => picture.retone(picture.show.mode === "temperature" ? { autoRange: on } : { auto: on });
+const setAuto = (on) => picture.retone(isRanged(picture.show.mode) ? { autoRange: on } : { auto: on });
 const expose = (by) => { picture.retone({ auto: false, ev: picture.tone.ev + by }); showTone(); };
 
 for (const button of document.querySelectorAll("[data-mode]")) button.addEventListener("click", () => setMode(button.dataset.mode));
@@ -159,7 +160,7 @@ function showCursor() {
   const found = picture.valueAt(...at), { mode } = picture.show;
   let text = `column ${at[0]}, row ${at[1]}`;
   if (found && !found.values.some(Number.isNaN)) {
-    const unit = mode === "temperature" ? "K" : mode === "colour" ? "linear R, G, B" : RADIANCE;
+    const unit = { temperature: "K", samples: "samples", colour: "linear R, G, B" }[mode] ?? RADIANCE;
     text += `: ${found.values.map((v) => short(v)).join(", ")} ${unit}`;
     if (found.scale > 1) text += ` (mean of ${found.scale} × ${found.scale})`;
   }
@@ -279,7 +280,7 @@ document.addEventListener("keydown", (event) => {
   const far = event.shiftKey ? 10 : 1, onPicture = target === find("picture") || target === document.body;
   const arrows = { ArrowLeft: [-far, 0], ArrowRight: [far, 0], ArrowUp: [0, -far], ArrowDown: [0, far] };
   const act = {
-    1: () => setMode("colour"), 2: () => setMode("channel"), 3: () => setMode("false"), 4: () => setMode("temperature"),
+    1: () => setMode("colour"), 2: () => setMode("channel"), 3: () => setMode("false"), 4: () => setMode("temperature"), 5: () => setMode("samples"),
     ",": () => step(-1), ".": () => step(1), "<": () => step(-10), ">": () => step(10), ";": () => step(-10), ":": () => step(10),
     e: () => expose(-0.25), E: () => expose(0.25), a: () => { setAuto(true); showTone(); },
     "+": () => picture.zoomTo(picture.zoom * 1.5), "=": () => picture.zoomTo(picture.zoom * 1.5), "-": () => picture.zoomTo(picture.zoom / 1.5),

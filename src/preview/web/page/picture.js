@@ -19,6 +19,9 @@ const MAPS = {
 const ENCODED = Uint8Array.from(TONE.srgb_steps.flatMap((steps, value) => Array(steps).fill(value)));
 const encode = (v) => (v >= 1 ? 255 : v > 0 ? ENCODED[(Math.sqrt(v) * (ENCODED.length - 1) + 0.5) | 0] : 0);
 
+// Shown by a colour map between two ends.
+const isRanged = (mode) => mode === "temperature" || mode === "samples";
+
 class Picture {
   constructor(canvas, changed) {
     this.canvas = canvas;
@@ -109,7 +112,7 @@ class Picture {
   // Squares -------------------------------------------------------------------------------------------------------
   what() {
     const { mode, k, rgb } = this.show;
-    if (mode === "colour") return "show=colour";
+    if (mode === "colour" || mode === "samples") return `show=${mode}`;
     if (mode === "false") return `show=false&r=${rgb[0]}&g=${rgb[1]}&b=${rgb[2]}`;
     return `show=${mode}&k=${k}`;
   }
@@ -217,7 +220,7 @@ class Picture {
       [square.width, square.height] = answer.headers.get("x-size").split(",").map(Number);
       square.planes = Number(answer.headers.get("x-planes"));
       square.ev = Number(answer.headers.get("x-exposure-ev"));
-      square.range = (answer.headers.get("x-range-k") || "").split(",").map(Number);
+      square.range = (answer.headers.get("x-range-k") || answer.headers.get("x-range-samples") || "").split(",").map(Number);
       square.values = values;
       square.look = 0;
       if (square.scale === this.scales().base) this.adapt();
@@ -264,12 +267,12 @@ class Picture {
   // Automatic exposure, and ends of the colour map: as the server has them for the whole picture.
   adapt() {
     if (!this.cube) return;
-    const { tone } = this, heat = this.show.mode === "temperature";
-    if (heat ? !tone.autoRange : !tone.auto) return;
+    const { tone } = this, ranged = isRanged(this.show.mode);
+    if (ranged ? !tone.autoRange : !tone.auto) return;
     const [whole] = this.inSight(this.scales().base, [0, 0, ...this.cube.size]);
     if (!whole.values) return;
     const before = [tone.ev, tone.low, tone.high];
-    if (heat) [tone.low, tone.high] = whole.range;
+    if (ranged) [tone.low, tone.high] = whole.range;
     else tone.ev = whole.ev;
     if (before.some((v, i) => v !== [tone.ev, tone.low, tone.high][i])) {
       this.look++;
@@ -285,7 +288,10 @@ class Picture {
       [square.canvas.width, square.canvas.height] = [width, height];
     const context = square.canvas.getContext("2d"), image = context.createImageData(width, height), out = image.data;
     const scale = 2 ** tone.ev, map = MAPS[tone.map], n = width * height;
-    const heat = this.show.mode === "temperature", low = tone.low, span = tone.high - tone.low || 1e-9;
+    const { mode } = this.show, ranged = isRanged(mode);
+    // Of samples each step is as many times more.
+    const place = mode === "samples" ? (v) => Math.log2(Math.max(v, 1e-9)) : (v) => v;
+    const low = place(tone.low), span = place(tone.high) - low || 1e-9;
     for (let i = 0; i < n; i++) {
       const v = values[i * planes], o = 4 * i;
       if (v !== v) continue; // not rendered: transparent
@@ -294,7 +300,7 @@ class Picture {
         out[o + 1] = encode(values[3 * i + 1] * scale);
         out[o + 2] = encode(values[3 * i + 2] * scale);
       } else {
-        const level = heat ? (255 * Math.max(0, Math.min(1, (v - low) / span)) + 0.5) | 0 : encode(v * scale);
+        const level = ranged ? (255 * Math.max(0, Math.min(1, (place(v) - low) / span)) + 0.5) | 0 : encode(v * scale);
         out[o] = map[3 * level];
         out[o + 1] = map[3 * level + 1];
         out[o + 2] = map[3 * level + 2];

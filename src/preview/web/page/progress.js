@@ -46,15 +46,21 @@ class Progress {
     const error = state.error_estimate === undefined || state.error_estimate === null ? "–" : `${short(100 * state.error_estimate, 3)} %`;
     const samples = viewing && state.samples_most !== state.samples ? `${state.samples}–${state.samples_most}` : `${state.samples ?? 0}`;
     rows.push(["samples", samples], ["error", error]);
+    const ends = state.tile_ends;
+    if (ends) {
+      rows.push(["tiles ended", `${ends.ended} of ${ends.tiles}`]);
+      rows.push(["worst tile", ends.worst === null ? "–" : `${short(100 * ends.worst, 3)} %`]);
+    }
     if (!viewing) {
       rows.push(["paths", count(state.paths ?? 0)], ["paths/s", count(state.paths_per_s ?? 0)]);
       rows.push(["rays", count(state.rays ?? 0)], ["left", duration(state.remaining_s)]);
-      rows.push(["elapsed", duration(state.elapsed_s)], ["next", state.samples_next ? `${state.samples_next} samples` : "–"]);
+      rows.push(["elapsed", duration(state.elapsed_s)], ["next", ends ? "each by itself" : state.samples_next ? `${state.samples_next} samples` : "–"]);
     }
     if (state.cube) {
       rows.push(["picture", `${state.cube.size[0]} × ${state.cube.size[1]}`], ["channels", String(state.channels)]);
       const tiles = viewing ? `${state.tiles_started ?? 0} of ${state.cube.tiles}` : `${state.units ?? 0} of ${state.units_total ?? 0} units`;
-      rows.push([viewing ? "tiles begun" : "epoch", tiles], ["on disk", bytes(state.cube.bytes)]);
+      if (!ends) rows.push([viewing ? "tiles begun" : "epoch", tiles]);
+      rows.push(["on disk", bytes(state.cube.bytes)]);
     }
     find("numbers").replaceChildren(...rows.flatMap(([name, value]) => {
       const [dt, dd] = [document.createElement("dt"), document.createElement("dd")];
