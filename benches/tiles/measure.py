@@ -1,12 +1,11 @@
 """Tiles that end by their own errors (`--error-per tile`) against pictures that end as a whole.
 
-    measure.py --spectile PROGRAM [-o FOLDER] [--seeds N] [--only gain|bias]
+    measure.py --spectile PROGRAM [-o FOLDER] [--seeds N] [--only gain|bias] [--scene NAME]
 
 *Gain*: to bring every tile to the same error, an even render takes everywhere the samples of the tile that needs most. The same tile has
 the same bytes in both, so one render with `--error-per tile` tells what both take: the mean and the most of `samples`.
 
-*Bias*: a rule that looks at data stops sooner where these happen to agree. Renders of many seeds, 4 x 4 tiles of a conference room, are
-compared with even ones of the same seeds that go on to more samples, whose mean has no such bias. Told of each tile and channel: the mean
+*Bias*: a rule that looks at data stops sooner where these happen to agree. Renders of many seeds, 4 x 4 tiles of a scene, are compared with even ones of the same seeds that go on to more samples, whose mean has no such bias. Told of each tile and channel: the mean
 difference in standard errors of one render's tile mean, and the error's true size over its estimate.
 Needs nothing but Python 3.9 and the program.
 """
@@ -25,11 +24,13 @@ import tempfile
 SIMPLE = ["--set", 'integrator.evaluation="all"', "--set", "integrator.wavelengths_per_channel=1"]
 # Scene, size, tile, samples of an epoch, error, most samples.
 GAINS = [
-    ("conference", "96x60", 8, 16, 0.1, 16384),
-    ("aircraft", "96x60", 8, 16, 0.05, 16384),
-    ("aircraft-infrared", "48x32", 8, 4, 0.1, 2048),
+    ("conference", "96x60", 8, 16, 0.3, 16384),
+    ("aircraft", "96x60", 8, 16, 0.1, 16384),
+    ("aircraft-infrared", "48x32", 8, 4, 0.2, 2048),
 ]
-TILES, TILE, CHANNELS, EPOCH, ERROR, EVEN = 4, 8, 8, 4, 0.15, 256
+# Scene, error, samples of the even renders.
+BIASES = [("cornell", 0.1, 512), ("conference", 0.5, 512)]
+TILES, TILE, CHANNELS, EPOCH = 4, 8, 8, 4
 
 
 def render(program, scene, out, *more):
@@ -67,8 +68,10 @@ def pixels(cube):
     return [numbers(cube / f"radiance/c/0/{i // TILES}/{i % TILES}", "f") for i in range(TILES**2)]
 
 
-def gain(program, folder):
+def gain(program, folder, of):
     for scene, size, tile, epoch, error, most in GAINS:
+        if of not in (None, scene):
+            continue
         cube = pathlib.Path(folder) / "gain.zarr"
         stop = ["--error", str(error), "--error-per", "tile", "--spp", str(most)]
         shape = ["--size", size, "--tile", str(tile), "--set", "channels.equal.count=8", "--set", f"integrator.epoch={epoch}"]
@@ -80,19 +83,25 @@ def gain(program, folder):
         yield ["gain", scene, size, tile, epoch, error, len(found), full, min(found), f"{mean:.1f}", max(found), f"{max(found) / mean:.3f}"]
 
 
-def bias(program, folder, seeds):
+def bias(program, folder, of, seeds):
+    for scene, error, even in BIASES:
+        if of in (None, scene):
+            yield from bias_of(program, folder, scene, error, even, seeds)
+
+
+def bias_of(program, folder, scene, wanted, samples_of_even, seeds):
     cube = pathlib.Path(folder) / "bias.zarr"
     side = TILES * TILE
     shape = ["--size", f"{side}x{side}", "--tile", str(TILE), "--set", f"channels.equal.count={CHANNELS}", "--set", f"integrator.epoch={EPOCH}"]
     cells = TILES**2
     ended, even, squares, spread = [], [], None, []
     for seed in range(seeds):
-        stop = ["--error", str(ERROR), "--error-per", "tile"]
-        render(program, "conference", str(cube), *shape, "--seed", str(seed), "--uncertainty", *stop)
+        stop = ["--error", str(wanted), "--error-per", "tile"]
+        render(program, scene, str(cube), *shape, "--seed", str(seed), "--uncertainty", *stop)
         ended.append((samples(cube), means(cube), pixels(cube)))
         errors = [numbers(cube / f"standard_error/c/0/{i // TILES}/{i % TILES}", "f") for i in range(cells)]
         spread.append([[math.fsum(v * v for v in tile[k::CHANNELS]) for k in range(CHANNELS)] for tile in errors])
-        render(program, "conference", str(cube), *shape, "--seed", str(seed), "--spp", str(EVEN))
+        render(program, scene, str(cube), *shape, "--seed", str(seed), "--spp", str(samples_of_even))
         even.append((means(cube), pixels(cube)))
         if seed % 20 == 19:
             print(f"{seed + 1} of {seeds} seeds", file=sys.stderr)
@@ -111,8 +120,8 @@ def bias(program, folder, seeds):
             shifts.append(shift)
             ratios.append(ratio)
             taken = statistics.fmean(e[0][i] for e in ended)
-            yield ["bias", i, k, n, f"{taken:.1f}", f"{shift:.4f}", f"{ratio:.4f}"]
-    print(f"bias over {n} seeds: mean {statistics.fmean(shifts):+.3f} standard errors, from {min(shifts):+.3f} to {max(shifts):+.3f}; "
+            yield ["bias", scene, wanted, i, k, n, f"{taken:.1f}", f"{shift:.4f}", f"{ratio:.4f}"]
+    print(f"{scene}, bias over {n} seeds: mean {statistics.fmean(shifts):+.3f} standard errors, from {min(shifts):+.3f} to {max(shifts):+.3f}; "
           f"true error over estimate {statistics.fmean(ratios):.3f}, from {min(ratios):.3f} to {max(ratios):.3f}")
 
 
@@ -122,12 +131,13 @@ def main():
     parser.add_argument("-o", "--output", default="out/tiles", type=pathlib.Path)
     parser.add_argument("--seeds", default=200, type=int)
     parser.add_argument("--only", choices=["gain", "bias"])
+    parser.add_argument("--scene")
     asked = parser.parse_args()
     asked.output.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         for name, head, rows in [
-            ("gain", "kind,scene,size,tile,epoch,error,tiles,ended_by_samples,least,mean,most,times_fewer_paths", lambda: gain(asked.spectile, folder)),
-            ("bias", "kind,tile,channel,seeds,samples,shift_in_standard_errors,true_error_over_estimate", lambda: bias(asked.spectile, folder, asked.seeds)),
+            ("gain", "kind,scene,size,tile,epoch,error,tiles,ended_by_samples,least,mean,most,times_fewer_paths", lambda: gain(asked.spectile, folder, asked.scene)),
+            ("bias", "kind,scene,error,tile,channel,seeds,samples,shift_in_standard_errors,true_error_over_estimate", lambda: bias(asked.spectile, folder, asked.scene, asked.seeds)),
         ]:
             if asked.only in (None, name):
                 with open(asked.output / f"tiles-{name}.csv", "w", newline="") as file:

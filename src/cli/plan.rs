@@ -164,29 +164,52 @@ fn measure_all(
     Ok(measured)
 }
 
-/// Renders a few samples of a tile in the middle of the picture, after one that compiles everything.
+/// Renders a few samples in the middle of the picture, after one that compiles everything: ever more paths, up to a tile of them, until
+/// they take long enough to tell. A path may take a microsecond, or on a software device some milliseconds.
 fn measure(gpu: Gpu, prepared: &Arc<Prepared>, scene: &Scene, tile: [u32; 2], budget: Budget) -> Result<Measured> {
     const SAMPLES: u32 = 16;
     const TRIAL: Duration = Duration::from_millis(500);
+    /// So that some threads of a software device have work.
+    const FIRST_SIDE: u32 = 16;
     let started = Instant::now();
     let device = gpu.name.clone();
     let mut worker = Worker::new(gpu, Arc::clone(prepared), tile, budget)?;
     let [width, height] = scene.film.cube_size();
-    let [x, y] = [(width - tile[0]) / 2 + scene.film.crop[0], (height - tile[1]) / 2 + scene.film.crop[1]];
-    let unit = [x, y, x + tile[0], y + tile[1]];
-    let mut epoch = |samples: u32, index: u32| -> Result<()> {
-        worker.submit(&[unit], index, samples)?;
-        worker.collect().map(drop)
+    let mut epochs = 0..;
+    // Paths, and the seconds that they took.
+    let mut epoch = |size: [u32; 2], samples: u32| -> Result<(f64, f64)> {
+        let began = Instant::now();
+        let [x, y] = [(width - size[0]) / 2 + scene.film.crop[0], (height - size[1]) / 2 + scene.film.crop[1]];
+        worker.submit(&[[x, y, x + size[0], y + size[1]]], epochs.next().unwrap_or(0), samples)?;
+        worker.collect()?;
+        let paths = f64::from(samples) * f64::from(size[0]) * f64::from(size[1]);
+        Ok((paths, began.elapsed().as_secs_f64()))
     };
-    epoch(1, 0)?;
+    let mut size = tile.map(|side| side.min(FIRST_SIDE));
+    epoch(size, 1)?;
     let setup_s = started.elapsed().as_secs_f64();
-    let (began, mut epochs) = (Instant::now(), 0);
-    while began.elapsed() < TRIAL {
-        epochs += 1;
-        epoch(SAMPLES, epochs)?;
-    }
-    let paths = f64::from(epochs * SAMPLES) * f64::from(tile[0]) * f64::from(tile[1]);
-    Ok(Measured { device, waves: worker.plan, setup_s, paths_per_s: paths / began.elapsed().as_secs_f64() })
+    let (mut samples, mut before) = (1, None);
+    let (paths, seconds) = loop {
+        let (paths, seconds) = epoch(size, samples)?;
+        if seconds >= TRIAL.as_secs_f64() {
+            // What any number of paths takes is in the one before too.
+            let more = before.map(|(fewer, sooner)| (paths - fewer, seconds - sooner));
+            break more.filter(|(_, longer)| *longer > 0.3 * seconds).unwrap_or((paths, seconds));
+        }
+        before = Some((paths, seconds));
+        if samples < SAMPLES {
+            samples *= 2;
+        } else if size != tile {
+            size = [0, 1].map(|axis| (2 * size[axis]).min(tile[axis]));
+        } else {
+            let (began, mut all) = (Instant::now(), 0.0);
+            while began.elapsed() < TRIAL {
+                all += epoch(size, samples)?.0;
+            }
+            break (all, began.elapsed().as_secs_f64());
+        }
+    };
+    Ok(Measured { device, waves: worker.plan, setup_s, paths_per_s: paths / seconds })
 }
 
 struct Plan<'a> {
