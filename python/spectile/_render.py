@@ -21,11 +21,12 @@ if TYPE_CHECKING:
 
 
 class Epoch:
-    """How far a render is at the end of an epoch: the picture has `samples` per pixel everywhere.
+    """How far a render is at the end of an epoch: the picture has `samples` per pixel everywhere, or more where tiles have
+    ends of their own.
 
     `samples`, `samples_next` per pixel; `paths` and `rays` so far; `paths_per_s`; `error_estimate`, the largest of all channels, relative,
-    None below two full epochs; `time_s` since the beginning; `remaining_s`, None where it is not known; `devices`, a dict each with
-    `name`, `units`, `busy_s` and `idle_s`.
+    None below two full epochs; `tile_ends`, with `error_per="tile"` a dict of `ended`, `by_samples`, `tiles` and `worst`; `time_s` since
+    the beginning; `remaining_s`, None where it is not known; `devices`, a dict each with `name`, `units`, `busy_s` and `idle_s`.
     """
 
     def __init__(self, event: Mapping[str, Any], task: Any) -> None:
@@ -36,6 +37,7 @@ class Epoch:
         self.rays: int = event["rays"]
         self.paths_per_s: float = event["paths_per_s"]
         self.error_estimate: float | None = event["error_estimate"]
+        self.tile_ends: dict[str, Any] | None = event["tile_ends"]
         self.time_s: float = event["time_s"]
         self.remaining_s: float | None = event["remaining_s"]
         self.devices: list[dict[str, Any]] = event["devices"]
@@ -67,6 +69,7 @@ def render(
     spp: int | None = None,
     time: float | str | None = None,
     error: float | None = None,
+    error_per: str = "image",
     seed: int = 0,
     uncertainty: bool = False,
     factored: bool = False,
@@ -90,6 +93,7 @@ def render(
     out: the cube to make, a folder; None for a temporary one, which is removed when nothing reads from it any more.
     spp, time, error: stop after so many samples per pixel, so many seconds (or text such as "10m"), or when the estimated relative error
         of every channel is so small; the first that is reached, at the end of an epoch. Without any, 64 samples (512 with `uncertainty`).
+    error_per: "image", or "tile": each tile ends by its own error, at `spp` at the latest; those with the largest errors come first.
     uncertainty: also store the standard error of every value.
     factored: keep weights of products of spectra instead of radiance, of which `relight` makes cubes under other lamps and paints.
     layers: names of what of the first surface behind each pixel is stored too, such as ["depth", "normal", "material"].
@@ -163,6 +167,8 @@ def _arguments(path: str, settings: Mapping[str, Any]) -> list[str]:
         "preview": None if preview is None else os.fspath(preview),
         **{name: bool(settings[name]) for name in ("uncertainty", "factored", "resume", "overwrite")},
         **{name: settings[name] for name in ("spp", "error", "tile", "memory", "exposure")},
+        # The program's own default goes without `error`.
+        "error-per": None if settings["error_per"] == "image" else settings["error_per"],
     }
     for name, value in options.items():
         arguments += _work.option(name, value)

@@ -60,6 +60,24 @@ def test_epochs_call_back_with_preview_and_error(tmp_path):
     assert seen[-1].devices[0]["units"] > 0 and "16 samples/pixel" in repr(seen[-1])
 
 
+def test_tiles_end_by_their_own_errors(tmp_path):
+    import numpy
+
+    seen = []
+    scene = ball(integrator={"epoch": 4})
+    cube = sp.render(scene, spp=512, tile=8, error=0.02, error_per="tile", callback=seen.append)
+    samples = cube.samples.values
+    assert samples.shape == (2, 2) and samples.min() >= 40 and samples.max() > samples.min()
+    assert seen[-1].tile_ends["ended"] == seen[-1].tile_ends["tiles"] == 4 and seen[-1].samples == samples.min()
+    # Each tile is what it is in a render of as many samples everywhere.
+    even = sp.render(scene, spp=int(samples.min()), tile=8)
+    y, x = (8 * index for index in numpy.argwhere(samples == samples.min())[0])
+    same = [cube.radiance.values[:, y : y + 8, x : x + 8], even.radiance.values[:, y : y + 8, x : x + 8]]
+    assert numpy.array_equal(*same)
+    with pytest.raises(sp.UsageError, match="error-per"):
+        sp.render(scene, error_per="tile")
+
+
 def test_what_a_callback_raises_stops_in_order_and_the_cube_is_gone_on_with(tmp_path):
     sp.render(ball(), tmp_path / "whole.zarr", spp=64)
 
