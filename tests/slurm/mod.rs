@@ -249,7 +249,6 @@ fn an_array_job_makes_standard_errors_too() {
     );
 }
 
-/// The script and what would be typed, to the letter. If this has to change, look at it, and write it anew by hand.
 #[test]
 fn an_array_job_keeps_weights() {
     let Some(place) = Place::new(2, 1) else { return };
@@ -257,6 +256,27 @@ fn an_array_job_keeps_weights() {
     place.ends_with_the_bytes_of(&["--spp", "64", "--factored"]);
 }
 
+/// No task sees the whole picture, nor needs to.
+#[test]
+fn tiles_of_an_array_job_end_by_their_errors() {
+    let Some(place) = Place::new(2, 1) else { return };
+    let stop = ["--set", "integrator.epoch=4", "--spp", "4096", "--error", "0.1", "--error-per", "tile"];
+    place.submit(&[&stop[..], &["--tasks", "4"]].concat());
+    place.ends_with_the_bytes_of(&stop);
+    let work = place.work();
+    assert_eq!((&work["tiles_exact"], &work["tiles_done"]), (&Value::from(64), &Value::from(64)), "{work}");
+    let output = place.run(&[&["submit", "--resume"], &stop[..], SUBMIT].concat());
+    assert!(text(&output.stdout).contains("there is nothing to submit"), "{}", text(&output.stdout));
+    for (more, words) in [
+        (&["--error", "0.1"][..], "--error-per"),
+        (&["--error", "0.1", "--error-per", "image"], "take --error-per tile"),
+    ] {
+        let output = place.run(&[&["submit", "--overwrite", "--spp", "64"], more, SUBMIT].concat());
+        assert!(output.status.code() == Some(2) && text(&output.stderr).contains(words), "{}", text(&output.stderr));
+    }
+}
+
+/// The script and what would be typed, to the letter. If this has to change, look at it, and write it anew by hand.
 #[test]
 fn a_dry_run_shows_everything_and_changes_nothing() {
     let folder = folder_with_scene();
