@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use super::{Event, Render};
-use crate::cube::{Writer, epochs_in, next_look};
+use crate::cube::{Writer, epochs_in, next_look, samples_before};
 use crate::preview::TileEnds;
 use crate::render::pool::{Merged, Report};
 use crate::render::queue::Queue;
@@ -31,6 +31,8 @@ struct Tile {
     samples: u32,
     /// Its error at the last look.
     look: f32,
+    /// The epoch that it has been allowed up to, without that one: no device takes that before it is decided.
+    until: u32,
     goes_on: bool,
 }
 
@@ -48,7 +50,11 @@ impl Tiles {
     fn of(cube: &Writer, error: f64, limit: Option<u32>) -> Tiles {
         let mut by_samples = BTreeMap::new();
         cube.found().iter().for_each(|&n| *by_samples.entry(n).or_default() += 1);
-        let each = cube.found().iter().map(|&samples| Tile { samples, look: f32::INFINITY, goes_on: true }).collect();
+        let each = cube
+            .found()
+            .iter()
+            .map(|&samples| Tile { samples, look: f32::INFINITY, until: 0, goes_on: true })
+            .collect();
         Tiles { first: cube.tiles().start, each, by_samples, error, limit, full: cube.cube().header().epoch }
     }
 
@@ -158,6 +164,7 @@ impl Render<'_> {
         tiles.at(tile).look = looks[1];
         match tiles.judge(samples, looks)? {
             Verdict::Until(epoch) => {
+                tiles.at(tile).until = epoch;
                 queue.allow_tile(tile, epoch, looks[1]);
                 return Ok(());
             }
@@ -180,10 +187,14 @@ impl Render<'_> {
         merged: Merged,
         observe: &mut dyn FnMut(Event) -> Result<()>,
     ) -> Result<()> {
-        let samples = crate::cube::samples_before(merged.group.epoch + merged.group.epochs, tiles.full);
+        let end = merged.group.epoch + merged.group.epochs;
+        let samples = samples_before(end, tiles.full);
         for &tile in &merged.group.tiles {
             tiles.note(tile, samples);
-            self.judge(tiles, tile, cube, queue)?;
+            // Before that a device may have merged more of it meanwhile than this report says.
+            if end == tiles.at(tile).until {
+                self.judge(tiles, tile, cube, queue)?;
+            }
         }
         self.status.samples = tiles.least();
         self.status.samples_next = self.status.samples;
