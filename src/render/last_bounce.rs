@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use crate::Result;
 use crate::device::prepared::Prepared;
@@ -12,8 +13,10 @@ use crate::render::wave::Budget;
 use crate::render::worker::Worker;
 use crate::scene::Scene;
 
-/// Epochs of one sample of the pilot's pixels.
+/// Epochs of one sample of the pilot's pixels, at most; and after what time no more of them are begun: a path through a cloud takes
+/// milliseconds on a software device, and all that hangs on this is a sentence.
 const EPOCHS: u32 = 16;
+const TIME: Duration = Duration::from_secs(1);
 /// What is warned of.
 const NOTED: f64 = 0.01;
 
@@ -46,9 +49,15 @@ impl LastBounce {
         let budget = Budget { memory, paths: None };
         let mut worker = Worker::new(Arc::clone(gpu), Arc::clone(prepared), [1, 1], budget)?;
         worker.watch(interrupt);
-        let all = pilot::channel_sums(&mut worker, &scene.film, prepared.channels, EPOCHS)?;
+        let (film, channels) = (&scene.film, prepared.channels);
+        let (began, mut epochs) = (Instant::now(), 0);
+        let mut all = vec![0.0; channels];
+        while epochs < EPOCHS && (epochs == 0 || began.elapsed() < TIME) {
+            add(&mut all, &pilot::channel_sums(&mut worker, film, channels, epochs..epochs + 1)?);
+            epochs += 1;
+        }
         worker.limit_bounces(bounces - 1);
-        let before = pilot::channel_sums(&mut worker, &scene.film, prepared.channels, EPOCHS)?;
+        let before = pilot::channel_sums(&mut worker, film, channels, 0..epochs)?;
         let shares = all.iter().zip(&before).map(|(all, before)| if *all > 0.0 { (all - before) / all } else { 0.0 });
         let most = shares.enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
         Ok(most.map(|(channel, share)| LastBounce { bounces, share, channel }))
@@ -57,6 +66,10 @@ impl LastBounce {
     pub fn is_much(&self) -> bool {
         self.share > NOTED
     }
+}
+
+fn add(sums: &mut [f64], more: &[f64]) {
+    sums.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
 }
 
 impl fmt::Display for LastBounce {

@@ -7,6 +7,7 @@
 
 mod work;
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use crate::cube::{Brightness, Choices};
@@ -127,7 +128,7 @@ impl Pilot<'_> {
         self.on_a_device(|pilot, gpu| {
             let mut worker = worker(gpu, &plain, pilot.memory, pilot.interrupt)?;
             let film = &pilot.scene.film;
-            let sums = channel_sums(&mut worker, film, plain.channels, SAMPLES_OF_BRIGHTNESS)?;
+            let sums = channel_sums(&mut worker, film, plain.channels, 0..SAMPLES_OF_BRIGHTNESS)?;
             let samples = pixels(film).len() as u32 * SAMPLES_OF_BRIGHTNESS;
             let means: Vec<f32> = sums.iter().map(|sum| (sum / f64::from(samples)) as f32).collect();
             let means = plain.integration.as_ref().map_or_else(|| means.clone(), |parts| parts.sums(&means));
@@ -610,11 +611,11 @@ impl Expected {
     }
 }
 
-/// Sums over the pilot's pixels and `epochs` samples of each, of every channel.
-pub fn channel_sums(worker: &mut Worker, film: &Film, channels: usize, epochs: u32) -> Result<Vec<f64>> {
+/// Sums over the pilot's pixels and its `epochs` of one sample of each, of every channel.
+pub fn channel_sums(worker: &mut Worker, film: &Film, channels: usize, epochs: Range<u32>) -> Result<Vec<f64>> {
     let units = pixels(film);
     let mut sums = vec![0.0; channels];
-    for epoch in 0..epochs {
+    for epoch in epochs {
         for pixel in values(worker, &units, FIRST_EPOCH + epoch, 1)?.radiance.chunks(channels) {
             sums.iter_mut().zip(pixel).for_each(|(sum, value)| *sum += f64::from(*value));
         }
