@@ -18,6 +18,7 @@ pub mod render;
 pub mod report;
 pub mod scene;
 pub mod sensor;
+pub mod sky;
 pub mod slurm;
 pub mod spectral;
 pub mod stress;

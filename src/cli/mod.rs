@@ -21,6 +21,7 @@ mod render;
 mod scene;
 mod sensor;
 mod sinks;
+mod sky;
 mod spectrum;
 mod stress;
 mod submit;
@@ -50,6 +51,7 @@ pub use program::{program, program_of_script};
     after_long_help = "\
 Examples:
   spectile render scene.toml -o cube.zarr --spp 256     render 256 samples per pixel
+  spectile sky --sun-elevation 40 -o sky.zarr           a clear sky, as an environment map
   spectile submit scene.toml -o cube.zarr --spp 256     the same on a Slurm cluster
   spectile info cube.zarr                               how far it got, how large the error is
   spectile spectrum cube.zarr 120 80                    the spectrum of one pixel, as CSV
@@ -79,6 +81,7 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Render(render::Args),
+    Sky(sky::Args),
     Submit(submit::Args),
     Plan(plan::Args),
     Devices(devices::Args),
@@ -110,6 +113,7 @@ impl Cli {
     pub fn json(&self) -> bool {
         match &self.command {
             Command::Render(args) => args.json,
+            Command::Sky(args) => args.json,
             Command::Plan(args) => args.json,
             Command::Devices(args) => args.json,
             Command::Import(args) => args.json,
@@ -132,6 +136,7 @@ impl Cli {
     pub fn run(&self, output: &Output) -> Result<()> {
         match &self.command {
             Command::Render(args) => render::run(args, output),
+            Command::Sky(args) => sky::run(args, output),
             Command::Plan(args) => plan::run(args, output),
             Command::Devices(args) => devices::run(args, output),
             Command::Import(args) => import::run(args, output),

@@ -83,7 +83,7 @@ impl<'a> Reporter<'a> {
     }
 
     /// An event for programs. One that has gone away does not end the render.
-    fn emit(&self, event: &str, fields: Value) -> Result<()> {
+    pub fn emit(&self, event: &str, fields: Value) -> Result<()> {
         match self.output.event(event, fields) {
             Err(Error::BrokenPipe) => Ok(()),
             result => result,

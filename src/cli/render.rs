@@ -14,6 +14,7 @@ use crate::format::png::KEPT;
 use crate::gpu::adapter::Selection;
 use crate::render::job::{Job, Preview, StopRule};
 use crate::render::schedule;
+use crate::scene::Scene;
 use crate::{Error, Result};
 
 /// Render a scene into a cube
@@ -226,8 +227,17 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
             return Err(Error::Usage(format!("{}: {what}", preview.display())));
         }
     }
+    render(args, args.scene.load()?, output, |_| Ok(()))
+}
+
+/// Renders `scene`, which `args` name, and does `before_end` with the whole cube before the last event is told.
+pub(super) fn render(
+    args: &Args,
+    scene: Scene,
+    output: &Output,
+    before_end: impl FnOnce(&Reporter) -> Result<()>,
+) -> Result<()> {
     let interrupt = output.interrupt()?;
-    let scene = args.scene.load()?;
     let scene = if args.factored { scene.factored() } else { scene };
     let scene = if args.layers.is_empty() { scene } else { scene.with_first_hits() };
     let mut reporter = Reporter::new(args.quiet, output);
@@ -263,6 +273,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     reporter.start(&job)?;
     let summary = schedule::run(&job, &interrupt, &mut |event| reporter.event(event));
     sinks.finish(&job.output, &summary);
+    let summary = summary.and_then(|summary| before_end(&reporter).map(|()| summary));
     reporter.finish(&job, summary)
 }
 

@@ -103,7 +103,7 @@ pub(super) fn parse_override(text: &str) -> std::result::Result<(String, String)
     }
 }
 
-fn parse_size(text: &str) -> std::result::Result<[u32; 2], String> {
+pub(super) fn parse_size(text: &str) -> std::result::Result<[u32; 2], String> {
     let side = |text: &str| text.parse::<u32>().ok().filter(|&side| side > 0);
     text.split_once(['x', 'X'])
         .and_then(|(width, height)| Some([side(width)?, side(height)?]))

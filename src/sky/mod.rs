@@ -1,0 +1,174 @@
+//! A clear sky as an ordinary scene: layers of air and haze over level ground under the sun, and a camera that looks everywhere.
+//!
+//! The atmosphere is plane: layers of a kilometre, whose matter is that of the US standard atmosphere (AFGL-TR-86-0110). Molecules scatter
+//! by Rayleigh's law (Bodhaine et al. 1999), aerosols by Henyey and Greenstein's with the coefficients of Shettle and Fenn (1979), and gases
+//! absorb as LOWTRAN7 has them ([`gas`]). Nothing is rendered here: [`Atmosphere::write_scene`] makes the scene, [`Irradiance`] sums up what
+//! came of it.
+
+mod air;
+mod gas;
+mod irradiance;
+mod particle;
+mod scene;
+
+use std::fmt;
+
+use crate::{Error, Result};
+
+pub use gas::{STANDARD_OZONE, STANDARD_WATER};
+pub use irradiance::Irradiance;
+pub use scene::FOLDER;
+
+use air::Profile;
+
+/// Wavelengths that the tables of matter cover, nm.
+pub const RANGE: [f64; 2] = [380.0, 2500.0];
+/// Elevations of the sun, degrees. Below them light comes round the earth, which is plane here.
+pub const ELEVATIONS: [f64; 2] = [5.0, 90.0];
+/// Below this elevation a plane atmosphere's air mass is 1 % or more above the round one's (Kasten and Young 1989).
+const LOW_SUN: f64 = 16.0;
+
+/// A kind of aerosol, as Shettle and Fenn (AFGL-TR-79-0214) have it at 70 % of relative humidity.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Aerosol {
+    Rural,
+    Urban,
+    Maritime,
+    Tropospheric,
+}
+
+impl Aerosol {
+    /// In the order of the columns of their table.
+    pub const ALL: [Aerosol; 4] = [Aerosol::Rural, Aerosol::Urban, Aerosol::Maritime, Aerosol::Tropospheric];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Aerosol::Rural => "rural",
+            Aerosol::Urban => "urban",
+            Aerosol::Maritime => "maritime",
+            Aerosol::Tropospheric => "tropospheric",
+        }
+    }
+}
+
+/// What the ground reflects, the same in all directions.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Albedo {
+    Constant(f64),
+    /// A spectrum's file, with its whole path.
+    File(std::path::PathBuf),
+}
+
+/// What decides a sky.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Atmosphere {
+    /// Of the sun above the horizon, degrees.
+    pub elevation: f64,
+    /// Of the sun, degrees from north over east.
+    pub azimuth: f64,
+    pub aerosol: Aerosol,
+    /// Vertical optical depth of the aerosol at 550 nm.
+    pub aerosol_depth: f64,
+    /// Height in which the aerosol falls to 1/e, km.
+    pub aerosol_height: f64,
+    /// Column of ozone, Dobson units.
+    pub ozone: f64,
+    /// Column of water vapour, cm of liquid (the same number as g/cm²).
+    pub water: f64,
+    pub albedo: Albedo,
+}
+
+/// Vertical optical depths of the whole atmosphere at a wavelength.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Depths {
+    pub molecules: f64,
+    pub aerosol_scattering: f64,
+    pub aerosol_absorption: f64,
+    pub water: f64,
+    pub ozone: f64,
+    pub mixed: f64,
+}
+
+impl Depths {
+    pub fn sum(&self) -> f64 {
+        let Depths { molecules, aerosol_scattering, aerosol_absorption, water, ozone, mixed } = self;
+        molecules + aerosol_scattering + aerosol_absorption + water + ozone + mixed
+    }
+}
+
+impl Atmosphere {
+    /// # Errors
+    /// [`Error::Usage`]: the number that no clear sky has, and what it may be.
+    pub fn check(&self) -> Result<()> {
+        let number = |name: &str, value: f64, [least, most]: [f64; 2], unit: &str| {
+            if (least..=most).contains(&value) {
+                return Ok(());
+            }
+            Err(Error::Usage(format!("{name} is {value}{unit}, but it must be from {least} to {most}{unit}")))
+        };
+        if self.elevation < ELEVATIONS[0] {
+            return Err(Error::Usage(format!(
+                "--sun-elevation is {}, but the atmosphere is plane here, which has no dusk: give 5 to 90 degrees",
+                self.elevation
+            )));
+        }
+        number("--sun-elevation", self.elevation, ELEVATIONS, " degrees")?;
+        number("--sun-azimuth", self.azimuth, [-360.0, 360.0], " degrees")?;
+        number("--aerosol", self.aerosol_depth, [0.0, 5.0], "")?;
+        number("--aerosol-height", self.aerosol_height, [0.1, 10.0], " km")?;
+        number("--ozone", self.ozone, [0.0, 1000.0], " Dobson units")?;
+        number("--water", self.water, [0.0, 10.0], " cm")?;
+        match self.albedo {
+            Albedo::Constant(albedo) => number("--albedo", albedo, [0.0, 1.0], ""),
+            Albedo::File(_) => Ok(()),
+        }
+    }
+
+    /// What to know of this sky although it can be made.
+    pub fn warnings(&self) -> Vec<String> {
+        if self.elevation >= LOW_SUN {
+            return Vec::new();
+        }
+        let h = self.elevation;
+        let round = 1.0 / (h.to_radians().sin() + 0.50572 * (h + 6.07995).powf(-1.6364));
+        let more = 100.0 * (self.air_mass() / round - 1.0);
+        vec![format!(
+            "the sun is low: a plane atmosphere puts {more:.1} % more matter before it than the round one of the earth"
+        )]
+    }
+
+    /// Ways through the atmosphere to the sun over the vertical one.
+    pub fn air_mass(&self) -> f64 {
+        1.0 / self.elevation.to_radians().sin()
+    }
+
+    /// Depths at a wavelength (nm, vacuum) within [`RANGE`]; those of gases are what they are for sunlight: [`gas`].
+    pub fn depths(&self, nm: f64) -> Depths {
+        let [extinction, absorption, _] = particle::of(self.aerosol, nm).map(|value| value * self.aerosol_depth);
+        let [water, ozone, mixed] = gas::depths(nm, self.water, self.ozone, self.air_mass());
+        Depths {
+            molecules: Profile::standard().molecules() * air::cross_section(nm),
+            aerosol_scattering: extinction - absorption,
+            aerosol_absorption: absorption,
+            water,
+            ozone,
+            mixed,
+        }
+    }
+
+    /// Share of the sun's light that arrives on a plane that faces it.
+    pub fn transmittance(&self, nm: f64) -> f64 {
+        (-self.air_mass() * self.depths(nm).sum()).exp()
+    }
+
+    /// Mean cosine of what the aerosol scatters.
+    pub fn asymmetry(&self, nm: f64) -> f64 {
+        particle::of(self.aerosol, nm)[2]
+    }
+}
+
+impl fmt::Display for Aerosol {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
