@@ -36,6 +36,45 @@ fn rate_of_amounts(first: u32, t: u32, amounts: ptr<function, array<f32, MOST_TE
 }
 #endif
 
+#if FORCED
+// 1 - exp(-x), without cancellation.
+fn chance_within(x: f32) -> f32 {
+    let small = x * (1.0 - x * (0.5 - x * (0.16666667 - x * 0.041666667)));
+    return select(1.0 - exp(-x), small, x < 0.06);
+}
+
+// -log(1 - x), without cancellation.
+fn depth_of_chance(x: f32) -> f32 {
+    let small = x * (1.0 + x * (0.5 + x * (0.33333333 + x * 0.25)));
+    return select(-log(1.0 - x), small, x < 0.03);
+}
+
+// Optical depths of all techniques on the way to what was met.
+fn depths_of_way(ray: Ray) -> array<f32, TECHNIQUES> {
+    let speed = length(ray.direction) * bitcast<f32>(volumes[0]);
+    var depths = Depths();
+    for (var n = 0u; n < followed.count; n += 1u) {
+        let first = volume_at(followed.volume[n]);
+        let start = followed.start[n];
+        let to = min(followed.to[n], start + 8.0 / length(ray.direction));
+        let metres = (to - start) * speed;
+#if GRIDS
+        if ((volumes[first] & VOLUME_GRID) != 0u) {
+            let from_voxels = to_voxels(first, ray.origin + start * ray.direction);
+            let end_voxels = to_voxels(first, ray.origin + to * ray.direction);
+            let amounts = amounts_along(first, from_voxels, end_voxels, metres);
+            for (var term = 0u; term < volumes[first + 23u]; term += 1u) {
+                add_depths(&depths, first, term, amounts[term]);
+            }
+            continue;
+        }
+#endif
+        add_depths(&depths, first, 0u, metres);
+    }
+    return depths.flight;
+}
+#endif
+
 // Whether matter scatters the path on the way; then `collision` and `position` say where, and the records since `begins` are those of the way to
 // there. Else the path comes to what it met. Either way its weight is by the densities of all techniques.
 fn is_scattered(path: ptr<function, Path>, list: ptr<function, RecordList>, begins: RecordList, position: ptr<function, vec3<f32>>, survival: ptr<function, f32>) -> bool {
@@ -46,7 +85,19 @@ fn is_scattered(path: ptr<function, Path>, list: ptr<function, RecordList>, begi
     let own = technique_of((*path).number);
     let from_path = draw_of((*path).number);
     let u = draw(Draw(from_path.key ^ SALT_FLIGHT, from_path.index), DIMENSION_BOUNCE + step.bounce * DIMENSIONS_PER_VERTEX).x;
+#if FORCED
+    // What comes straight from the camera and meets nothing goes on nowhere else: all of these paths are scattered, with the weight of
+    // the chance of it.
+    let is_forced = step.bounce == 0u && way_is_open;
+    var whole_depths = array<f32, TECHNIQUES>();
+    var wanted = -log(1.0 - u);
+    if (is_forced) {
+        whole_depths = depths_of_way(ray);
+        wanted = depth_of_chance(u * chance_within(whole_depths[own]));
+    }
+#else
     let wanted = -log(1.0 - u);
+#endif
     // Only where something was added on the way must its throughput be put aside.
     let whole = *list;
     let added = (*list).used > begins.used;
@@ -145,6 +196,11 @@ fn is_scattered(path: ptr<function, Path>, list: ptr<function, RecordList>, begi
     let own_rate = select(1.0, rate_there[own], is_hit);
     for (var t = 0u; t < TECHNIQUES; t += 1u) {
         let rate = select(1.0, rate_there[t] / own_rate, is_hit);
+#if FORCED
+        if (is_forced) {
+            ratios[t] *= chance_within(whole_depths[own]) / max(chance_within(whole_depths[t]), 1.0e-37);
+        }
+#endif
         ratios[t] = min(ratios[t] * rate * exp(own_depth - depths.flight[t]), 1.0e30);
     }
 #endif
@@ -160,6 +216,11 @@ fn is_scattered(path: ptr<function, Path>, list: ptr<function, RecordList>, begi
     collision.direction = normalize(ray.direction);
     collision.technique = own;
     collision.weight = exp(own_depth) / rate_there[own];
+#if FORCED
+    if (is_forced) {
+        collision.weight *= chance_within(whole_depths[own]);
+    }
+#endif
     // The most that any technique, or the channel that absorbs least, keeps.
     var least_lost = depths.least;
     for (var t = 0u; t < TECHNIQUES; t += 1u) {

@@ -89,6 +89,7 @@ pub const PARTS: &[&Part] = &[
     &media::PLANCK,
     &scattering::SCATTERING,
     &scattering::TECHNIQUES,
+    &scattering::FORCED,
     &scattering::TABLES,
     &surfaces::DISPERSION,
     &surfaces::KNOTS_OF_ONE_CHANNEL,

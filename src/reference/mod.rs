@@ -155,6 +155,7 @@ mod tests {
                 wavelengths: Wavelengths::Uniform,
                 wavelengths_per_channel: Some(1),
                 techniques: None,
+                forced_collision: false,
                 evaluation: Evaluation::All,
                 evaluator: Evaluator::Auto,
                 epoch: 64,

@@ -184,6 +184,7 @@ impl Hash {
             wavelengths,
             wavelengths_per_channel,
             techniques,
+            forced_collision,
             evaluation,
             evaluator,
             epoch,
@@ -211,6 +212,9 @@ impl Hash {
         if let Some(techniques) = techniques {
             self.text("techniques");
             self.counts([techniques]);
+        }
+        if *forced_collision {
+            self.text("forced collision");
         }
         if *evaluation != Evaluation::Auto {
             self.text("evaluation");

@@ -176,6 +176,7 @@ impl Default for Integrator {
             wavelengths: Wavelengths::Emission,
             wavelengths_per_channel: None,
             techniques: None,
+            forced_collision: false,
             evaluation: Evaluation::Auto,
             evaluator: Evaluator::Auto,
             epoch: 64,
@@ -222,6 +223,10 @@ fn decode_integrator(item: &Item) -> Option<Integrator> {
         Some(item) => item.whole(1..=MOST_TECHNIQUES).map(Some),
         None => Some(default.techniques),
     };
+    let forced_collision = match fields.get("forced_collision") {
+        Some(item) => item.boolean(),
+        None => Some(default.forced_collision),
+    };
     let evaluation = match fields.get("evaluation") {
         Some(item) => item.choice(&Evaluation::ALL.map(|evaluation| (evaluation.name(), evaluation))),
         None => Some(default.evaluation),
@@ -238,6 +243,7 @@ fn decode_integrator(item: &Item) -> Option<Integrator> {
         wavelengths: wavelengths?,
         wavelengths_per_channel: wavelengths_per_channel?,
         techniques: techniques?,
+        forced_collision: forced_collision?,
         evaluation: evaluation?,
         evaluator: evaluator?,
         epoch: epoch?,

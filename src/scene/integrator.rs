@@ -21,6 +21,9 @@ pub struct Integrator {
     /// its channels differ.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub techniques: Option<u32>,
+    /// Whether a camera ray that leaves the scene through matter that scatters is always scattered there, with the weight of the chance of it.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub forced_collision: bool,
     /// Which of a scene's paths are evaluated.
     pub evaluation: Evaluation,
     pub evaluator: Evaluator,
@@ -112,6 +115,10 @@ pub enum Wavelengths {
     Uniform,
     /// From the emitters' own spectral density in each channel, see [`crate::spectral::warp`].
     Emission,
+}
+
+fn is_false(value: &bool) -> bool {
+    !value
 }
 
 fn one() -> Option<u32> {

@@ -138,6 +138,7 @@ impl Atmosphere {
              \n\
              [integrator]\n\
              max_bounces = 30\n\
+             forced_collision = true\n\
              \n\
              [[lights]]\n\
              directional = {{ direction = [{x}, {y}, {z}], irradiance = \"am0\" }}\n\

@@ -12,6 +12,11 @@ fn way_scatters() -> bool {
     }
     return false;
 }
+
+#if FORCED
+// Whether that way leads out of the scene.
+var<private> way_is_open: bool;
+#endif
 #endif
 
 fn meet(path: ptr<function, Path>, list: ptr<function, RecordList>, overflow: ptr<function, bool>) -> Meeting {
@@ -29,6 +34,9 @@ fn meet(path: ptr<function, Path>, list: ptr<function, RecordList>, overflow: pt
     (*path).nested = nested;
 #if SCATTERS
     followed = way;
+#if FORCED
+    way_is_open = walked.hit.primitive == NONE;
+#endif
     if (step.bounce < frame.max_bounces && way_scatters()) {
         append(list, OP_SAVE, 0u, 0.0, 0.0);
     }

@@ -50,6 +50,15 @@ pub const TECHNIQUES: Part = Part {
     ..Part::NOTHING
 };
 
+pub const FORCED: Part = Part {
+    name: "forced collisions",
+    used: |scene| scene.scattering.as_ref().is_some_and(|scattering| scattering.forced),
+    effect: |_| "the way of a camera ray is summed up once more before its flight".into(),
+    is_planned: true,
+    defines: |_, _, defines| _ = defines.set("FORCED", true),
+    ..Part::NOTHING
+};
+
 pub const TABLES: Part = Part {
     name: "tables of phase functions",
     used: |scene| scene.scattering.as_ref().is_some_and(|scattering| scattering.has_tables),
@@ -83,6 +92,8 @@ const ROW_DEGREES: f64 = 0.25;
 pub struct Scattering {
     pub techniques: u32,
     pub has_tables: bool,
+    /// Whether camera rays that meet nothing are always scattered.
+    pub forced: bool,
     pub most_scatterers: u32,
     /// Names of media in which paths go as far as their extinction says.
     by_extinction: Vec<String>,
@@ -100,6 +111,7 @@ impl Scattering {
         let mut scattering = Scattering {
             techniques: deciding.count() as u32,
             has_tables: false,
+            forced: scene.integrator.forced_collision,
             most_scatterers: 0,
             by_extinction: Vec::new(),
         };

@@ -1,6 +1,8 @@
 //! The file as a whole; the film and where it lies on a map, channels, and how all is computed.
 
-use super::Kind::{Choice, Direction, File, List, ListOfTables, NamedTables, Number, Table, Text, Vector, Whole};
+use super::Kind::{
+    Boolean, Choice, Direction, File, List, ListOfTables, NamedTables, Number, Table, Text, Vector, Whole,
+};
 use super::{ASSEMBLY, CAMERA, ENVIRONMENT, INSTANCE, Key, LIGHT, MATERIAL, MEDIUM, OBJECT, SPECTRUM, Section};
 
 pub static SCENE: Section = Section {
@@ -379,6 +381,14 @@ pub static INTEGRATOR: Section = Section {
         .or("`\"auto\"`")
         .range("[1, 16]"),
         Key::default(
+            "forced_collision",
+            Boolean,
+            "false",
+            "Whether what a camera ray sees of thin matter that scatters, before nothing but the environment, is drawn by chance, as \
+             everything else, or always: such a ray is then scattered for certain, with the weight of the chance of it. The means are the \
+             same; skies and hazes make much less noise ([METHOD.md](METHOD.md#matter-that-scatters)).",
+        ),
+        Key::default(
             "evaluation",
             Choice(&["auto", "all", "roulette"]),
             "\"auto\"",
@@ -414,6 +424,7 @@ sampler = "independent"
 wavelengths = "uniform"
 wavelengths_per_channel = 4
 techniques = 4
+forced_collision = true
 evaluation = "roulette"
 evaluator = "dpept-spectral"
 epoch = 16

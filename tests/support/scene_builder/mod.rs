@@ -30,6 +30,7 @@ impl Builder {
                 wavelengths: Wavelengths::Emission,
                 wavelengths_per_channel: Some(1),
                 techniques: None,
+                forced_collision: false,
                 evaluation: Evaluation::All,
                 evaluator: Evaluator::Auto,
                 epoch: 64,
