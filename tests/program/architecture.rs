@@ -19,6 +19,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("device", &["scene", "spectral", "gpu::source"]),
     ("cube", &["spectral"]),
     ("sensor", &["cube", "scene", "spectral"]),
+    ("sky", &["cube", "spectral"]),
     ("export", &["cube", "format", "spectral"]),
     ("preview", &["cube", "format", "spectral"]),
     ("render", &["device", "gpu", "cube", "preview", "scene", "spectral"]),
@@ -28,8 +29,8 @@ const ARROWS: &[(&str, &[&str])] = &[
     (
         "cli",
         &[
-            "stress", "report", "slurm", "render", "preview", "export", "sensor", "cube", "device", "gpu", "import",
-            "scene", "format", "spectral",
+            "stress", "report", "slurm", "sky", "render", "preview", "export", "sensor", "cube", "device", "gpu",
+            "import", "scene", "format", "spectral",
         ],
     ),
 ];

@@ -4,8 +4,9 @@
     disort_sky.py FOLDER NM[,NM…] > tests/data/disort_sky.csv
 
 reads the layers, coefficients, sun and ground of the scene itself (scene.toml, CSV and Zarr), so that nothing is shared with how Spectile
-makes them but the files. Irradiance above the air is 1. Lines: nm, elevation and azimuth of a direction in degrees, the azimuth from
-the sun's; its radiance, sr-1; and diffuse and direct irradiance of level ground. Needs numpy and PythonicDISORT 1.8.
+makes them but the files. Irradiance above the air is 1. Lines: nm, row and column of a map of 36 x 180 pixels, the mean radiance there, sr-1,
+and diffuse and direct irradiance of level ground. Rows are that around the zenith, that of the sun (its almucantar) and some between; of
+the columns those to the east, since the sun stands in the north. Needs numpy and PythonicDISORT 1.8.
 """
 
 import csv
@@ -57,7 +58,7 @@ def main():
     components = scene["media"]["air"]["components"]
     print("# Radiance of a plane sky under an irradiance of 1 above the air, by PythonicDISORT 1.8, tests/python/disort_sky.py")
     print(f"# COMPUTED with {STREAMS} streams; sun at an elevation of {sun:.6f} degrees, albedo {albedo}")
-    print("nm,elevation,azimuth,radiance,diffuse,direct")
+    print("nm,row,column,radiance,diffuse,direct")
     for nm in map(float, sys.argv[2].split(",")):
         scattering, extinction, moments = 0, 0, 0
         for component in components:
@@ -75,11 +76,12 @@ def main():
             depth, single, STREAMS, moments / scattering[:, None], mu0, 1.0, 0.0, BDRF_Fourier_modes=[albedo])
         between = subroutines.interpolate(radiance)
         diffuse, direct = down(depth[-1])
-        azimuths = numpy.array([2, 5, 10, 20, 30, 45, 60, 90, 120, 150, 180.0])
-        places = [(90.0, 0.0)] + [(sun, azimuth) for azimuth in azimuths] + [(e, a) for e in (10.0, 25.0, 65.0) for a in (60.0, 180.0)]
-        for elevation, azimuth in places:
-            value = between(-math.sin(math.radians(elevation)), depth[-1], math.radians(azimuth))
-            print(f"{nm:g},{elevation:g},{azimuth:g},{float(numpy.squeeze(value)):.6e},{float(diffuse):.6e},{float(direct):.6e}", flush=True)
+        for row in sorted({0, 20, math.floor(90 - sun), 65, 80}):
+            for number in range(18, 36):
+                elevations = numpy.radians(90 - row - (numpy.arange(4) + 0.5) / 4)
+                azimuths = numpy.radians(10 * (number - 18) + numpy.arange(10) + 0.5)
+                mean = numpy.mean(between(-numpy.sin(elevations), depth[-1], azimuths))
+                print(f"{nm:g},{row},{number},{mean:.6e},{float(diffuse):.6e},{float(direct):.6e}", flush=True)
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ mod resume;
 mod running;
 mod several;
 mod sizes;
+mod sky;
 mod uncertainty;
 mod wrong;
 
