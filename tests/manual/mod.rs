@@ -1,6 +1,7 @@
 //! `docs/scene.md` and `docs/cube.md` against the program: what they say is what it reads and writes.
 
 mod cube;
+mod examples;
 mod files;
 mod scene;
 
