@@ -336,6 +336,44 @@ fn techniques_bound_the_spread_of_samples() {
     assert!(without > 10.0 * with, "relative variance {without} with one technique, {with} with sixteen");
 }
 
+/// Where camera rays are always scattered that leave through matter, no mean changes, of voxels nor of what is the same everywhere: a thin cloud
+/// that fills a part of the pixels, before the sky and before ground, as the reference sees it, which knows nothing of that; and light that is
+/// scattered once in a layer as the closed form has it, without the noise of rays that go through.
+#[test]
+fn forced_collisions_change_no_mean() {
+    // Voxels without a surface behind: `render::sky`, by another code.
+    if size::is_full() {
+        let b = Builder::new().into_room().bounces(6).sky(0.2);
+        let b = b.diffuse(quad(DVec3::new(-1.0, -1.0, -1.0), 1.2 * DVec3::X, 2.0 * DVec3::Y), 0.6);
+        let mut scene = cloud(b.point(DVec3::new(-0.9, 0.95, 1.5), 3.0), 0.2, None).build();
+        scene.integrator.forced_collision = true;
+        let bound = Bound { resolution: 0.1, allowance: 3e-4 };
+        assert_as_reference("cloud, forced", &scene, [64, 256], 50_000, bound);
+    }
+
+    // Depths down to where 1 - e^-τ is rounding in an f32; a sun straight down, seen from above at a cosine of a half.
+    let depth = [1e-6, 1e-3, 0.03, 0.3, 1.0];
+    let scene = |forced: bool| {
+        let b = Builder::new().camera(at_cosine(0.5, true)).bounces(1).directional(-DVec3::Z, PI);
+        let mut scene = with_layer(b, &[1.0; 5], &depth, isotropic).build();
+        scene.integrator.forced_collision = forced;
+        (scene.film.width, scene.film.height, scene.film.crop) = (64, 64, [0, 0, 64, 64]);
+        scene
+    };
+    let expected = depth.map(|tau: f64| (1.0 - (-3.0 * tau).exp()) / (4.0 * 1.5));
+    let spread = |forced: bool| {
+        let rendered = render(&scene(forced), 4, 16, Settings::default());
+        rendered.assert_clean();
+        rendered.replicas()
+    };
+    let (with, without) = (spread(true), spread(false));
+    assert_estimates("a layer, forced", &with, &expected, Bound { resolution: 0.02, allowance: 2e-5 });
+    for k in 0..3 {
+        let gain = (without[k].error / with[k].error).powi(2);
+        assert!(gain > 10.0, "depth {}: a variance {gain} times less", depth[k]);
+    }
+}
+
 /// The same by all evaluators.
 #[test]
 fn clouds_by_all_evaluators() {
