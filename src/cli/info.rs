@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use super::Output;
 use super::tile_states::{TileStates, list};
-use crate::cube::{Choices, Cube, Progress, Verification};
+use crate::cube::{Choices, Cube, FACTORED, LAYERS, Progress, Verification};
 use crate::files::shown;
 use crate::scene::{Evaluation, Evaluator};
 use crate::spectral::Channels;
@@ -180,6 +180,7 @@ impl Found {
             "error_estimate_is_rough": epochs(cube, progress) < ROUGH_BELOW,
             "store_bytes": header.store_bytes(),
             "uncertainty": header.has_uncertainty(),
+            "layers": self.layers(),
             "choices": self.choices,
             "preview": shows(cube),
             "attributes": header.attributes,
@@ -197,6 +198,11 @@ impl Found {
         let by_itself =
             attributes.get("evaluator").is_some_and(|evaluator| by_itself.iter().any(|name| evaluator == name));
         !by_itself && self.progress.samples[1] == 0 && is_open
+    }
+
+    /// Names of what is known of the first surface behind each pixel.
+    fn layers(&self) -> Vec<&'static str> {
+        self.cube.layers().iter().map(|layer| layer.name()).collect()
     }
 
     fn describe(&self) -> String {
@@ -241,6 +247,9 @@ impl Found {
             };
             row("standard error", what);
         }
+        if !cube.layers().is_empty() {
+            row("layers", self.layers().join(", "));
+        }
         if let Some(choices) = &self.choices {
             row("wavelengths", choices.describe_wavelengths());
             row("evaluation", choices.describe());
@@ -262,7 +271,9 @@ impl Found {
             );
             row("factored", what);
         }
-        let written = header.attributes.iter().filter(|(name, _)| !header.is_factored() || *name != "factored");
+        // What has a line of its own above.
+        let is_told = |name: &str| name == LAYERS || (header.is_factored() && name == FACTORED);
+        let written = header.attributes.iter().filter(|(name, _)| !is_told(name));
         for (name, value) in written {
             row(name, value.as_str().map_or_else(|| value.to_string(), str::to_owned));
         }

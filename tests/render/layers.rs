@@ -288,6 +288,8 @@ fn layers_are_exported() {
     let place = place();
     let folder = place.path();
     let cube = render(folder, "cube.zarr", &format!("--spp 1 --layers {ALL}"));
+    let told = text(&run(folder, &["info", "cube.zarr"]).stdout);
+    assert!(told.contains("layers           depth, normal, object, material, coordinates, sun\n"), "{told}");
     let export = |line: &str| {
         let arguments: Vec<&str> = line.split_whitespace().collect();
         run(folder, &[&["export", "cube.zarr"], &arguments[..]].concat())
