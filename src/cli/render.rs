@@ -212,6 +212,12 @@ pub enum ErrorOf {
 }
 
 pub fn run(args: &Args, output: &Output) -> Result<()> {
+    check(args)?;
+    render(args, args.scene.load()?, output, |_| Ok(()))
+}
+
+/// Refuses arguments that do not go together, and pictures that cannot be written.
+pub(super) fn check(args: &Args) -> Result<()> {
     if args.tiles.is_some() && args.error.is_some() && args.error_per == ErrorOf::Image {
         let what = "--tiles goes with --error only where each tile has its own end: add --error-per tile";
         return Err(Error::Usage(what.into()));
@@ -227,7 +233,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
             return Err(Error::Usage(format!("{}: {what}", preview.display())));
         }
     }
-    render(args, args.scene.load()?, output, |_| Ok(()))
+    Ok(())
 }
 
 /// Renders `scene`, which `args` name, and does `before_end` with the whole cube before the last event is told.

@@ -95,7 +95,7 @@ pub struct Args {
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     pub size: Option<[u32; 2]>,
 
-    /// Stop after this many samples per pixel; else after 16, which leave noise of 10 to 15 % in a pixel in the blue, 3 to 5 % in the infrared
+    /// Stop after this many samples per pixel; else after 16, which leave noise of 25 % in a pixel at 430 nm, 10 % from 700 nm on
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub spp: Option<u32>,
 
@@ -184,6 +184,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     let folder = Temporary::create()?;
     atmosphere.write_scene(&folder.0)?;
     let render_args = render_args(args, cube, &folder.0);
+    render::check(&render_args)?;
     let mut scene = render_args.scene.load()?;
     check_channels(&scene)?;
     scene.warnings.extend(atmosphere.warnings());
@@ -273,6 +274,7 @@ fn render_args(args: &Args, cube: &Path, folder: &Path) -> render::Args {
         spp: args.spp.or(is_bare.then_some(16)),
         time: args.time,
         error: None,
+        error_per: render::ErrorOf::Image,
         uncertainty: args.uncertainty,
         factored: false,
         layers: Vec::new(),

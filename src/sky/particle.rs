@@ -1,5 +1,7 @@
 //! Aerosols.
 
+use std::sync::OnceLock;
+
 use super::Aerosol;
 use crate::spectral::columns;
 
@@ -9,7 +11,8 @@ const AEROSOLS: &str = include_str!("data/aerosols.csv");
 /// Extinction and absorption, over the extinction at 550 nm, and mean cosine of scattering. Between the table's wavelengths the first two
 /// are powers of the wavelength (Ångström), the last is linear.
 pub fn of(kind: Aerosol, nm: f64) -> [f64; 3] {
-    let rows: Vec<[f64; 13]> = columns::<13>(AEROSOLS).collect();
+    static TABLE: OnceLock<Vec<[f64; 13]>> = OnceLock::new();
+    let rows = TABLE.get_or_init(|| columns::<13>(AEROSOLS).collect());
     let i = rows.partition_point(|row| row[0] <= nm).clamp(1, rows.len() - 1);
     let [below, above] = [rows[i - 1], rows[i]];
     let first = 1 + 3 * kind as usize;

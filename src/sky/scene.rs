@@ -139,6 +139,9 @@ impl Atmosphere {
              [integrator]\n\
              max_bounces = 30\n\
              forced_collision = true\n\
+             techniques = 4\n\
+             wavelengths_per_channel = 1\n\
+             evaluation = \"all\"\n\
              \n\
              [[lights]]\n\
              directional = {{ direction = [{x}, {y}, {z}], irradiance = \"am0\" }}\n\
