@@ -8,7 +8,7 @@ use super::Output;
 use crate::cube::{Cube, Existing, integrate};
 use crate::files::shown;
 use crate::format::response;
-use crate::scene::load_sensor;
+use crate::scene::{Seen, load_sensor};
 use crate::sensor::{Applied, Settings, apply};
 use crate::{Error, Result};
 
@@ -91,9 +91,12 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     }
 }
 
+/// What optics may leave of the finest waves, of contrast, without a word.
+const MUCH: f64 = 0.1;
+
 fn expose(args: &Args, file: &Path, output: &Output) -> Result<()> {
     let cube = Cube::open_to_read(&args.cube)?;
-    let model = load_sensor(file, cube.channels())?;
+    let model = load_sensor(file, cube.channels(), Seen { pixel_tangent: cube.header().pixel_tangent() })?;
     for warning in &model.warnings {
         output.warn(warning)?;
     }
@@ -105,11 +108,24 @@ fn expose(args: &Args, file: &Path, output: &Output) -> Result<()> {
         overwrite: args.overwrite,
         about: file.file_name().unwrap_or_default().to_string_lossy().into_owned(),
     };
-    let Applied { bands, left_out, negative, pixels } =
+    let Applied { bands, left_out, negative, pixels, at_nyquist, noisy } =
         super::progress::watched(output, |progress| apply(&cube, &model, &settings, &args.output, progress))?;
     warn_left_out(&left_out, output)?;
     if negative > 0 {
-        output.warn(&format!("{negative} negative signals, which the noise of the cube makes, are taken as 0"))?;
+        let what = "which the noise of the cube makes, or a blur at sharp edges, are taken as 0";
+        output.warn(&format!("{negative} negative signals, {what}"))?;
+    }
+    if at_nyquist > MUCH && model.oversampling == 1 {
+        output.warn(&format!(
+            "the optics leave {:.0} % of the contrast of the finest waves that the cube's pixels hold: detail that the detector sees \
+             between pixels is missing; render with smaller pixels, and set detector.oversampling",
+            100.0 * at_nyquist
+        ))?;
+    }
+    for (band, share) in &noisy {
+        output.warn(&format!(
+            "{band}: the noise of the cube itself is about {share:.2} of the sensor's at the picture's mean; render more samples"
+        ))?;
     }
     let mut text = format!("{}: counts of {} bands of {}\n", args.output.display(), bands.len(), settings.about);
     let mut each = Vec::new();

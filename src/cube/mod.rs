@@ -49,7 +49,9 @@ pub use grid::{Grid, Rect};
 pub use layer::{Layer, LayerNames, Numbers, TileLayers};
 pub use map::Chunk;
 pub use merge::{merge_bytes, merge_means};
-pub use metadata::{AFFINE, CRS, FACTORED, FORMAT, Header, LAYERS, SENSOR_FORMAT, plain_attributes};
+pub use metadata::{
+    AFFINE, COUNTS_FORMAT, CRS, FACTORED, FORMAT, Header, LAYERS, PIXEL_TANGENT, SENSOR_FORMAT, plain_attributes,
+};
 pub use preview::reduction;
 pub use relight::{Relighted, relight};
 pub use runs::{Run, RunFile, RunState, SlurmTask, Stand, Work, node_name, now_s};

@@ -1,0 +1,156 @@
+//! How optics pass on detail: modulation transfer functions.
+
+use std::f64::consts::PI;
+
+use super::radiometry::Optical;
+use crate::scene::{Blur, SensorModel};
+use crate::spectral::Channels;
+
+/// How far interpolation between wavelengths may be from a channel's own function, anywhere.
+const SAME: f64 = 5e-4;
+/// The share of a point's light by which a blur is as wide as it is.
+const INSIDE: f64 = 0.99;
+
+/// The optics of a model; pixels have none here.
+#[derive(Debug, Clone, Copy)]
+pub struct Transfer<'a> {
+    blur: &'a Blur,
+    f_number: f64,
+    /// m.
+    pitch: f64,
+}
+
+impl<'a> Transfer<'a> {
+    /// `None` of optics that do not blur.
+    pub fn new(model: &'a SensorModel) -> Option<Transfer<'a>> {
+        let transfer = Transfer { blur: &model.optics.blur, f_number: model.optics.f_number, pitch: model.pitch };
+        (*transfer.blur != Blur::None).then_some(transfer)
+    }
+
+    /// Share of the contrast of a sine wave that is left, at light of `nm`; `frequency` in cycles a metre on the detector. Of a circular
+    /// aperture 2/π (acos s - s √(1 - s²)), s = frequency · λN (Goodman, *Introduction to Fourier Optics*).
+    pub fn at(&self, nm: f64, frequency: f64) -> f64 {
+        match self.blur {
+            Blur::None => 1.0,
+            Blur::Gaussian(sigma) => (-2.0 * (PI * sigma * self.pitch * frequency).powi(2)).exp(),
+            Blur::Diffraction => {
+                let s = frequency * nm * 1e-9 * self.f_number;
+                if s < 1.0 { 2.0 / PI * (s.acos() - s * (1.0 - s * s).sqrt()) } else { 0.0 }
+            }
+            Blur::Measured(table) => {
+                let (at, x, y) = (1e-3 * frequency, &table.cycles_per_mm, &table.values);
+                let i = x.partition_point(|x| *x <= at);
+                if i == x.len() {
+                    // The last value itself; beyond it nothing is measured, and nothing asked for (`check`).
+                    return if at <= x[i - 1] { y[i - 1] } else { 0.0 };
+                }
+                y[i - 1] + (at - x[i - 1]) / (x[i] - x[i - 1]) * (y[i] - y[i - 1])
+            }
+        }
+    }
+
+    /// Where it is 0 from, cycles a metre; of a Gaussian where it is 1e-8.
+    pub fn end(&self, nm: f64) -> f64 {
+        match self.blur {
+            Blur::None => f64::INFINITY,
+            Blur::Gaussian(sigma) => (8.0 * 10f64.ln() / 2.0).sqrt() / (PI * sigma * self.pitch),
+            Blur::Diffraction => 1.0 / (nm * 1e-9 * self.f_number),
+            Blur::Measured(table) => 1e3 * table.cycles_per_mm[table.cycles_per_mm.len() - 1],
+        }
+    }
+
+    /// Says what is wrong with a measured table for frequencies up to `highest`, cycles a metre.
+    pub fn check(&self, highest: f64) -> Result<(), String> {
+        let Blur::Measured(table) = self.blur else { return Ok(()) };
+        let last = table.cycles_per_mm.len() - 1;
+        let (end, value, needed) = (table.cycles_per_mm[last], table.values[last], 1e-3 * highest);
+        // As it is written, to rounding.
+        if value == 0.0 || end >= needed * (1.0 - 1e-6) {
+            return Ok(());
+        }
+        Err(format!(
+            "optics.mtf ends at {end} cycles/mm with {value}, and the cube's pixels hold waves of up to {needed:.1} cycles/mm (along \
+             diagonals): go on to there, or to 0"
+        ))
+    }
+
+    /// Radius, m, of the circle around a point's image that holds 99 % of its light, at `nm`: from there on. The light within r is
+    /// 2πr ∫ MTF(ν) J₁(2πrν) dν.
+    pub fn radius(&self, nm: f64) -> f64 {
+        const POINTS: u32 = 4000;
+        let end = self.end(nm);
+        if !end.is_finite() {
+            return 0.0;
+        }
+        let step = end / f64::from(POINTS);
+        // The midpoint rule: waves of J₁ have hundreds of points each.
+        let table: Vec<(f64, f64)> =
+            (0..POINTS).map(|i| (f64::from(i) + 0.5) * step).map(|nu| (nu, self.at(nm, nu))).collect();
+        let within = |r: f64| -> f64 {
+            2.0 * PI * r * step * table.iter().map(|(nu, m)| m * libm::j1(2.0 * PI * r * nu)).sum::<f64>()
+        };
+        // A tenth of a wave to a hundred of them: an Airy pattern has 99 % within 20.
+        let radii = || (0..180).map(|i| 0.1 / end * 1.04f64.powi(i));
+        radii().filter(|r| within(*r) < INSIDE).last().map_or(0.1 / end, |r| 1.04 * r)
+    }
+}
+
+/// How the channels of a band are gathered before they are blurred: each between two wavelengths.
+#[derive(Debug, Clone)]
+pub struct Nodes {
+    /// nm.
+    pub nm: Vec<f64>,
+    /// For each of the band's weights the first of its two nodes, and the share of the second.
+    pub places: Vec<(usize, f64)>,
+}
+
+impl Nodes {
+    /// As few wavelengths as keep every channel's function within [`SAME`], up to `highest` cycles a metre; a channel's function is that of
+    /// its centre. All shares of a channel add up to 1, so that no light is lost.
+    pub fn new(transfer: Option<Transfer>, band: &Optical, channels: &Channels, highest: f64) -> Nodes {
+        let centres: Vec<f64> = band.weights.iter().map(|(k, _)| channels.centre(*k)).collect();
+        let one = || Nodes { nm: vec![centres[0]], places: vec![(0, 0.0); centres.len()] };
+        let Some(transfer) = transfer.filter(|transfer| *transfer.blur == Blur::Diffraction) else { return one() };
+        let mut all = centres.clone();
+        all.sort_by(f64::total_cmp);
+        all.dedup();
+        let (first, last) = (all[0], all[all.len() - 1]);
+        let mut count = 2;
+        while count < all.len() {
+            let ratio = (last / first).powf(1.0 / (count - 1) as f64);
+            let nm: Vec<f64> = (0..count).map(|i| first * ratio.powi(i as i32)).collect();
+            let nodes = Nodes { places: centres.iter().map(|centre| place(&nm, *centre)).collect(), nm };
+            if nodes.error(transfer, &centres, highest) <= SAME {
+                return nodes;
+            }
+            count = count * 3 / 2 + 1;
+        }
+        // As many as channels: each its own.
+        Nodes { places: centres.iter().map(|centre| place(&all, *centre)).collect(), nm: all }
+    }
+
+    /// The largest distance from the channels' own functions.
+    fn error(&self, transfer: Transfer, centres: &[f64], highest: f64) -> f64 {
+        const FREQUENCIES: u32 = 512;
+        let each = centres.iter().zip(&self.places).flat_map(|(centre, &(node, share))| {
+            let end = transfer.end(*centre).min(highest);
+            (1..=FREQUENCIES).map(move |i| {
+                let nu = end * f64::from(i) / f64::from(FREQUENCIES);
+                let next = (node + 1).min(self.nm.len() - 1);
+                let [a, b] = [node, next].map(|node| transfer.at(self.nm[node], nu));
+                (a + share * (b - a) - transfer.at(*centre, nu)).abs()
+            })
+        });
+        each.fold(0.0, f64::max)
+    }
+}
+
+/// Between which of the ascending `nm` a wavelength lies.
+fn place(nm: &[f64], at: f64) -> (usize, f64) {
+    let i = nm.partition_point(|nm| *nm <= at).clamp(1, nm.len().max(2) - 1);
+    if nm.len() < 2 {
+        return (0, 0.0);
+    }
+    let share = ((at - nm[i - 1]) / (nm[i] - nm[i - 1])).clamp(0.0, 1.0);
+    if share == 1.0 { (i, 0.0) } else { (i - 1, share) }
+}
