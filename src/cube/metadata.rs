@@ -577,7 +577,7 @@ impl Header {
 }
 
 /// Refuses an array whose stored metadata make other numbers of it than `ours`; `who` has given it those.
-fn check_meaning(path: &Path, who: &str, name: &str, ours: &Value, stored: &Value) -> Result<()> {
+pub(super) fn check_meaning(path: &Path, who: &str, name: &str, ours: &Value, stored: &Value) -> Result<()> {
     let Some(what) = other_meaning(&ours["attributes"], &stored["attributes"]) else { return Ok(()) };
     let help = "values are read as Spectile writes them: put that right, or open the cube with xarray";
     Err(Error::storage(path, format!("{who} `{name}` {what}; {help}")))

@@ -14,6 +14,7 @@ mod arrays;
 mod checksums;
 mod choices;
 mod compare;
+mod counts;
 mod create;
 mod epochs;
 mod estimate;
@@ -59,7 +60,7 @@ pub use sensor::{Findings, integrate};
 pub use state::{CubeState, RegionMean, Seen, Window};
 pub use store::{Cube, Progress};
 pub use verify::Verification;
-pub use view::{Quantity, Reader, Strides, View, White};
+pub use view::{Integers, Quantity, Reader, Strides, View, White};
 pub use weights::{Merging, Weights, systematic};
 pub use writer::Writer;
 

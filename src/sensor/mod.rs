@@ -21,4 +21,4 @@ pub use detect::{Clipped, Electronics};
 pub use figures::Figures;
 pub use noise::Stream;
 pub use radiometry::{Bands, Optical};
-pub use transfer::Transfer;
+pub use transfer::{Transfer, TransferCurve, curves};

@@ -95,6 +95,46 @@ impl<'a> Transfer<'a> {
     }
 }
 
+/// A transfer function to be drawn.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TransferCurve {
+    pub name: String,
+    /// Cycles/mm on the detector, and the share of contrast that is left.
+    pub points: Vec<(f64, f64)>,
+    /// Whether others are to be compared with it.
+    pub is_guide: bool,
+}
+
+/// The transfer functions of every band, at its mean wavelength: of the optics, and with the pixel, sin(πpν)/(πpν) of its pitch p along an
+/// axis; those of the pixel and of the highest frequency that it samples beside them.
+pub fn curves(model: &SensorModel, bands: &[Optical]) -> Vec<TransferCurve> {
+    const POINTS: u32 = 400;
+    let transfer = Transfer::new(model);
+    let pixel = |nu: f64| {
+        let x = PI * model.pitch * nu;
+        if x == 0.0 { 1.0 } else { (x.sin() / x).abs() }
+    };
+    let end = |band: &Optical| transfer.map_or(0.0, |transfer| transfer.end(band.centre));
+    // Up to where a pixel's is 0, or the optics' where that is not far beyond.
+    let highest = bands.iter().map(end).fold(0.0, f64::max).clamp(1.0 / model.pitch, 2.0 / model.pitch);
+    let curve = |name: String, is_guide: bool, of: &dyn Fn(f64) -> f64| {
+        let frequency = |i: u32| highest * f64::from(i) / f64::from(POINTS);
+        let points = (0..=POINTS).map(frequency).map(|nu| (1e-3 * nu, of(nu))).collect();
+        TransferCurve { name, points, is_guide }
+    };
+    let mut curves = Vec::new();
+    for (band, transfer) in bands.iter().filter_map(|band| Some((band, transfer?))) {
+        let (name, nm) = (&band.name, band.centre);
+        curves.push(curve(format!("{name}, {nm:.0} nm: optics"), false, &|nu| transfer.at(nm, nu)));
+        curves.push(curve(format!("{name}: with the pixel"), false, &|nu| transfer.at(nm, nu) * pixel(nu)));
+    }
+    curves.push(curve("pixel".into(), true, &pixel));
+    let nyquist = 0.5e-3 / model.pitch;
+    let line = vec![(nyquist, 0.0), (nyquist, 1.0)];
+    curves.push(TransferCurve { name: format!("Nyquist frequency, {nyquist:.1}"), points: line, is_guide: true });
+    curves
+}
+
 /// How the channels of a band are gathered before they are blurred: each between two wavelengths.
 #[derive(Debug, Clone)]
 pub struct Nodes {

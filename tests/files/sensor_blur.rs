@@ -68,14 +68,14 @@ fn exposed(cube: &Cube, text: &str, noise: bool, out: &Path) -> (Applied, Vec<f6
 /// Where an Airy pattern has its first zero, over λN: J₁'s first zero over π.
 const FIRST_ZERO: f64 = 1.219_669_891;
 
-/// A point's image: all its light, and dark rings where the theory has them. The pattern is sampled at λN/8; its first zero is where the
-/// intensity, which is a square there, has its least value, by a parabola through its root's absolute value on both sides.
+/// A point's image: all its light, and the first dark ring where the theory has it. The pattern is sampled at λN/8; amplitudes, roots of
+/// intensities with the sign that changes at the zero, are smooth, and a parabola through three of them is 0 there.
 #[test]
 fn a_point_becomes_an_airy_pattern() {
     let folder = tempdir().expect("folder");
-    let (size, at) = ([160, 144], [80u32, 72u32]);
+    let (size, at) = ([320, 288], [160u32, 144u32]);
     let point = |x: u32, y: u32, _| if [x, y] == at { 1000.0 } else { 0.0 };
-    let cube = cube(folder.path(), "point.zarr", (size, 16), 1, None, point);
+    let cube = cube(folder.path(), "point.zarr", (size, 64), 1, None, point);
     let sharp = model("", "pitch = 1e-6");
     let (_, before, width) = exposed(&cube, &sharp, false, &folder.path().join("a.zarr"));
     let blurred = model("psf = \"diffraction\"", "pitch = 1e-6");
@@ -83,13 +83,16 @@ fn a_point_becomes_an_airy_pattern() {
     let (sum_before, sum_after) = (before.iter().sum::<f64>(), after.iter().sum::<f64>());
     println!("light {:e} of {sum_before:e}", sum_after / sum_before - 1.0);
     assert!((sum_after / sum_before - 1.0).abs() < 1e-6, "{sum_before} {sum_after}");
-    // Amplitudes change sign at the zero: signed roots along the row through the point, and where they cross 0.
     let row = &after[at[1] as usize * width..][at[0] as usize..];
     let least = (5..14).min_by(|a, b| row[*a].total_cmp(&row[*b])).expect("pixels");
-    let amplitude = |i: usize| if i < least { row[i].sqrt() } else { -row[i].sqrt() };
-    // The least value itself may lie on either side.
-    let (a, b) = (least - 1, least + 1);
-    let zero = a as f64 + (b - a) as f64 * amplitude(a) / (amplitude(a) - amplitude(b));
+    let (before_it, after_it) = (row[least - 1].sqrt(), -row[least + 1].sqrt());
+    // The least value itself may lie on either side: where amplitudes are smoother.
+    let bend = |middle: f64| before_it - 2.0 * middle + after_it;
+    let root = row[least].max(0.0).sqrt();
+    let middle = if bend(root).abs() < bend(-root).abs() { root } else { -root };
+    let slope = 0.5 * (after_it - before_it);
+    let offset = (0..20).fold(0.0, |x, _| -(middle + 0.5 * bend(middle) * x * x) / slope);
+    let zero = least as f64 + offset;
     println!("first zero at {zero} pixels, {} expected", 8.0 * FIRST_ZERO);
     assert!((zero / (8.0 * FIRST_ZERO) - 1.0).abs() < 0.005, "{zero}");
     // The peak: all light times π / (4 λ²N²) a pixel.
@@ -113,7 +116,7 @@ fn waves_keep_the_contrast_of_the_transfer_function() {
         nu => 0.3 * (800.0 - nu) / 700.0,
     };
     let mut edge: Vec<(f64, f64)> = Vec::new();
-    for m in size::first(6, [12u32, 40, 100, 112, 118, 122, 60, 80, 90, 105, 115, 119, 120, 150, 239]) {
+    for m in size::first(6, [24u32, 80, 200, 228, 236, 239, 1, 60, 120, 150, 180, 210, 220, 232, 238]) {
         // m / 2W cycles a pixel.
         let frequency = f64::from(m) / f64::from(2 * WIDTH);
         let wave = |x: u32| (2.0 * PI * frequency * (f64::from(x) + 0.5)).cos();
@@ -143,7 +146,7 @@ fn waves_keep_the_contrast_of_the_transfer_function() {
         assert!((found - expected).abs() < 2e-6, "{m}: {found} {expected}");
     }
     // Near its end the function is 8√2 / 3π (1 - s)^(3/2) to first order: its 2/3 power is a line, whose zero is the cut-off.
-    edge.retain(|(s, found)| *s > 0.9 && *found > 1e-4);
+    edge.retain(|(s, found)| *s > 0.9 && *found > 1e-3);
     edge.sort_by(|a, b| a.0.total_cmp(&b.0));
     let power = |i: usize| (edge[i].0, edge[i].1.powf(2.0 / 3.0));
     let ((a, p), (b, q)) = (power(edge.len() - 2), power(edge.len() - 1));
