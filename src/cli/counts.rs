@@ -40,7 +40,7 @@ pub fn info(cube: &Cube, output: &Output) -> Result<()> {
             "origin": header.origin,
             "tile": header.tile,
             "tiles": progress.tiles,
-            "tiles_missing": progress.tiles_missing()[0],
+            "tiles_missing": progress.missing.iter().map(|tiles| [tiles.start, tiles.end]).collect::<Vec<_>>(),
             "count_most": most,
             "count_missing": missing,
             "bands": bands.collect::<Vec<_>>(),
