@@ -424,9 +424,65 @@ fn bands_by_files_and_efficiencies_that_end() {
     let table = "quantum_efficiency = { samples = [[400, 0.5], [620, 0.5]] }";
     let output = make("qe.zarr", &MODEL.replace("quantum_efficiency = 0.5", table));
     let stderr = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success() && stderr.contains("does not cover 620 to 700 nm: it is 0 there"), "{stderr}");
+    assert!(output.status.success() && stderr.contains("does not cover 620-700 nm: it is 0 there"), "{stderr}");
     // Of the red band a fifth is left: 600 to 620 of 700 nm.
     let of_red = |name: &str| counts(&path.join(name), SIZE)[260..].iter().map(|c| f64::from(*c) - 50.0).sum::<f64>();
     let (cut, whole) = (of_red("qe.zarr"), of_red("ends.zarr"));
     assert!(cut > 0.1 * whole && cut < 0.25 * whole, "{cut} {whole}");
+}
+
+/// The page's model is one, and its program finds a spot as far away as it must: 2 x 2 pixels of 600 K before 290 K, seen without a blur.
+#[test]
+fn the_page_tells_how_far_a_spot_is_seen() {
+    let page = repository("docs/SENSORS.md");
+    let text = fs::read_to_string(&page).expect("read");
+    let channels = Channels::equal(3000.0, 5000.0, 20);
+    let block = text.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).expect("a model");
+    let model = spectile::scene::parse_sensor(block, &page, &channels, Seen::default()).expect("the page's model");
+    assert!((model.pitch, model.optics.f_number, model.bits) == (15e-6, 2.5, 14), "{model:?}");
+
+    let folder = tempdir().expect("folder");
+    let path = folder.path();
+    let means = |kelvin: f64| -> Vec<f64> {
+        let mean = |[from, to]: [f64; 2]| {
+            (0..100).map(|i| planck::radiance(from + (to - from) * (f64::from(i) + 0.5) / 100.0, kelvin)).sum::<f64>()
+                / 100.0
+        };
+        channels.bounds.iter().map(|bounds| mean(*bounds)).collect()
+    };
+    let (cold, hot) = (means(290.0), means(600.0));
+    let cube = create(path, "cube.zarr", Header { channels: channels.clone(), ..header([32, 20], [16, 16], 1) });
+    for tile in 0..cube.grid().count() {
+        let value = |x: u32, y: u32, k: usize| if x / 2 == 8 && y / 2 == 4 { hot[k] } else { cold[k] } as f32;
+        cube.merge_unit(tile, 1, &unit(&cube, tile, value)).expect("merged");
+    }
+    let model = fs::read_to_string(repository("sensors/mwir-insb.toml")).expect("read");
+    fs::write(path.join("sensor.toml"), model.replace("psf = \"diffraction\"", "")).expect("written");
+    success(path, &["sensor", "cube.zarr", "--model", "sensor.toml", "-o", "counts.zarr", "--electrons"]);
+    // π τ A t QE / 4N² Σ L_k Δ(λ²) / 2hc.
+    let per_radiance = std::f64::consts::PI * 0.85 / (4.0 * 6.25) * 15e-6f64.powi(2) * 0.0033 * 0.9 * 1e-9
+        / (2.0 * 6.626_070_15e-34 * 299_792_458.0);
+    let electrons = |radiance: &[f64]| -> f64 {
+        let square = |[from, to]: [f64; 2]| to * to - from * from;
+        per_radiance * radiance.iter().zip(&channels.bounds).map(|(l, bounds)| l * square(*bounds)).sum::<f64>()
+    };
+    let facts: serde_json::Value =
+        serde_json::from_str(&success(path, &["info", "counts.zarr", "--json"])).expect("JSON");
+    let warm = facts["attributes"]["background_signal"][0].as_f64().expect("electrons");
+    let noise = (electrons(&cold) + warm + 5e4 * 0.0033 + 400.0 * 400.0 + 430.0 * 430.0 / 12.0).sqrt();
+    let expected = 58.0 * (4.0 * (electrons(&hot) - electrons(&cold)) / (5.0 * noise)).sqrt();
+    let Some(said) = read_counts(&["example", page.to_str().expect("a name"), path.to_str().expect("a name")]) else {
+        return;
+    };
+    let found: serde_json::Value = serde_json::from_str(&said).expect("JSON");
+    let range = |share: &str| found["ranges"][share].as_f64().expect("metres");
+    println!("{} m, {expected} by hand", range("1.0"));
+    assert_eq!(found["pixels"], 4);
+    assert!((range("1.0") / expected - 1.0).abs() < 1e-4, "{found} {expected}");
+    assert!((range("0.01") / expected - 0.1).abs() < 1e-5, "{found}");
+    // R e^(αR/2) is the range without air.
+    let air = found["air"]["0.01"].as_f64().expect("metres");
+    assert!((air * (0.1e-3 * air).exp() / range("0.01") - 1.0).abs() < 1e-5, "{found}");
+    let snr = electrons(&hot) / (electrons(&hot) + noise * noise - electrons(&cold)).sqrt();
+    assert!((found["snr"].as_f64().expect("a number") / snr - 1.0).abs() < 1e-4, "{found} {snr}");
 }

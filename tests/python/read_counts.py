@@ -124,7 +124,8 @@ def example(page, folder):
     os.chdir(folder)
     names = {}
     exec(compile(program, page, "exec"), names)
-    print(json.dumps({"snr": float(np.nanmax(names["snr"])), "ranges": names["ranges"], "pixels": int(names["hot"].sum())}))
+    found = {"snr": float(np.nanmax(names["snr"])), "median": float(np.nanmedian(names["snr"])), "pixels": int(names["hot"].sum())}
+    print(json.dumps({**found, "ranges": names["ranges"], "air": names["through_air"]}))
 
 
 if __name__ == "__main__":
