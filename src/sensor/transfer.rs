@@ -194,3 +194,63 @@ fn place(nm: &[f64], at: f64) -> (usize, f64) {
     let share = ((at - nm[i - 1]) / (nm[i] - nm[i - 1])).clamp(0.0, 1.0);
     if share == 1.0 { (i, 0.0) } else { (i - 1, share) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const AIRY: Transfer = Transfer { blur: &Blur::Diffraction, f_number: 2.5, pitch: 15e-6 };
+
+    /// 400 channels from 3 to 5 um are gathered between far fewer wavelengths, all shares of which are shares, and every channel's function is
+    /// kept at frequencies that no choice has looked at.
+    #[test]
+    fn many_channels_share_few_wavelengths() {
+        let channels = Channels::equal(3000.0, 5000.0, 400);
+        let band = Optical {
+            name: "band".into(),
+            response: None,
+            weights: (0..400).map(|k| (k, 1.0)).collect(),
+            background: 0.0,
+            black_body: [0.0; 2],
+            centre: 4000.0,
+        };
+        let highest = 0.5 * 2.0f64.sqrt() / AIRY.pitch;
+        // Of coarse pixels, whose waves end far before the cut-off, and of fine ones.
+        for (highest, most) in [(highest, 40), (10.0 * highest, 80)] {
+            let nodes = Nodes::new(Some(AIRY), &band, &channels, highest);
+            assert!(nodes.nm.len() < most && nodes.places.len() == 400, "{}", nodes.nm.len());
+            let mut worst = 0.0f64;
+            for (k, &(node, share)) in nodes.places.iter().enumerate() {
+                assert!(
+                    (0.0..1.0).contains(&share) && node < nodes.nm.len() && (share == 0.0 || node + 1 < nodes.nm.len())
+                );
+                for i in 0..977 {
+                    let nu = highest * f64::from(i) / 977.0;
+                    let second = if share > 0.0 { share * AIRY.at(nodes.nm[node + 1], nu) } else { 0.0 };
+                    let found = (1.0 - share) * AIRY.at(nodes.nm[node], nu) + second;
+                    worst = worst.max((found - AIRY.at(channels.centre(k), nu)).abs());
+                }
+            }
+            println!("{} wavelengths, off by {worst:e}", nodes.nm.len());
+            // Between the frequencies that were looked at a little more.
+            assert!(worst < 1.1 * SAME, "{worst}");
+        }
+        let table = Blur::Gaussian(0.5);
+        let one = Nodes::new(Some(Transfer { blur: &table, ..AIRY }), &band, &channels, highest);
+        assert_eq!((one.nm.len(), one.places[399]), (1, (0, 0.0)));
+    }
+
+    /// Light within r of an Airy pattern: 1 - J₀² - J₁² of πr/λN (Rayleigh 1881). Of a Gaussian 1 - e^(-r²/2σ²).
+    #[test]
+    fn circles_hold_99_percent() {
+        let lambda_n = 4e-6 * 2.5;
+        let radius = AIRY.radius(4000.0);
+        let within = |r: f64| 1.0 - libm::j0(PI * r / lambda_n).powi(2) - libm::j1(PI * r / lambda_n).powi(2);
+        println!("{} λN", radius / lambda_n);
+        assert!(within(radius) >= INSIDE - 1e-4 && within(radius / 1.09) < INSIDE, "{radius}");
+        let gaussian = Transfer { blur: &Blur::Gaussian(0.7), ..AIRY };
+        let expected = 0.7 * 15e-6 * (2.0 * 100f64.ln()).sqrt();
+        let radius = gaussian.radius(4000.0);
+        assert!(radius >= expected * 0.999 && radius < 1.05 * expected, "{radius} {expected}");
+    }
+}
