@@ -486,3 +486,36 @@ fn the_page_tells_how_far_a_spot_is_seen() {
     let snr = electrons(&hot) / (electrons(&hot) + noise * noise - electrons(&cold)).sqrt();
     assert!((found["snr"].as_f64().expect("a number") / snr - 1.0).abs() < 1e-4, "{found} {snr}");
 }
+
+/// Eight epochs of 0.9 and 1.1 by turns: their mean has the relative standard error 0.1 √(8/7) / √8, which is far more than a tenth of the
+/// sensor's noise; eight equal ones have none.
+#[test]
+fn noise_of_the_cube_itself_is_told() {
+    let folder = tempdir().expect("folder");
+    let path = folder.path();
+    fs::write(path.join("sensor.toml"), MODEL.replace("integration_time = 0.01", "integration_time = 1e-4"))
+        .expect("written");
+    for (name, swing) in [("noisy.zarr", 0.1f32), ("still.zarr", 0.0)] {
+        let channels = Channels::equal(400.0, 700.0, 30);
+        let cube = create(path, name, Header { channels, epoch: 1, ..header(SIZE, SIZE, 1) });
+        for i in 0..8 {
+            let value = if i % 2 == 0 { 1.0 - swing } else { 1.0 + swing };
+            cube.merge_unit(0, 1, &unit(&cube, 0, |_, _, _| 0.01 * value)).expect("merged");
+        }
+        let output = run(path, &["sensor", name, "--model", "sensor.toml", "-o", &format!("s-{name}")]);
+        let [said, warned] = [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text).into_owned());
+        assert!(output.status.success(), "{warned}");
+        let snr =
+            said.split("blue: SNR ").nth(1).and_then(|rest| rest.split(',').next()?.parse::<f64>().ok()).expect("SNR");
+        let share = warned.split("blue: the noise of the cube itself is about ").nth(1);
+        let share = share.and_then(|rest| rest.split(' ').next()?.parse::<f64>().ok());
+        match swing > 0.0 {
+            true => {
+                let expected = snr * 0.1 / 7f64.sqrt();
+                let share = share.expect("a warning");
+                assert!(expected > 0.1 && (share - expected).abs() < 0.006, "{share} {expected}: {warned}");
+            }
+            false => assert!(!warned.contains("noise of the cube"), "{warned}"),
+        }
+    }
+}
