@@ -175,7 +175,7 @@ fn wrong_models_are_refused_by_name() {
     for (from, to, key, words) in [
         ("f_number = 2.5", "f_number = 0.2", "optics.f_number", "0.5 or greater"),
         ("f_number = 2.5", "focal_length = 0.1", "optics", "f_number"),
-        ("f_number = 2.5", "f_number = 2.5\npsf = 1", "optics.psf", "gaussian"),
+        ("f_number = 2.5", "f_number = 2.5\npsf = \"airy\"", "optics.psf", "gaussian"),
         ("bits = 14", "bits = 40", "detector.bits", "1 to 24"),
         ("bits = 14", "bits = 14\nresponsivity = 1", "detector.responsivity", "not for photon"),
         ("gain = 400", "", "detector.gain", "missing"),
