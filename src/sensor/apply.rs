@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::detect::{Clipped, Electronics};
 use super::figures::Figures;
-use super::planes::Planes;
+use super::planes::{Planes, Wrong};
 use super::radiometry::{Bands, Optical};
 use super::store::{Store, Values};
 use crate::cube::{Chunk, Cube, Grid, Rect};
@@ -302,13 +302,7 @@ type Light<'a> = dyn Fn(usize, u32, u32) -> Option<f64> + Sync + 'a;
 
 impl Exposure<'_> {
     /// Fills `values` and adds to `rows`, one a band. Errors: pixel and band of a signal that is not finite.
-    fn tile(
-        &self,
-        tile: u32,
-        light: &Light,
-        values: &mut Values,
-        rows: &mut [Row],
-    ) -> std::result::Result<(), ([u32; 2], usize)> {
+    fn tile(&self, tile: u32, light: &Light, values: &mut Values, rows: &mut [Row]) -> std::result::Result<(), Wrong> {
         let (rect, [width, height]) = (self.frame.grid.rect(tile), self.frame.grid.tile.map(|side| side as usize));
         values.clear();
         let tasks: Vec<_> = values.rows(width).enumerate().collect();

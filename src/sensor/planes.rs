@@ -23,6 +23,10 @@ const PIECE_BYTES: usize = 32 << 20;
 /// What a step of the work is called with: steps done.
 pub type Step<'a> = dyn FnMut(u64) -> Result<()> + 'a;
 
+/// Pixel and band of a signal that is not finite.
+pub type Wrong = ([u32; 2], usize);
+
+/// All planes of a picture.
 pub struct Planes<'a> {
     /// The store that is being made, which errors name.
     store: &'a Path,
@@ -102,8 +106,8 @@ impl<'a> Planes<'a> {
         self.transfer.map_or(0.0, of)
     }
 
-    /// Takes the radiance of a tile. Returns pixel and band of the first value that is not finite.
-    pub fn put(&mut self, chunk: &Chunk) -> Result<Option<([u32; 2], usize)>> {
+    /// Takes the radiance of a tile. Returns the first signal that is not finite.
+    pub fn put(&mut self, chunk: &Chunk) -> Result<Option<Wrong>> {
         let rect = chunk.rect();
         let planes: usize = self.bands.iter().map(|(_, nodes)| nodes.nm.len()).sum();
         let width = rect.width() as usize;
@@ -111,7 +115,7 @@ impl<'a> Planes<'a> {
         for y0 in (rect.y0..rect.y1).step_by(together as usize) {
             let rows: Vec<u32> = (y0..(y0 + together).min(rect.y1)).collect();
             // [row][plane][x].
-            let sums: Vec<std::result::Result<Vec<f64>, ([u32; 2], usize)>> =
+            let sums: Vec<std::result::Result<Vec<f64>, Wrong>> =
                 rows.par_iter().map(|&y| self.row(chunk, y, planes)).collect();
             let mut found = Vec::with_capacity(sums.len());
             for row in sums {
@@ -129,7 +133,7 @@ impl<'a> Planes<'a> {
         Ok(None)
     }
 
-    fn row(&self, chunk: &Chunk, y: u32, planes: usize) -> std::result::Result<Vec<f64>, ([u32; 2], usize)> {
+    fn row(&self, chunk: &Chunk, y: u32, planes: usize) -> std::result::Result<Vec<f64>, Wrong> {
         let rect = chunk.rect();
         let width = rect.width() as usize;
         let mut sums = vec![0.0; planes * width];

@@ -90,8 +90,8 @@ impl<'a> Transfer<'a> {
             2.0 * PI * r * step * table.iter().map(|(nu, m)| m * libm::j1(2.0 * PI * r * nu)).sum::<f64>()
         };
         // A tenth of a wave to a hundred of them: an Airy pattern has 99 % within 20.
-        let radii = || (0..180).map(|i| 0.1 / end * 1.04f64.powi(i));
-        radii().filter(|r| within(*r) < INSIDE).last().map_or(0.1 / end, |r| 1.04 * r)
+        let radii = (0..180).map(|i| 0.1 / end * 1.04f64.powi(i));
+        radii.rev().find(|r| within(*r) < INSIDE).map_or(0.1 / end, |r| 1.04 * r)
     }
 }
 

@@ -228,7 +228,8 @@ fn by_hand(
     }
     let mut found = Vec::new();
     for y in 0..height {
-        let line: Vec<f64> = (0..width).map(|m| (0..height).map(|n| sums[n][m] * along[n][y]).sum()).collect();
+        let at = |n: usize| along[n][y];
+        let line: Vec<f64> = (0..width).map(|m| (0..height).map(|n| sums[n][m] * at(n)).sum()).collect();
         found.extend((0..width).map(|x| (0..width).map(|m| line[m] * across[m][x]).sum::<f64>()));
     }
     found
