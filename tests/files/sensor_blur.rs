@@ -228,8 +228,9 @@ fn by_hand(
     }
     let mut found = Vec::new();
     for y in 0..height {
-        let at = |n: usize| along[n][y];
-        let line: Vec<f64> = (0..width).map(|m| (0..height).map(|n| sums[n][m] * at(n)).sum()).collect();
+        let waves_there: Vec<f64> = along.iter().map(|wave| wave[y]).collect();
+        let column = |m: usize| sums.iter().zip(&waves_there).map(|(sums, wave)| sums[m] * wave).sum::<f64>();
+        let line: Vec<f64> = (0..width).map(column).collect();
         found.extend((0..width).map(|x| (0..width).map(|m| line[m] * across[m][x]).sum::<f64>()));
     }
     found
