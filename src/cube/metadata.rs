@@ -463,7 +463,7 @@ impl Header {
         let layout = match group["attributes"]["spectile_format"].as_u64() {
             Some(format) => Layout::of_format(format).ok_or_else(|| unknown_format(path, format))?,
             None if !group["attributes"][SENSOR_FORMAT].is_null() => {
-                let what = "holds counts of a sensor, of which this command makes nothing; it takes cubes of radiance";
+                let what = "holds counts of a sensor, and this command takes cubes of radiance";
                 return Err(Error::storage(path, what));
             }
             None => {
