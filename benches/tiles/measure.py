@@ -22,15 +22,20 @@ import sys
 import tempfile
 
 SIMPLE = ["--set", 'integrator.evaluation="all"', "--set", "integrator.wavelengths_per_channel=1"]
-# Scene, size, tile, samples of an epoch, error, most samples.
+# Scene, nm, size, tile, samples of an epoch, error, most samples.
 GAINS = [
-    ("conference", "96x60", 8, 16, 0.3, 16384),
-    ("aircraft", "96x60", 8, 16, 0.1, 16384),
-    ("aircraft-infrared", "48x32", 8, 4, 0.2, 2048),
+    ("conference", (380, 780), "96x60", 8, 16, 0.3, 16384),
+    ("aircraft", (380, 780), "96x60", 8, 16, 0.1, 16384),
+    ("aircraft-infrared", (1500, 5500), "48x32", 8, 4, 0.2, 2048),
 ]
 # Scene, error, samples of the even renders.
 BIASES = [("cornell", 0.1, 512), ("conference", 0.5, 512)]
 TILES, TILE, CHANNELS, EPOCH = 4, 8, 8, 4
+
+
+def channels(nm):
+    """Eight of them. What a scene says of its own, such as false colours, goes."""
+    return f"channels={{ equal = {{ from = {nm[0]}.0, to = {nm[1]}.0, count = {CHANNELS} }} }}"
 
 
 def render(program, scene, out, *more):
@@ -69,12 +74,12 @@ def pixels(cube):
 
 
 def gain(program, folder, of):
-    for scene, size, tile, epoch, error, most in GAINS:
+    for scene, nm, size, tile, epoch, error, most in GAINS:
         if of not in (None, scene):
             continue
         cube = pathlib.Path(folder) / "gain.zarr"
         stop = ["--error", str(error), "--error-per", "tile", "--spp", str(most)]
-        shape = ["--size", size, "--tile", str(tile), "--set", "channels.equal.count=8", "--set", f"integrator.epoch={epoch}"]
+        shape = ["--size", size, "--tile", str(tile), "--set", channels(nm), "--set", f"integrator.epoch={epoch}"]
         done = render(program, scene, str(cube), *shape, *stop)
         found = samples(cube)
         mean = statistics.fmean(found)
@@ -92,7 +97,7 @@ def bias(program, folder, of, seeds):
 def bias_of(program, folder, scene, wanted, samples_of_even, seeds):
     cube = pathlib.Path(folder) / "bias.zarr"
     side = TILES * TILE
-    shape = ["--size", f"{side}x{side}", "--tile", str(TILE), "--set", f"channels.equal.count={CHANNELS}", "--set", f"integrator.epoch={EPOCH}"]
+    shape = ["--size", f"{side}x{side}", "--tile", str(TILE), "--set", channels((380, 780)), "--set", f"integrator.epoch={EPOCH}"]
     cells = TILES**2
     ended, even, squares, spread = [], [], None, []
     for seed in range(seeds):

@@ -18,7 +18,7 @@ from xarray.backends.zarr import ZarrBackendEntrypoint
 from ._errors import StorageError
 
 # Of cubes, and of counts by sensor models, by the attribute that holds it.
-FORMATS = {"spectile_format": (1, 2), "spectile_sensor_format": (1,)}
+FORMATS = {"spectile_format": (1, 2), "spectile_sensor_format": (1, 2)}
 
 
 def attributes(path: str) -> dict[str, Any] | None:

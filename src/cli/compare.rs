@@ -19,6 +19,8 @@ use crate::{Error, Result};
 /// Where a cube was rendered with --uncertainty, z is the difference of the means in units of its standard error (within -2
 /// and 2 in 95 % of all cases if nothing but noise differs) and z_rms that of single pixels, root mean square (then 1).
 ///
+/// Counts of a sensor (`sensor --model`) are compared with counts, band by band, without a unit.
+///
 /// Size and channels must agree, tiles need not. Pixels that one of the cubes has not rendered yet are left out, which is
 /// said. Of many channels, those ten with the largest relMSE are shown; --all shows all, and so does --json.
 #[derive(Debug, clap::Args)]
@@ -49,7 +51,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, output: &Output) -> Result<()> {
-    let (cube, reference) = (Cube::open_to_read(&args.a)?, Cube::open_to_read(&args.b)?);
+    let (cube, reference) = (Cube::open_picture(&args.a)?, Cube::open_picture(&args.b)?);
     let comparison = compare(&cube, &reference)?;
     let verdict = args.tolerance.map(|tolerance| judge(&comparison, tolerance));
     output.event("done", facts(args, &cube, &comparison, verdict.as_ref().map(|v| v.is_ok())))?;

@@ -205,7 +205,10 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         return Err(Error::Usage("--json and -o -: only one of them can have the standard output".into()));
     }
     let output = &Said { output, aside: to_standard_output };
-    let cube = Cube::open_to_read(&args.cube)?;
+    let cube = Cube::open_picture(&args.cube)?;
+    if cube.is_counts() {
+        refuse_of_counts(args)?;
+    }
     if args.temperature && args.bands.is_none() {
         refuse_without_heat(&args.cube, &cube)?;
     }
@@ -301,6 +304,27 @@ impl Said<'_> {
 
     fn event(&self, event: &str, fields: Value) -> Result<()> {
         self.output.event(event, fields)
+    }
+}
+
+/// Refuses what is asked of counts and can be had of radiance only.
+fn refuse_of_counts(args: &Args) -> Result<()> {
+    let asked = [
+        ("--temperature", args.temperature),
+        ("--integrated", args.integrated),
+        ("--xyz", args.xyz.is_some()),
+        ("--observer", args.observer.is_some()),
+        ("--reflectance", args.reflectance.is_some()),
+        ("--standard-error", args.standard_error),
+        ("--layers", !args.layers.is_empty()),
+    ];
+    match asked.into_iter().find(|(_, is_asked)| *is_asked) {
+        None => Ok(()),
+        Some((option, _)) => {
+            let what =
+                format!("holds counts of a sensor: {option} is about radiance, of the cube that they were made of");
+            Err(Error::Usage(format!("{} {what}", args.cube.display())))
+        }
     }
 }
 
@@ -587,6 +611,7 @@ fn write_map(args: &Args, view: &View, output: &Said) -> Result<()> {
     let (map, of, unit) = match (args.temperature, args.integrated) {
         (true, _) => (export::Map::Temperature, "brightness temperature", "K"),
         (_, true) => (export::Map::Integrated, "radiance", "W m-2 sr-1"),
+        _ if view.cube().is_counts() => (export::Map::Radiance, "mean counts", "counts"),
         _ => (export::Map::Radiance, "mean radiance", "W m-2 sr-1 nm-1"),
     };
     let missing = view.cube().progress()?.tiles_missing();

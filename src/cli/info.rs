@@ -26,6 +26,8 @@ use crate::{Error, Result};
 /// Where several processes or the tasks of an array job work on it, it says which tiles are done, being rendered, failed or still
 /// waiting, and by whom; with --watch again and again, until all are done.
 ///
+/// Of counts (`sensor --model`) it tells the sensor and, for every band, signal, SNR, NEDL, NETD and how many pixels were clipped.
+///
 /// With --verify every file is read and compared with its checksum; the exit code is 1 if one is damaged. Rendering the same
 /// scene into the cube with --resume puts it in order.
 #[derive(Debug, clap::Args)]
@@ -61,6 +63,16 @@ pub(super) const ROUGH_BELOW: u32 = 8;
 pub fn run(args: &Args, output: &Output) -> Result<()> {
     if args.watch {
         watch(args, output)?;
+    }
+    // Of counts as they are; of a cube also where others have changed its metadata.
+    if let Ok(counts) = Cube::open_picture(&args.cube)
+        && counts.is_counts()
+    {
+        if args.verify {
+            let what = "holds counts of a sensor, which have no checksums: make them anew to compare";
+            return Err(Error::Usage(format!("{} {what}", args.cube.display())));
+        }
+        return super::counts::info(&counts, output);
     }
     let cube = Cube::open(&args.cube)?;
     let verified = if args.verify { Some(cube.verify()?) } else { None };

@@ -6,6 +6,7 @@ mod bench;
 mod call;
 mod compare;
 mod converge;
+mod counts;
 mod devices;
 mod export;
 mod help;

@@ -7,9 +7,9 @@ use serde_json::json;
 use super::Output;
 use crate::cube::{Cube, Existing, integrate};
 use crate::files::shown;
-use crate::format::response;
-use crate::scene::load_sensor;
-use crate::sensor::{Applied, Settings, apply};
+use crate::format::{plot, response};
+use crate::scene::{Seen, load_sensor};
+use crate::sensor::{Applied, Bands, Settings, TransferCurve, apply, curves};
 use crate::{Error, Result};
 
 /// What a sensor would see of a cube: integrated with responses, or as counts of a detector behind optics
@@ -22,14 +22,16 @@ use crate::{Error, Result};
 ///
 /// (`channels.responses` in a scene weights while rendering instead: fewer channels, and no error of this kind.)
 ///
-/// With --model a file says what the optics and the detector are, and the result is the counts of every band, with shot noise,
-/// reading noise and fixed patterns: a Zarr store for xarray and others, with SNR, NEDL and, where black bodies at the reference
-/// temperature are seen, NETD of every band among its attributes. The same seed gives the same bytes.
+/// With --model a file says what the optics and the detector are, and the result is the counts of every band, blurred by the optics, with
+/// shot noise, reading noise and fixed patterns: a Zarr store for xarray and others, which `info`, `spectrum`, `compare`, `export` and
+/// `view` read too, with SNR, NEDL and, where black bodies at the reference temperature are seen, NETD of every band among its
+/// attributes. The same seed gives the same bytes. `sensors/` has models to begin with.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = "\
 Examples:
   spectile sensor cube.zarr --responses sentinel2.csv -o sentinel2.zarr
   spectile sensor cube.zarr --model camera.toml -o counts.zarr --seed 1
+  spectile sensor cube.zarr --model sensors/mwir-insb.toml -o counts.zarr --mtf-plot mtf.svg
 
 Responses are CSV: `wavelength_nm,red,green,blue`, a column a band; or long, with the header
 `band,wavelength_nm,response`. Lines that begin with # are comments.")]
@@ -61,6 +63,12 @@ pub struct Args {
     #[arg(long, requires = "model")]
     pub partial: bool,
 
+    /// Draw the transfer functions of optics and pixel too, as SVG, at the mean wavelength of every band
+    ///
+    /// An earlier plot of that name is replaced; nothing else is.
+    #[arg(long, value_name = "FILE.svg", requires = "model")]
+    pub mtf_plot: Option<PathBuf>,
+
     /// The cube to make, a folder
     #[arg(short, long, value_name = "OUT.zarr")]
     pub output: PathBuf,
@@ -91,9 +99,12 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     }
 }
 
+/// What optics may leave of the finest waves, of contrast, without a word.
+const MUCH: f64 = 0.1;
+
 fn expose(args: &Args, file: &Path, output: &Output) -> Result<()> {
     let cube = Cube::open_to_read(&args.cube)?;
-    let model = load_sensor(file, cube.channels())?;
+    let model = load_sensor(file, cube.channels(), Seen { pixel_tangent: cube.header().pixel_tangent() })?;
     for warning in &model.warnings {
         output.warn(warning)?;
     }
@@ -105,11 +116,27 @@ fn expose(args: &Args, file: &Path, output: &Output) -> Result<()> {
         overwrite: args.overwrite,
         about: file.file_name().unwrap_or_default().to_string_lossy().into_owned(),
     };
-    let Applied { bands, left_out, negative, pixels } =
+    if let Some(path) = &args.mtf_plot {
+        plot::MTF_PLOT.check_target(path)?;
+    }
+    let Applied { bands, left_out, negative, pixels, at_nyquist, noisy } =
         super::progress::watched(output, |progress| apply(&cube, &model, &settings, &args.output, progress))?;
     warn_left_out(&left_out, output)?;
     if negative > 0 {
-        output.warn(&format!("{negative} negative signals, which the noise of the cube makes, are taken as 0"))?;
+        let what = "which the noise of the cube makes, or a blur at sharp edges, are taken as 0";
+        output.warn(&format!("{negative} negative signals, {what}"))?;
+    }
+    if at_nyquist > MUCH && model.oversampling == 1 {
+        output.warn(&format!(
+            "the optics leave {:.0} % of the contrast of the finest waves that the cube's pixels hold: detail that the detector sees \
+             between pixels is missing; render with smaller pixels, and set detector.oversampling",
+            100.0 * at_nyquist
+        ))?;
+    }
+    for (band, share) in &noisy {
+        output.warn(&format!(
+            "{band}: the noise of the cube itself is about {share:.2} of the sensor's at the picture's mean; render more samples"
+        ))?;
     }
     let mut text = format!("{}: counts of {} bands of {}\n", args.output.display(), bands.len(), settings.about);
     let mut each = Vec::new();
@@ -140,6 +167,15 @@ fn expose(args: &Args, file: &Path, output: &Output) -> Result<()> {
             "clipped_above": clipped.above,
             "clipped_below": clipped.below,
         }));
+    }
+    if let Some(path) = &args.mtf_plot {
+        let bands = Bands::new(&model, cube.channels()).bands;
+        let lines: Vec<plot::Line> = curves(&model, &bands)
+            .into_iter()
+            .map(|TransferCurve { name, points, is_guide }| plot::Line { name, points, guide: is_guide })
+            .collect();
+        let title = format!("{}: F/{}, pixels of {} um", settings.about, model.optics.f_number, 1e6 * model.pitch);
+        plot::MTF_PLOT.write(path, plot::mtf(&title, &lines)?.as_bytes())?;
     }
     let left_out: Vec<_> = left_out.iter().map(|(name, share)| json!({ "band": name, "covered": share })).collect();
     output.event("done", json!({ "cube": shown(&args.output), "bands": each, "left_out": left_out }))?;

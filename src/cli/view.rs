@@ -4,6 +4,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use super::Output;
+use super::sensor::Noise;
 use crate::Result;
 
 /// Look at a cube in a browser: its picture, channels and spectra
@@ -11,10 +12,13 @@ use crate::Result;
 /// Serves one page until Ctrl-C: the picture in true colour, in a single channel, in false colour or, in the thermal infrared,
 /// as brightness temperature; a click shows the spectrum of a pixel. The cube may be one that is being rendered, or larger than
 /// memory: zoomed out only its overview is read. docs/http.md describes what else can be asked of the server.
+///
+/// Counts of a sensor (`sensor --model`) are shown as they are, or with --noise off as the detector would count without noise and patterns.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = "\
 Examples:
   spectile view cube.zarr
+  spectile view counts.zarr --noise off
   spectile view cube.zarr --listen 127.0.0.1:9000
   spectile view cube.zarr --listen 0.0.0.0:8090        for other machines, with the token that is printed")]
 pub struct Args {
@@ -34,6 +38,10 @@ pub struct Args {
     /// this machine, since whoever comes through the proxy seems to. docs/http.md has more.
     #[arg(long, value_name = "NAME", value_parser = parse_host)]
     pub public_host: Vec<String>,
+
+    /// Of counts: as they are, or without noise and patterns, which needs `sensor --electrons`
+    #[arg(long, value_enum, default_value_t = Noise::On)]
+    pub noise: Noise,
 
     /// Exposure that the page begins with, in EV; otherwise automatic
     #[arg(long, value_name = "EV", value_parser = super::parse_exposure, allow_hyphen_values = true)]
@@ -60,8 +68,12 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     use crate::preview::{Feed, follow, web};
 
     let interrupt = output.interrupt()?;
-    let feed = Feed::of_cube(Cube::open_to_read(&args.cube)?);
-    follow(Cube::open(&args.cube)?, &feed)?;
+    let open = || {
+        let cube = Cube::open_picture(&args.cube)?;
+        if args.noise == Noise::Off { cube.without_noise() } else { Ok(cube) }
+    };
+    let feed = Feed::of_cube(open()?);
+    follow(open()?, &feed)?;
     let about = web::About { name: name_of(&args.cube), exposure: args.exposure, controls: false };
     let server = web::Server::start_behind(&args.public_host, args.listen, feed, about)?;
     output.event("listening", json!({ "url": server.url(), "token": server.token() }))?;

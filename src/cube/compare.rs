@@ -174,6 +174,10 @@ fn check_comparable(a: &Cube, b: &Cube) -> Result<()> {
             "the first begins at pixel {xa}, {ya} of its film, the second at {xb}, {yb}: render both with the same `film.crop`"
         ));
     }
+    if a.is_counts() != b.is_counts() {
+        let holds = |cube: &Cube| if cube.is_counts() { "counts of a sensor" } else { "radiance" };
+        return refuse(format!("the first holds {}, the second {}", holds(a), holds(b)));
+    }
     let (ca, cb) = (a.channels(), b.channels());
     if ca.len() != cb.len() {
         return refuse(format!("the first has {} channels, the second {}", ca.len(), cb.len()));
@@ -197,7 +201,13 @@ fn visit(a: &Cube, b: &Cube, mut each: impl FnMut(&[f32], &[f32])) -> Result<()>
         for other in b.grid().tiles_in(chunk.rect()) {
             let Some(other) = b.chunk(other)? else { continue };
             if let Some(common) = chunk.rect().intersection(&other.rect()) {
-                visit_common(&chunk, &other, common, &mut each);
+                visit_common(&chunk, &other, common, &mut |of_a, of_b| {
+                    // Single pixels of counts may be missing.
+                    let is_missing = a.is_counts() && of_a.iter().chain(of_b).any(|value| value.is_nan());
+                    if !is_missing {
+                        each(of_a, of_b);
+                    }
+                });
             }
         }
     }

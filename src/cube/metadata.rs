@@ -19,6 +19,8 @@ pub const FORMAT: u64 = 2;
 
 /// The attribute of groups that hold counts of a sensor instead of radiance.
 pub const SENSOR_FORMAT: &str = "spectile_sensor_format";
+/// Its value: the version of their layout.
+pub const COUNTS_FORMAT: u64 = 2;
 
 /// How the files of a tile are laid out in a version of the layout.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -77,6 +79,9 @@ pub const LAYERS: &str = "layers";
 /// corner: a x + b y + c, d x + e y + f.
 pub const CRS: &str = "crs";
 pub const AFFINE: &str = "affine";
+
+/// Of a cube whose camera has an angle: the tangent of the one that a pixel spans on the axis, which is pitch over focal length.
+pub const PIXEL_TANGENT: &str = "pixel_tangent";
 
 /// Of a cube that was made of another one's channels: how.
 pub(super) const DERIVED: &str = "derived";
@@ -140,6 +145,11 @@ impl Header {
     pub fn georeference(&self) -> Option<(&str, [f64; 6])> {
         let affine = serde_json::from_value(self.attributes.get(AFFINE)?.clone()).ok()?;
         Some((self.attributes.get(CRS)?.as_str()?, affine))
+    }
+
+    /// [`PIXEL_TANGENT`], of cubes that tell it.
+    pub fn pixel_tangent(&self) -> Option<f64> {
+        self.attributes.get(PIXEL_TANGENT).and_then(Value::as_f64)
     }
 
     /// Whether the cube holds weights of products of spectra instead of radiance.
@@ -272,8 +282,9 @@ impl Header {
         if self.epoch != wanted.epoch {
             return there_and_wanted("integrator.epoch", self.epoch.to_string(), wanted.epoch.to_string());
         }
-        // Whoever goes on with a cube adopts the evaluator that it was begun with.
-        let decides = |key: &str| key != "evaluator" && key != "scene_digest";
+        // Whoever goes on with a cube adopts the evaluator that it was begun with; what follows from the camera the digest holds, and
+        // older cubes do not tell it.
+        let decides = |key: &str| !["evaluator", "scene_digest", PIXEL_TANGENT].contains(&key);
         let of = |attributes: &Map<String, Value>| {
             Value::Object(
                 attributes.iter().filter(|(key, _)| decides(key)).map(|(k, v)| (k.clone(), v.clone())).collect(),
@@ -452,7 +463,7 @@ impl Header {
         let layout = match group["attributes"]["spectile_format"].as_u64() {
             Some(format) => Layout::of_format(format).ok_or_else(|| unknown_format(path, format))?,
             None if !group["attributes"][SENSOR_FORMAT].is_null() => {
-                let what = "holds counts of a sensor, which this command does not read; open it as any Zarr store, with xarray or zarr-python";
+                let what = "holds counts of a sensor, and this command takes cubes of radiance";
                 return Err(Error::storage(path, what));
             }
             None => {
@@ -566,7 +577,7 @@ impl Header {
 }
 
 /// Refuses an array whose stored metadata make other numbers of it than `ours`; `who` has given it those.
-fn check_meaning(path: &Path, who: &str, name: &str, ours: &Value, stored: &Value) -> Result<()> {
+pub(super) fn check_meaning(path: &Path, who: &str, name: &str, ours: &Value, stored: &Value) -> Result<()> {
     let Some(what) = other_meaning(&ours["attributes"], &stored["attributes"]) else { return Ok(()) };
     let help = "values are read as Spectile writes them: put that right, or open the cube with xarray";
     Err(Error::storage(path, format!("{who} `{name}` {what}; {help}")))

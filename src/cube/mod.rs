@@ -14,6 +14,7 @@ mod arrays;
 mod checksums;
 mod choices;
 mod compare;
+mod counts;
 mod create;
 mod epochs;
 mod estimate;
@@ -49,7 +50,9 @@ pub use grid::{Grid, Rect};
 pub use layer::{Layer, LayerNames, Numbers, TileLayers};
 pub use map::Chunk;
 pub use merge::{merge_bytes, merge_means};
-pub use metadata::{AFFINE, CRS, FACTORED, FORMAT, Header, LAYERS, SENSOR_FORMAT, plain_attributes};
+pub use metadata::{
+    AFFINE, COUNTS_FORMAT, CRS, FACTORED, FORMAT, Header, LAYERS, PIXEL_TANGENT, SENSOR_FORMAT, plain_attributes,
+};
 pub use preview::reduction;
 pub use relight::{Relighted, relight};
 pub use runs::{Run, RunFile, RunState, SlurmTask, Stand, Work, node_name, now_s};
@@ -57,7 +60,7 @@ pub use sensor::{Findings, integrate};
 pub use state::{CubeState, RegionMean, Seen, Window};
 pub use store::{Cube, Progress};
 pub use verify::Verification;
-pub use view::{Quantity, Reader, Strides, View, White};
+pub use view::{Integers, Quantity, Reader, Strides, View, White};
 pub use weights::{Merging, Weights, systematic};
 pub use writer::Writer;
 

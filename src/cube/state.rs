@@ -108,6 +108,9 @@ impl<'a> CubeState<'a> {
 
     /// Samples per pixel of a tile.
     pub fn samples(&self, tile: u32) -> Result<u32> {
+        if self.cube.is_counts() {
+            return self.cube.samples(tile);
+        }
         let mut samples = [0u32];
         Ok(if self.read(TileArray::Samples, tile, 0, &mut samples)? { samples[0] } else { 0 })
     }
@@ -138,7 +141,12 @@ impl<'a> CubeState<'a> {
     }
 
     /// All channels of all pixels of a tile.
+    ///
+    /// Of counts these, NaN where a pixel is missing.
     pub fn radiance(&self, tile: u32) -> Result<Option<Chunk>> {
+        if let Some(counts) = self.cube.counts() {
+            return self.cube.counts_chunk(counts, tile);
+        }
         if !self.cube.header().is_factored() {
             return self.chunk(TileArray::Radiance, tile);
         }
@@ -154,6 +162,9 @@ impl<'a> CubeState<'a> {
         let (grid, channels) = (self.cube.grid(), self.cube.channels().len());
         let tile = grid.tile_at(x, y);
         let rect = grid.rect(tile);
+        if self.cube.is_counts() {
+            return Ok(self.radiance(tile)?.map(|chunk| chunk.spectrum(x, y).to_vec()));
+        }
         if self.cube.header().is_factored() {
             let Some(weights) = self.weights(tile)? else { return Ok(None) };
             let pixel = ((y - rect.y0) * grid.tile[0] + x - rect.x0) as usize;
@@ -186,7 +197,12 @@ impl<'a> CubeState<'a> {
     pub fn colour(&self, rect: Rect, factor: u32) -> Result<Window> {
         let grid = self.cube.grid();
         let mut sums = Sums::new(rect, factor, 3);
-        if factor.is_multiple_of(BLOCK) {
+        if self.cube.is_counts() && !self.has_overview(factor) {
+            let (projection, pixels) = (self.cube.projection(), sums.pixels(grid));
+            self.each_pixel(pixels, |x, y, spectrum| sums.add(x, y, 1, &projection.rgb(spectrum)))?;
+            return Ok(sums.means());
+        }
+        if self.has_overview(factor) {
             let projection = self.cube.projection();
             let channels: Vec<usize> = projection.channels().collect();
             // Colours are linear in the channels, so those of a mean are the mean of the colours.
@@ -221,24 +237,37 @@ impl<'a> CubeState<'a> {
     pub fn channels(&self, channels: &[usize], rect: Rect, factor: u32) -> Result<Window> {
         let mut sums = Sums::new(rect, factor, channels.len());
         let pixels = sums.pixels(self.cube.grid());
-        match factor.is_multiple_of(BLOCK) {
+        match self.has_overview(factor) {
             true => self.blocks(channels, pixels, |x, y, pixels, values| sums.add(x, y, pixels, values))?,
-            false => self.single_pixels(channels, pixels, &mut sums)?,
+            false => {
+                let mut values = vec![0.0; channels.len()];
+                self.each_pixel(pixels, |x, y, spectrum| {
+                    values.iter_mut().zip(channels).for_each(|(value, &k)| *value = spectrum[k]);
+                    sums.add(x, y, 1, &values);
+                })?;
+            }
         }
         Ok(sums.means())
     }
 
-    fn single_pixels(&self, channels: &[usize], pixels: Rect, sums: &mut Sums) -> Result<()> {
+    /// Whether means of `factor` x `factor` pixels can be had from `overview`, which holds counts with their noise.
+    fn has_overview(&self, factor: u32) -> bool {
+        factor.is_multiple_of(BLOCK) && self.cube.counts().is_none_or(|counts| !counts.is_plain())
+    }
+
+    /// Calls `each` with column, row and all channels of the pixels that are there.
+    fn each_pixel(&self, pixels: Rect, mut each: impl FnMut(u32, u32, &[f32])) -> Result<()> {
         self.check_radiance(pixels)?;
-        let mut values = vec![0.0; channels.len()];
         for tile in self.cube.grid().tiles_in(pixels) {
             let Some(chunk) = self.radiance(tile)? else { continue };
             let Some(shared) = chunk.rect().intersection(&pixels) else { continue };
             for y in shared.y0..shared.y1 {
                 for x in shared.x0..shared.x1 {
                     let spectrum = chunk.spectrum(x, y);
-                    values.iter_mut().zip(channels).for_each(|(value, &k)| *value = spectrum[k]);
-                    sums.add(x, y, 1, &values);
+                    // Of counts single pixels may be missing.
+                    if !(self.cube.is_counts() && spectrum.iter().any(|value| value.is_nan())) {
+                        each(x, y, spectrum);
+                    }
                 }
             }
         }
@@ -334,6 +363,9 @@ impl<'a> CubeState<'a> {
             let Some(shared) = chunk.rect().intersection(&rect) else { continue };
             for y in shared.y0..shared.y1 {
                 for x in shared.x0..shared.x1 {
+                    if self.cube.is_counts() && chunk.spectrum(x, y).iter().any(|value| value.is_nan()) {
+                        continue;
+                    }
                     pixels += 1;
                     radiance.iter_mut().zip(chunk.spectrum(x, y)).for_each(|(sum, &v)| *sum += f64::from(v));
                     if let (Some(variance), Some(errors)) = (&mut variance, &errors) {
@@ -476,7 +508,10 @@ impl Cube {
         let [columns, _] = self.grid().tiles();
         let mut changed = Vec::new();
         for (row, known) in (0..).zip(&mut seen.rows) {
-            let path = self.part_path(TileArray::Samples, row * columns);
+            let path = match self.is_counts() {
+                true => self.counts_path("counts", row * columns),
+                false => self.part_path(TileArray::Samples, row * columns),
+            };
             let folder = crate::files::parent(&path);
             let modified = match fs::metadata(folder).and_then(|found| found.modified()) {
                 Ok(modified) => modified,

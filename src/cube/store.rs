@@ -8,6 +8,7 @@ use std::sync::OnceLock;
 
 use serde_json::Value;
 
+use super::counts::Counts;
 use super::estimate;
 use super::grid::Grid;
 use super::journal::Journal;
@@ -106,7 +107,7 @@ pub struct Cube {
 }
 
 /// By what a cube is known, which decides whether it can be gone on with.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) enum Origin {
     /// Its record under `.spectile/`; the version of Spectile that made it.
     Record { made_by: String },
@@ -116,6 +117,8 @@ pub(super) enum Origin {
     Copy,
     /// Its metadata, in version 1 of the layout.
     Older { made_by: String },
+    /// Counts of a sensor, by their metadata: no cube of radiance.
+    Counts(Counts),
 }
 
 /// How far a cube has got.
@@ -195,6 +198,8 @@ impl Cube {
         let projection = Projection::new(&header.channels);
         let layers = header.layers();
         let parts = match (header.is_factored(), header.has_uncertainty()) {
+            // None that a journal tells of.
+            _ if matches!(origin, Origin::Counts(_)) => &[][..],
             (true, _) => &TileArray::FACTORED[..],
             (false, true) => &TileArray::ALL,
             (false, false) => &TileArray::ALL[..4],
@@ -206,6 +211,22 @@ impl Cube {
     /// A cube that this version has just made.
     pub(super) fn made(path: &Path, header: Header) -> Cube {
         Cube::new(path, header, Layout::Columns, Origin::Record { made_by: env!("CARGO_PKG_VERSION").into() })
+    }
+
+    /// How counts are read, of a cube that holds them.
+    pub(super) fn counts(&self) -> Option<&Counts> {
+        match &self.origin {
+            Origin::Counts(counts) => Some(counts),
+            _ => None,
+        }
+    }
+
+    pub(super) fn set_counts(&mut self, counts: Counts) {
+        self.origin = Origin::Counts(counts);
+    }
+
+    pub(super) fn set_projection(&mut self, projection: Projection) {
+        self.projection = projection;
     }
 
     pub(super) fn layout(&self) -> Layout {
@@ -226,6 +247,7 @@ impl Cube {
             Origin::Older { made_by } => {
                 Some(format!("its layout is that of version 1, by Spectile {made_by}, which this one reads only"))
             }
+            Origin::Counts(_) => Some("it holds counts of a sensor".into()),
         }
     }
 
@@ -262,7 +284,12 @@ impl Cube {
     }
 
     /// Samples per pixel merged into a tile so far.
+    ///
+    /// Of counts 1 where there are some.
     pub fn samples(&self, tile: u32) -> Result<u32> {
+        if self.counts().is_some() {
+            return Ok(self.counts_path("counts", tile).exists().into());
+        }
         let mut bytes = Vec::new();
         if let Some(mut file) = self.open_part(TileArray::Samples, tile)? {
             let path = self.part_path(TileArray::Samples, tile);
@@ -475,7 +502,7 @@ impl Cube {
 
     /// Whether it was made of another cube's channels.
     pub fn is_derived(&self) -> bool {
-        self.header.attributes.contains_key(DERIVED)
+        self.header.attributes.contains_key(DERIVED) || self.counts().is_some()
     }
 
     /// Tiles that some process works on at this moment: those of the first range found.
@@ -547,7 +574,7 @@ fn ranges(samples: &[u32], such: impl Fn(u32) -> bool) -> Vec<Range<u32>> {
     found
 }
 
-fn read_doubles(path: &Path, count: usize) -> Result<Vec<f64>> {
+pub(super) fn read_doubles(path: &Path, count: usize) -> Result<Vec<f64>> {
     let bytes = fs::read(path).map_err(|error| Error::storage(path, format!("cannot be read: {error}")))?;
     if bytes.len() != 8 * count {
         return Err(Error::storage(path, format!("is damaged: {} bytes long, not {}", bytes.len(), 8 * count)));
@@ -555,7 +582,7 @@ fn read_doubles(path: &Path, count: usize) -> Result<Vec<f64>> {
     Ok(bytes.as_chunks().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect())
 }
 
-fn check_folder(path: &Path) -> Result<()> {
+pub(super) fn check_folder(path: &Path) -> Result<()> {
     match fs::metadata(path) {
         Err(error) if error.kind() == ErrorKind::NotFound => Err(Error::storage(path, "there is no such cube")),
         Err(error) => Err(Error::storage(path, error)),
@@ -565,7 +592,7 @@ fn check_folder(path: &Path) -> Result<()> {
 }
 
 /// The metadata of the Zarr group at `path`.
-fn read_group(path: &Path) -> Result<Value> {
+pub(super) fn read_group(path: &Path) -> Result<Value> {
     let refuse = |what: &str| Err(Error::storage(path, what));
     let text = match fs::read(path.join("zarr.json")) {
         Ok(text) => text,

@@ -23,6 +23,8 @@ pub enum Quantity {
     Temperature,
     /// The hemispherical-directional reflectance factor: of [`White`].
     Reflectance,
+    /// Counts of a sensor, without a unit: whole numbers.
+    Counts,
     /// X, Y and Z, W m⁻² sr⁻¹ nm⁻¹: divided by ∫ȳ dλ, so that a constant 1 has Y = 1.
     Xyz(Observer),
 }
@@ -76,6 +78,26 @@ pub struct Strides {
     pub band: usize,
 }
 
+/// Whole numbers as files have them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Integers {
+    /// Whether they have 16 bits, not 32.
+    pub is_short: bool,
+    /// The value of a pixel that is missing.
+    pub missing: u32,
+}
+
+impl Integers {
+    /// Little-endian; what is NaN is missing.
+    pub fn encode(self, values: &[f32]) -> Vec<u8> {
+        let whole = |value: &f32| if value.is_nan() { self.missing } else { *value as u32 };
+        match self.is_short {
+            true => values.iter().flat_map(|value| (whole(value) as u16).to_le_bytes()).collect(),
+            false => values.iter().flat_map(|value| whole(value).to_le_bytes()).collect(),
+        }
+    }
+}
+
 impl<'a> View<'a> {
     /// All of a cube.
     pub fn whole(cube: &'a Cube) -> View<'a> {
@@ -85,7 +107,7 @@ impl<'a> View<'a> {
             bands: (0..cube.channels().len()).collect(),
             channels: cube.channels().clone(),
             rect: Rect { x0: 0, y0: 0, x1, y1 },
-            quantity: Quantity::Radiance,
+            quantity: if cube.is_counts() { Quantity::Counts } else { Quantity::Radiance },
             divisor: None,
             errors: false,
         }
@@ -120,6 +142,13 @@ impl<'a> View<'a> {
 
     /// As another quantity. X, Y and Z are of all channels, and three bands.
     pub fn with_quantity(self, quantity: Quantity) -> Result<View<'a>> {
+        if self.cube.is_counts() {
+            let what = "holds counts of a sensor: integrals, temperatures and colours are those of radiance";
+            return match quantity {
+                Quantity::Radiance | Quantity::Counts => Ok(self),
+                _ => Err(Error::Usage(format!("{} {what}", self.cube.path().display()))),
+            };
+        }
         let Quantity::Xyz(observer) = quantity else { return Ok(View { quantity, ..self }) };
         if Projection::as_seen(self.cube.channels(), observer).is_none() {
             let what = "its channels do not cover the visible, so X, Y and Z cannot be told";
@@ -130,6 +159,10 @@ impl<'a> View<'a> {
 
     /// Reflectance factors of the bands and pixels chosen so far. Errors: a white cube of other pixels or channels.
     pub fn with_reflectance(self, white: White<'a>) -> Result<View<'a>> {
+        if self.cube.is_counts() {
+            let what = "holds counts of a sensor: reflectances are those of radiance";
+            return Err(Error::Usage(format!("{} {what}", self.cube.path().display())));
+        }
         let divisor = match white {
             White::Irradiance(means) => Divisor::Irradiance(means),
             White::Cube(white) => {
@@ -164,6 +197,10 @@ impl<'a> View<'a> {
 
     /// The standard errors instead of the values.
     pub fn of_errors(self) -> Result<View<'a>> {
+        if self.cube.is_counts() {
+            let what = "holds counts of a sensor, which have noise and no standard errors";
+            return Err(Error::Usage(format!("{} {what}", self.cube.path().display())));
+        }
         if !self.cube.header().has_uncertainty() {
             let what = "has no standard errors; render with --uncertainty to have them";
             return Err(Error::Usage(format!("{} {what}", self.cube.path().display())));
@@ -219,13 +256,20 @@ impl<'a> View<'a> {
 
     /// Bytes of all values.
     pub fn bytes(&self) -> u64 {
-        self.rect.pixels() * self.bands.len() as u64 * 4
+        let each = if self.integers().is_some_and(|integers| integers.is_short) { 2 } else { 4 };
+        self.rect.pixels() * self.bands.len() as u64 * each
+    }
+
+    /// How values are written that are whole numbers; `None` of others.
+    pub fn integers(&self) -> Option<Integers> {
+        let [_, missing] = self.cube.count_range()?;
+        Some(Integers { is_short: missing <= u16::MAX.into(), missing })
     }
 
     pub fn reader(&self) -> Reader<'_> {
         let mut white = None;
         let convert = match self.quantity {
-            Quantity::Radiance => Convert::None,
+            Quantity::Radiance | Quantity::Counts => Convert::None,
             Quantity::Reflectance => match &self.divisor {
                 Some(Divisor::Irradiance(means)) => {
                     // Nothing can be told where nothing arrives.

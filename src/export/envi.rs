@@ -1,14 +1,15 @@
 //! ENVI: raw numbers beside a header.
 
+use std::borrow::Cow;
 use std::fs;
 use std::io::{Seek, SeekFrom, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use super::{PIECE_BYTES, Progress, check_space, default_bands, long_name};
-use crate::cube::{Quantity, Reader, Rect, Strides, View};
+use crate::cube::{Integers, Quantity, Reader, Rect, Strides, View};
 use crate::files::output::{Product, Replacement};
-use crate::format::envi::{self, Image, Interleave};
+use crate::format::envi::{self, DataType, Image, Interleave};
 use crate::{Error, Result};
 
 /// The numbers that [`write`] writes, and the header without which they are none.
@@ -95,14 +96,19 @@ pub fn write(view: &View, path: &Path, interleave: Interleave, progress: &mut Pr
         description: long_name(view),
         size: [width, height, channels.len()],
         interleave,
-        is_double: false,
+        data_type: match view.integers() {
+            None => DataType::F32,
+            Some(Integers { is_short: true, .. }) => DataType::U16,
+            Some(_) => DataType::U32,
+        },
         units: match view.quantity() {
             Quantity::Radiance | Quantity::Xyz(_) => "W m^-2 sr^-1 nm^-1",
             Quantity::Integrated => "W m^-2 sr^-1",
             Quantity::Temperature => "K",
             Quantity::Reflectance => "reflectance",
+            Quantity::Counts => "DN",
         },
-        ignore: MISSING,
+        ignore: view.integers().map_or(MISSING.into(), |integers| integers.missing.into()),
         origin: view.origin(),
         default_bands: Some(default_bands(view)),
         wavelength_nm: each(&|k| channels.centre(k)),
@@ -149,7 +155,7 @@ pub(super) struct Pieces<'a, 'p> {
     pub file: &'a mut Replacement,
     pub values: Vec<f32>,
     pub progress: &'a mut Progress<'p>,
-    /// Instead of NaN.
+    /// Instead of NaN, of values that are no whole numbers.
     pub missing: f32,
     /// Where in the file the first one goes, of [`Pieces::by_band`].
     pub begin: u64,
@@ -204,10 +210,14 @@ impl Pieces<'_, '_> {
                 self.read(rows, part.clone(), Strides { row: width, pixel: 1, band: plane })?;
                 let values = std::mem::take(&mut self.values);
                 for (band, values) in part.zip(values.chunks_exact(plane)) {
-                    let at = self.begin + 4 * (band * height + (y0 - rect.y0) as usize) as u64 * width as u64;
+                    let bytes = match self.view.integers() {
+                        None => Cow::Borrowed(bytemuck::cast_slice(values)),
+                        Some(integers) => Cow::Owned(integers.encode(values)),
+                    };
+                    let each = (bytes.len() / values.len()) as u64;
+                    let at = self.begin + each * (band * height + (y0 - rect.y0) as usize) as u64 * width as u64;
                     let file = self.file.file();
-                    let written =
-                        file.seek(SeekFrom::Start(at)).and_then(|_| file.write_all(bytemuck::cast_slice(values)));
+                    let written = file.seek(SeekFrom::Start(at)).and_then(|_| file.write_all(&bytes));
                     written.map_err(|error| self.file.failed(&error))?;
                 }
                 self.values = values;
@@ -234,12 +244,17 @@ impl Pieces<'_, '_> {
     fn read(&mut self, rect: Rect, bands: Range<usize>, strides: Strides) -> Result<()> {
         self.values.resize(rect.pixels() as usize * bands.len(), 0.0);
         self.reader.read(rect, bands, strides, &mut self.values)?;
-        self.values.iter_mut().filter(|value| value.is_nan()).for_each(|value| *value = self.missing);
+        if self.view.integers().is_none() {
+            self.values.iter_mut().filter(|value| value.is_nan()).for_each(|value| *value = self.missing);
+        }
         Ok(())
     }
 
     fn write(&mut self) -> Result<()> {
-        let written = self.file.file().write_all(bytemuck::cast_slice(&self.values));
+        let written = match self.view.integers() {
+            None => self.file.file().write_all(bytemuck::cast_slice(&self.values)),
+            Some(integers) => self.file.file().write_all(&integers.encode(&self.values)),
+        };
         written.map_err(|error| self.file.failed(&error))
     }
 

@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use smallvec::SmallVec;
 
 use super::{Progress, check_space};
-use crate::cube::{Quantity, Rect, Strides, View};
+use crate::cube::{Integers, Quantity, Rect, Strides, View};
 use crate::files::output::{Product, Replacement, cannot_write};
 use crate::format::maps::exr::QUANTITY;
 use crate::{Error, Result};
@@ -48,7 +48,11 @@ pub fn write(
     split: Option<usize>,
     progress: &mut Progress,
 ) -> Result<Vec<PathBuf>> {
-    if !matches!(view.quantity(), Quantity::Radiance | Quantity::Integrated) {
+    if view.cube().is_counts() && strict_units {
+        let what = "--exr-strict-units is about radiance, and these are counts; leave it out";
+        return Err(Error::Usage(format!("{}: {what}", path.display())));
+    }
+    if !matches!(view.quantity(), Quantity::Radiance | Quantity::Integrated | Quantity::Counts) {
         let what = "spectral OpenEXR holds spectra of light only; export temperatures, reflectances and colours to another format";
         return Err(Error::Usage(format!("{}: {what}", path.display())));
     }
@@ -88,9 +92,26 @@ fn band_name(nm: f64) -> String {
     format!("S0.{nm:.6}nm").replacen(".", "\u{0}", 1).replace('.', ",").replace('\u{0}', ".")
 }
 
-/// Bands are told apart by their centres only.
+/// The channel of a band of counts: its name, without the points that separate layers.
+fn counts_name(view: &View, b: usize) -> String {
+    view.channels().names[b].replace('.', "_")
+}
+
+/// Bands are told apart by their centres only; those of counts by their names.
 fn check_names(view: &View, order: &[usize]) -> Result<()> {
     let channels = view.channels();
+    if view.cube().is_counts() {
+        let mut names: Vec<String> = order.iter().map(|&b| counts_name(view, b)).collect();
+        names.sort();
+        return match names.windows(2).find(|pair| pair[0] == pair[1]) {
+            None => Ok(()),
+            Some(pair) => Err(Error::Usage(format!(
+                "{}: OpenEXR would call two bands {}, since points separate layers; choose one of them with --bands",
+                view.cube().path().display(),
+                pair[0]
+            ))),
+        };
+    }
     let same = |pair: &&[usize]| band_name(channels.centre(pair[0])) == band_name(channels.centre(pair[1]));
     match order.windows(2).find(same) {
         None => Ok(()),
@@ -115,9 +136,12 @@ enum Source {
 
 /// The file, which has not taken its place yet.
 fn write_file(view: &View, path: &Path, strict_units: bool, progress: &mut Progress) -> Result<Replacement> {
-    let mut named: Vec<(String, Source)> =
-        (0..view.channels().len()).map(|b| (band_name(view.channels().centre(b)), Source::Band(b))).collect();
-    named.extend(["R", "G", "B"].into_iter().enumerate().map(|(i, name)| (name.to_owned(), Source::Colour(i))));
+    let is_counts = view.cube().is_counts();
+    let name = |b: usize| if is_counts { counts_name(view, b) } else { band_name(view.channels().centre(b)) };
+    let mut named: Vec<(String, Source)> = (0..view.channels().len()).map(|b| (name(b), Source::Band(b))).collect();
+    // Counts are no light that has a colour.
+    let colours = ["R", "G", "B"].into_iter().enumerate().filter(|_| !is_counts);
+    named.extend(colours.map(|(i, name)| (name.to_owned(), Source::Colour(i))));
     // The order of the file's channels is that of their names' bytes.
     named.sort_by(|a, b| a.0.cmp(&b.0));
     let sources: Vec<Source> = named.iter().map(|(_, source)| *source).collect();
@@ -165,7 +189,10 @@ pub(super) fn channel(name: &str) -> Result<ChannelDescription> {
 }
 
 fn header(view: &View, named: &[(String, Source)], strict_units: bool) -> Result<Header> {
-    let channels = named.iter().map(|(name, _)| channel(name)).collect::<Result<SmallVec<_>>>()?;
+    let is_counts = view.cube().is_counts();
+    let sample_type = if is_counts { SampleType::U32 } else { SampleType::F32 };
+    let channels = named.iter().map(|(name, _)| Ok(ChannelDescription { sample_type, ..channel(name)? }));
+    let channels = channels.collect::<Result<SmallVec<_>>>()?;
     let [width, height] = view.size();
     let mut side = TILE.min(width.max(height).next_power_of_two());
     while side > 1 && (side * side) as usize * named.len() * 4 > TILE_BYTES {
@@ -176,13 +203,23 @@ fn header(view: &View, named: &[(String, Source)], strict_units: bool) -> Result
         level_mode: LevelMode::Singular,
         rounding_mode: RoundingMode::Down,
     });
-    let mut header = Header::new(text("radiance")?, Vec2(width as usize, height as usize), channels).with_encoding(
-        Compression::ZIP16,
-        blocks,
-        LineOrder::Increasing,
-    );
+    let mut header = Header::new(
+        text(if is_counts { "counts" } else { "radiance" })?,
+        Vec2(width as usize, height as usize),
+        channels,
+    )
+    .with_encoding(Compression::ZIP16, blocks, LineOrder::Increasing);
     // A single unnamed part is what every reader expects.
     header.own_attributes.layer_name = None;
+    if is_counts {
+        let about = format!(
+            "Spectile {}; counts of a sensor, whole numbers; {} is a pixel that is missing",
+            env!("CARGO_PKG_VERSION"),
+            u32::MAX
+        );
+        header.own_attributes.comments = Some(text(&about)?);
+        return Ok(header);
+    }
     let units = match view.quantity() {
         Quantity::Radiance if !strict_units => "W.m^-2.sr^-1.nm^-1",
         _ => "W.m^-2.sr^-1",
@@ -275,6 +312,8 @@ impl Tiles<'_> {
         self.colours.clear();
         self.colours.resize(width * height * 3, f32::NAN);
         let projection = self.view.cube().projection();
+        // The only whole numbers that OpenEXR has.
+        let whole = self.view.integers().map(|_| Integers { is_short: false, missing: u32::MAX });
         self.reader.spectra(tile, |x, y, spectrum| {
             let at = (y - y0) as usize * 3 * width + (x - x0) as usize;
             (0..3).zip(projection.rgb(spectrum)).for_each(|(i, value)| self.colours[at + i * width] = value);
@@ -290,7 +329,10 @@ impl Tiles<'_> {
                     Source::Band(_) => &self.bands[line],
                     Source::Colour(_) => &self.colours[line],
                 };
-                data.extend_from_slice(bytemuck::cast_slice(values));
+                match whole {
+                    None => data.extend_from_slice(bytemuck::cast_slice(values)),
+                    Some(whole) => data.extend(whole.encode(values)),
+                }
             }
         }
         Ok(UncompressedBlock { index, data })

@@ -15,7 +15,7 @@ use smallvec::SmallVec;
 use super::{PIECE_BYTES, Progress, check_space, envi, exr as spectral_exr, table};
 use crate::cube::{Cube, Layer, Rect};
 use crate::files::output::Replacement;
-use crate::format::envi::{Image, Interleave};
+use crate::format::envi::{DataType, Image, Interleave};
 use crate::{Error, Result};
 
 /// Formats that take layers.
@@ -153,9 +153,9 @@ fn write_envi(view: &LayerView, path: &Path, progress: &mut Progress) -> Result<
         description: "what the first surface behind each pixel is",
         size: [width as usize, height as usize, names.len()],
         interleave: Interleave::Bil,
-        is_double: true,
+        data_type: DataType::F64,
         units: "m; normals, numbers and cosines have none",
-        ignore: envi::MISSING,
+        ignore: envi::MISSING.into(),
         origin: view.origin(),
         default_bands: None,
         wavelength_nm: Vec::new(),

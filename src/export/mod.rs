@@ -114,7 +114,7 @@ fn units(view: &View) -> &'static str {
         Quantity::Radiance | Quantity::Xyz(_) => "W m-2 sr-1 nm-1",
         Quantity::Integrated => "W m-2 sr-1",
         Quantity::Temperature => "K",
-        Quantity::Reflectance => "1",
+        Quantity::Reflectance | Quantity::Counts => "1",
     }
 }
 
@@ -125,6 +125,7 @@ fn long_name(view: &View) -> &'static str {
     match view.quantity() {
         Quantity::Xyz(_) => "CIE XYZ, divided by the integral of ybar",
         Quantity::Radiance => "mean spectral radiance over the channel",
+        Quantity::Counts => "counts",
         Quantity::Integrated => "radiance of the channel",
         Quantity::Temperature => "brightness temperature in the channel",
         Quantity::Reflectance if view.is_by_white_cube() => {

@@ -74,11 +74,15 @@ struct Rows<'a> {
 impl<'a> Rows<'a> {
     fn new(view: &'a View<'a>, shown: &'a Shown, passes: u64) -> Rows<'a> {
         let channels = view.cube().channels();
+        // Counts of several bands are as they are, whatever their widths.
+        let is_counts = view.cube().is_counts();
         let total: f64 = match shown {
             Shown::Map(Map::Integrated) => 1.0,
             _ => view.bands().iter().map(|&k| channels.integral(k)).sum(),
         };
-        let weights = view.bands().iter().map(|&k| (k, channels.integral(k) / total)).collect();
+        let count = view.bands().len() as f64;
+        let share = |k: usize| if is_counts { 1.0 / count } else { channels.integral(k) / total };
+        let weights = view.bands().iter().map(|&k| (k, share(k))).collect();
         let is_heat = *shown == Shown::Map(Map::Temperature);
         let temperature = is_heat.then(|| BandTemperature::of_all(channels, view.bands()));
         Rows { view, shown, reader: view.reader(), weights, temperature, values: Vec::new(), passes, passed: 0 }

@@ -98,6 +98,7 @@ fn write_rows(view: &View, table: &mut csv::Writer<impl Write>, progress: &mut P
         return Ok(Err(error));
     }
     let together = (PIECE_BYTES / (4 * bands)).clamp(1, rect.width() as usize) as u32;
+    let is_whole = view.integers().is_some();
     let mut values = Vec::new();
     let mut cell = String::new();
     for y in rect.y0..rect.y1 {
@@ -107,7 +108,7 @@ fn write_rows(view: &View, table: &mut csv::Writer<impl Write>, progress: &mut P
             let strides = Strides { row: 0, pixel: bands, band: 1 };
             reader.read(Rect { x0, x1, y0: y, y1: y + 1 }, 0..bands, strides, &mut values)?;
             for (x, spectrum) in (x0..x1).zip(values.chunks_exact(bands)) {
-                if let Err(error) = write_row(table, [left + x, top + y], spectrum, &mut cell) {
+                if let Err(error) = write_row(table, [left + x, top + y], spectrum, is_whole, &mut cell) {
                     return Ok(Err(error));
                 }
             }
@@ -122,6 +123,7 @@ fn write_row(
     table: &mut csv::Writer<impl Write>,
     place: [u32; 2],
     spectrum: &[f32],
+    is_whole: bool,
     cell: &mut String,
 ) -> csv::Result<()> {
     for coordinate in place {
@@ -131,7 +133,7 @@ fn write_row(
         cell.clear();
         if !value.is_nan() {
             // Debug, not Display: 1e-30 instead of thirty zeros. Writing to a string cannot fail.
-            let _ = write!(cell, "{value:?}");
+            let _ = if is_whole { write!(cell, "{}", *value as u32) } else { write!(cell, "{value:?}") };
         }
         table.write_field(&*cell)?;
     }

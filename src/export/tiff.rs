@@ -1,4 +1,4 @@
-//! GeoTIFF (TIFF 6.0; BigTIFF beyond 4 GB; OGC 19-008r4): 32-bit numbers, uncompressed, one band after the other, with the names and
+//! GeoTIFF (TIFF 6.0; BigTIFF beyond 4 GB; OGC 19-008r4): floating-point numbers of 32 bits or counts of 16 and 32, uncompressed, one band after the other, with the names and
 //! wavelengths of the bands as GDAL keeps them.
 
 use std::io::{Read, Seek, SeekFrom, Write};
@@ -98,9 +98,11 @@ fn head(view: &View, is_big: bool) -> Vec<u8> {
 fn head_before(view: &View, is_big: bool, begin: u64) -> Vec<u8> {
     let ([width, height], bands) = (view.size().map(u64::from), view.channels().len());
     // A few lines together, so that a reader takes a piece of a band.
-    let rows = (((1 << 20) / (4 * width)).max(1)).min(height);
+    let integers = view.integers();
+    let each = if integers.is_some_and(|integers| integers.is_short) { 2 } else { 4 };
+    let rows = (((1 << 20) / (each * width)).max(1)).min(height);
     let strips = height.div_ceil(rows);
-    let line = 4 * width;
+    let line = each * width;
     let strip = |i: u64| (i / strips, (i % strips) * rows);
     let offset = |i: u64| {
         let (band, row) = strip(i);
@@ -111,7 +113,7 @@ fn head_before(view: &View, is_big: bool, begin: u64) -> Vec<u8> {
     let mut tags = vec![
         (256, Field::Long(vec![width])),
         (257, Field::Long(vec![height])),
-        (258, Field::Short(vec![32; bands])),
+        (258, Field::Short(vec![8 * each as u16; bands])),
         // No compression; the least is black.
         (259, Field::Short(vec![1])),
         (262, Field::Short(vec![1])),
@@ -127,7 +129,8 @@ fn head_before(view: &View, is_big: bool, begin: u64) -> Vec<u8> {
     if bands > 1 {
         tags.push((338, Field::Short(vec![0; bands - 1])));
     }
-    tags.push((339, Field::Short(vec![3; bands])));
+    // Whole numbers, or floating point.
+    tags.push((339, Field::Short(vec![if integers.is_some() { 1 } else { 3 }; bands])));
     if let Some((crs, [a, b, c, d, e, f])) = view.georeference() {
         let (is_upright, is_down) = (b == 0.0 && d == 0.0, a > 0.0 && e < 0.0);
         if is_upright && is_down {
@@ -145,7 +148,8 @@ fn head_before(view: &View, is_big: bool, begin: u64) -> Vec<u8> {
         tags.push((34735, Field::Short(keys)));
     }
     tags.push((42112, Field::Text(metadata(view))));
-    tags.push((42113, Field::Text("nan".into())));
+    let missing = integers.map_or("nan".into(), |integers| integers.missing.to_string());
+    tags.push((42113, Field::Text(missing)));
 
     let (word, header) = if is_big { (8, 16) } else { (4, 8) };
     let entry = if is_big { 20 } else { 12 };

@@ -11,7 +11,7 @@ use zarrs::storage::store::MemoryStore;
 use zarrs::storage::{ReadableStorageTraits, WritableStorageTraits};
 
 use super::{PIECE_BYTES, Progress, check_space, long_name, units};
-use crate::cube::{FACTORED, Quantity, Rect, Strides, View, plain_attributes};
+use crate::cube::{FACTORED, Integers, Quantity, Rect, SENSOR_FORMAT, Strides, View, plain_attributes};
 use crate::files::output::{NewFolder, Product, cannot_write, only_holds};
 use crate::{Error, Result, files};
 
@@ -30,8 +30,9 @@ const SOURCE_BEGINS: &str = "Spectile ";
 /// The array whose attributes say where on a map a picture lies (CF, grid mappings).
 const SPATIAL_REF: &str = "spatial_ref";
 /// All arrays that stores may have.
-const ARRAYS: [&str; 12] = [
+const ARRAYS: [&str; 13] = [
     "radiance",
+    "counts",
     "standard_error",
     "brightness_temperature",
     "xyz",
@@ -187,7 +188,11 @@ fn write_values(view: &View, layout: &Layout, chunks: &Chunks, progress: &mut Pr
                 values.fill(f32::NAN);
                 let part = first..(first + deep).min(bands);
                 reader.read(Rect { x0, y0, x1, y1 }, part, strides, &mut values)?;
-                chunks.put(&[group, row, column], bytemuck::cast_slice(&values).to_vec())?;
+                let bytes = match view.integers() {
+                    None => bytemuck::cast_slice(&values).to_vec(),
+                    Some(integers) => integers.encode(&values),
+                };
+                chunks.put(&[group, row, column], bytes)?;
             }
         }
         progress(u64::from(y1 - rect.y0) * u64::from(rect.width()), rect.pixels())?;
@@ -210,6 +215,7 @@ fn variable(view: &View) -> &'static str {
     match view.quantity() {
         _ if view.is_of_errors() => "standard_error",
         Quantity::Radiance | Quantity::Integrated => "radiance",
+        Quantity::Counts => "counts",
         Quantity::Temperature => "brightness_temperature",
         Quantity::Reflectance => "reflectance",
         Quantity::Xyz(_) => "xyz",
@@ -231,9 +237,10 @@ fn group(view: &View, arrays: &[(&str, Value)]) -> Value {
     attributes.remove("uncertainty");
     // What is exported is radiance.
     attributes.remove(FACTORED);
+    attributes.remove(SENSOR_FORMAT);
     attributes.extend([
         ("Conventions".into(), json!("CF-1.11")),
-        ("title".into(), json!("Spectral image")),
+        ("title".into(), json!(if view.cube().is_counts() { "Counts of a sensor" } else { "Spectral image" })),
         (SOURCE.into(), json!(format!("{SOURCE_BEGINS}{}", env!("CARGO_PKG_VERSION")))),
         ("channel_names".into(), json!(view.channels().names)),
     ]);
@@ -305,7 +312,18 @@ fn arrays(view: &View, layout: &Layout) -> Result<Vec<(&'static str, Value)>> {
         }
         let names = ["wavelength", "y", "x"];
         let shape = [bands, height, width];
-        arrays.push((variable(&of), array("float32", &shape, &layout.file, codecs.clone(), &names, attributes)));
+        let (kind, fill) = match view.integers() {
+            None => ("float32", json!("NaN")),
+            Some(Integers { is_short: true, missing }) => ("uint16", json!(missing)),
+            Some(Integers { missing, .. }) => ("uint32", json!(missing)),
+        };
+        if view.integers().is_some() {
+            // By which CF and xarray know what is missing.
+            attributes["_FillValue"] = fill.clone();
+        }
+        let mut values = array(kind, &shape, &layout.file, codecs.clone(), &names, attributes);
+        values["fill_value"] = fill;
+        arrays.push((variable(&of), values));
     }
     arrays.extend([
         (

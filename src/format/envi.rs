@@ -61,6 +61,11 @@ impl DataType {
         })
     }
 
+    fn number(self) -> u64 {
+        let known = [1, 2, 3, 4, 5, 12, 13, 14, 15];
+        known.into_iter().find(|number| DataType::from_number(*number) == Some(self)).unwrap_or_default()
+    }
+
     pub fn bytes(self) -> usize {
         match self {
             DataType::U8 => 1,
@@ -600,11 +605,10 @@ pub struct Image<'a> {
     /// Columns, lines and bands.
     pub size: [usize; 3],
     pub interleave: Interleave,
-    /// Whether numbers have 64 bits, not 32.
-    pub is_double: bool,
+    pub data_type: DataType,
     pub units: &'a str,
     /// The value of what is not rendered.
-    pub ignore: f32,
+    pub ignore: f64,
     /// Column and line of the first pixel in the whole picture, from 0.
     pub origin: [u32; 2],
     /// Bands, from 0, shown as red, green and blue.
@@ -659,7 +663,7 @@ impl Image<'_> {
         entry("bands", &bands.to_string());
         entry("header offset", "0");
         entry("file type", "ENVI Standard");
-        entry("data type", if self.is_double { "5" } else { "4" });
+        entry("data type", &self.data_type.number().to_string());
         entry("interleave", self.interleave.name());
         entry("byte order", "0");
         if self.origin != [0, 0] {

@@ -10,6 +10,7 @@ pub mod library;
 pub mod maps;
 pub mod mesh;
 pub mod modtran;
+pub mod mtf;
 pub mod noise;
 pub mod obj;
 pub mod phase;

@@ -24,9 +24,28 @@ pub const PLOT: Product = Product {
 const AXES: [&str; 2] = ["wavelength (nm)", "spectral radiance ("];
 
 fn is_plot(path: &Path) -> std::result::Result<(), String> {
+    has_axes(path, AXES)
+}
+
+fn has_axes(path: &Path, axes: [&str; 2]) -> std::result::Result<(), String> {
     let text = std::fs::read_to_string(path).map_err(|error| format!("cannot be read as text ({error})"))?;
     let is_svg = text.trim_start().starts_with("<svg");
-    if is_svg && AXES.iter().all(|label| text.contains(label)) { Ok(()) } else { Err("is another drawing".into()) }
+    if is_svg && axes.iter().all(|label| text.contains(label)) { Ok(()) } else { Err("is another drawing".into()) }
+}
+
+/// What [`mtf`] makes.
+pub const MTF_PLOT: Product = Product {
+    name: "a plot of transfer functions as SVG",
+    extensions: &["svg"],
+    is_stream: true,
+    is_folder: false,
+    check: is_mtf_plot,
+};
+
+const MTF_AXES: [&str; 2] = ["cycles/mm on the detector", "modulation transfer"];
+
+fn is_mtf_plot(path: &Path) -> std::result::Result<(), String> {
+    has_axes(path, MTF_AXES)
 }
 
 /// A line of a plot.
@@ -44,14 +63,15 @@ pub struct Line {
 pub fn log_log(title: &str, x: &str, y: &str, lines: &[Line]) -> Result<String> {
     let all = || lines.iter().flat_map(|line| line.points.iter());
     let mut plot = Plot::new(title, Axis::log(x, all().map(|p| p.0)), Axis::log(y, all().map(|p| p.1)));
-    let mut colours = COLOURS.into_iter().cycle();
-    for Line { name, points, guide } in lines {
-        let (colour, stroke) = match guide {
-            true => (GUIDE, Stroke::Dashed),
-            false => (colours.next().unwrap_or(GUIDE), Stroke::Marked),
-        };
-        plot.curves.push(Curve { name: Some(name.clone()), points: points.clone(), colour, stroke });
-    }
+    plot.add(lines, Stroke::Marked);
+    plot.draw()
+}
+
+/// A plot of modulation transfer functions: of `lines` the points are cycles/mm on the detector, and the share of contrast that is left.
+pub fn mtf(title: &str, lines: &[Line]) -> Result<String> {
+    let highest = lines.iter().flat_map(|line| &line.points).map(|point| point.0).fold(0.0, f64::max);
+    let mut plot = Plot::new(title, Axis::linear(MTF_AXES[0], 0.0..highest), Axis::linear(MTF_AXES[1], 0.0..1.02));
+    plot.add(lines, Stroke::Plain);
     plot.draw()
 }
 
@@ -139,6 +159,18 @@ enum Stroke {
 impl Plot {
     fn new(title: &str, x: Axis, y: Axis) -> Plot {
         Plot { title: title.to_owned(), x, y, boxes: Vec::new(), curves: Vec::new() }
+    }
+
+    /// Adds lines in colours that differ; guides are dashed.
+    fn add(&mut self, lines: &[Line], stroke: Stroke) {
+        let mut colours = COLOURS.into_iter().cycle();
+        for Line { name, points, guide } in lines {
+            let (colour, stroke) = match guide {
+                true => (GUIDE, Stroke::Dashed),
+                false => (colours.next().unwrap_or(GUIDE), stroke),
+            };
+            self.curves.push(Curve { name: Some(name.clone()), points: points.clone(), colour, stroke });
+        }
     }
 
     fn draw(&self) -> Result<String> {

@@ -59,9 +59,14 @@ impl<'a> From<Option<&'a str>> for Column<'a> {
 /// A spectrum as CSV: a header, then the centre of each channel in nm, its radiance and, where known, standard error, with as
 /// many digits as bring back the numbers exactly.
 pub fn spectrum_csv<T: Debug>(channels: &Channels, radiance: &[T], standard_error: Option<&[T]>) -> String {
+    values_csv("radiance", channels, radiance, standard_error)
+}
+
+/// The same of another quantity, by its name.
+pub fn values_csv<T: Debug>(name: &str, channels: &Channels, radiance: &[T], standard_error: Option<&[T]>) -> String {
     // The header stands first: many readers of CSV know no comments.
     let columns = if standard_error.is_some() { 3 } else { 2 };
-    let mut table = csv_table::Table::new(&["wavelength_nm", "radiance", "standard_error"][..columns]);
+    let mut table = csv_table::Table::new(&["wavelength_nm", name, "standard_error"][..columns]);
     for (k, radiance) in radiance.iter().enumerate() {
         // Debug, not Display: 1e-30 instead of thirty zeros.
         let error = standard_error.map(|errors| format!("{:?}", errors[k]));

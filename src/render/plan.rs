@@ -46,6 +46,9 @@ pub fn header(scene: &Scene, tile: [u32; 2], seed: u64, uncertainty: bool, layer
             "integrator": integrator,
         }),
     );
+    if let Some(tangent) = scene.camera.pixel_tangent(&scene.film) {
+        attributes.insert(cube::PIXEL_TANGENT.into(), json!(tangent));
+    }
     if let Some(Georeference { crs, affine: [a, b, c, d, e, f] }) = &scene.georeference {
         // Of the cube, not of the full film.
         let [x, y] = [scene.film.crop[0], scene.film.crop[1]].map(f64::from);

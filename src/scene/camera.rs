@@ -24,6 +24,16 @@ impl Camera {
         self.distortion.and_then(|distortion| distortion.undone(seen * down)).map_or(seen, |at| at * down)
     }
 
+    /// The tangent of the angle that a pixel spans on the axis, of cameras that have one; of a line scanner across the track.
+    pub fn pixel_tangent(&self, film: &Film) -> Option<f64> {
+        let half = match &self.projection {
+            Projection::Perspective { tan_half } | Projection::ThinLens { tan_half, .. } => tan_half.x,
+            Projection::Pushbroom { half_width, .. } => *half_width,
+            Projection::Orthographic { .. } | Projection::Latlong => return None,
+        };
+        Some(2.0 * half / f64::from(film.width))
+    }
+
     /// Whether the distortion cannot be undone somewhere on the film, or the two pixels around it that a filter reaches.
     fn folds(&self, film: &Film) -> bool {
         let (Some(distortion), Projection::Perspective { tan_half } | Projection::ThinLens { tan_half, .. }) =

@@ -48,9 +48,10 @@ pub use integrator::{Evaluation, Evaluator, Integrator, MOST_WAVELENGTHS, Sample
 pub use light::{Cone, Light, Profile};
 pub use transform::box_around;
 
+pub use crate::format::mtf::MtfTable;
 pub use crate::format::phase::PhaseTable;
 pub use relight::{NewChannels, Relit, relight};
-pub use sensor::{Detector, Optics, SensorModel, load_sensor, parse_sensor};
+pub use sensor::{Blur, Detector, Optics, Seen, SensorModel, load_sensor, parse_sensor};
 pub use spectrum::{Quantity, irradiance};
 
 use crate::spectral::{Channels, Curve};

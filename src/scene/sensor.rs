@@ -9,6 +9,7 @@ use super::keys;
 use super::spectrum::{Spectra, report_in_file};
 use super::tree;
 use crate::error::{Error, Result};
+use crate::format::mtf::{self, MtfTable};
 use crate::format::response;
 use crate::spectral::{Channels, Curve, Response};
 
@@ -18,6 +19,8 @@ pub struct SensorModel {
     pub optics: Optics,
     /// Side of a square pixel, m.
     pub pitch: f64,
+    /// Pixels of the cube, along each axis, that make one of the detector.
+    pub oversampling: u32,
     /// Share of a pixel that is sensitive, (0, 1].
     pub fill_factor: f64,
     pub bits: u32,
@@ -48,12 +51,34 @@ impl SensorModel {
 pub struct Optics {
     pub f_number: f64,
     pub transmittance: Curve,
-    /// Focal length, m, of optics whose irradiance falls as cos⁴ of the angle to the axis.
-    pub cos4: Option<f64>,
+    pub blur: Blur,
+    /// m; known wherever `cos4` is true.
+    pub focal_length: Option<f64>,
+    /// Whether irradiance falls as cos⁴ of the angle to the axis.
+    pub cos4: bool,
     /// K; optics without one emit nothing.
     pub temperature: Option<f64>,
     /// F-number of the cone from which the warm optics shine; `None`: the hemisphere.
     pub cold_shield: Option<f64>,
+}
+
+/// How optics spread the light of a point. The aperture of a pixel is no part of it: a cube's pixels are means already.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Blur {
+    None,
+    /// Standard deviation along each axis, pixels of the detector.
+    Gaussian(f64),
+    /// Of a circular aperture without aberrations, by wavelength and F-number.
+    Diffraction,
+    /// At all wavelengths alike.
+    Measured(MtfTable),
+}
+
+/// The camera of the cube that a model is used on.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Seen {
+    /// Tangent of the angle that a pixel of the cube spans on the axis; `None` where the cube does not tell.
+    pub pixel_tangent: Option<f64>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -80,21 +105,24 @@ pub enum Detector {
     },
 }
 
-/// Reads the model in `file`, to be used on a cube of these channels.
+/// How far pitch over focal length may be from the angle of the cube's pixels.
+const SAME_ANGLE: f64 = 0.01;
+
+/// Reads the model in `file`, to be used on a cube of these channels, rendered with this camera.
 ///
 /// # Errors
-/// [`Error::Input`] with every independent mistake.
-pub fn load_sensor(file: &Path, channels: &Channels) -> Result<SensorModel> {
+/// [`Error::Input`] with every independent mistake; one of pitch and focal length that contradict the camera.
+pub fn load_sensor(file: &Path, channels: &Channels, seen: Seen) -> Result<SensorModel> {
     let text = std::fs::read_to_string(file).map_err(|e| Error::input(file, format!("cannot be read: {e}")))?;
-    parse_sensor(&text, file, channels)
+    parse_sensor(&text, file, channels, seen)
 }
 
 /// [`load_sensor`] on a text; `file` only locates relative paths and messages.
-pub fn parse_sensor(text: &str, file: &Path, channels: &Channels) -> Result<SensorModel> {
+pub fn parse_sensor(text: &str, file: &Path, channels: &Channels, seen: Seen) -> Result<SensorModel> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let cx = Context::new(file, text, &[]);
     let Some(root) = cx.document() else { return Err(Error::Input(cx.finish().0)) };
-    let model = decode(&cx, &root, channels);
+    let model = decode(&cx, &root, channels, seen);
     let (problems, warnings) = cx.finish();
     if !problems.is_empty() {
         return Err(Error::Input(problems));
@@ -103,7 +131,7 @@ pub fn parse_sensor(text: &str, file: &Path, channels: &Channels) -> Result<Sens
     Ok(SensorModel { warnings, ..model })
 }
 
-fn decode<'a>(cx: &'a Context<'a>, root: &'a [tree::Entry], channels: &Channels) -> Option<SensorModel> {
+fn decode<'a>(cx: &'a Context<'a>, root: &'a [tree::Entry], channels: &Channels, seen: Seen) -> Option<SensorModel> {
     let top = Fields::root(cx, root, &keys::SENSOR);
     let mut spectra = Spectra::new(cx, top.get("spectra"), Some(channels.clone()));
     let optics = top.require("optics", "[optics] with f_number").and_then(|item| optics(&item, &mut spectra));
@@ -119,14 +147,16 @@ fn decode<'a>(cx: &'a Context<'a>, root: &'a [tree::Entry], channels: &Channels)
                 if is_thermal { thermal(&detector, &mut spectra) } else { photon(&detector, &mut spectra) }
             },
         );
-    let pitch = detector.require("pitch", "pitch = 15e-6 (m)").and_then(|item| item.positive());
+    let oversampling = detector.get("oversampling").map_or(Some(1), |item| item.whole(1..=64));
+    let pitch = detector.get("pitch").map(|item| item.positive());
     let fill_factor = number(&detector, "fill_factor", 1.0, |v| v > 0.0 && v <= 1.0, "greater than 0 and at most 1");
-    let bits = detector.require("bits", "bits = 12").and_then(|item| item.whole(1..=31));
+    let bits = detector.require("bits", "bits = 12").and_then(|item| item.whole(1..=24));
     let offset = number(&detector, "offset", 0.0, |v| v >= 0.0, "0 or greater");
     let prnu = number(&detector, "prnu", 0.0, |v| (0.0..=0.1).contains(&v), "from 0 to 0.1");
     let dsnu = number(&detector, "dsnu", 0.0, |v| v >= 0.0, "0 or greater");
     let pattern_seed = detector.get("pattern_seed").map_or(Some(0), |item| item.whole(0..=u32::MAX));
     let (mut optics, mut kind) = (optics?, kind?);
+    let pitch = fit(&detector, &mut optics.0, pitch, oversampling?, seen);
     let all = spectra.finish();
     let curve = |id: usize| all[id].curve.clone();
     if let Some(id) = optics.1 {
@@ -140,6 +170,7 @@ fn decode<'a>(cx: &'a Context<'a>, root: &'a [tree::Entry], channels: &Channels)
     Some(SensorModel {
         optics: optics.0,
         pitch: pitch?,
+        oversampling: oversampling?,
         fill_factor: fill_factor?,
         bits: bits?,
         offset: offset?,
@@ -197,20 +228,106 @@ fn optics<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> WithSpectrum<Optics
             return None;
         }
     };
-    let cos4 = match fields.get("cos4").map_or(Some(false), |item| item.boolean())? {
-        true if focal.is_none() => {
-            fields.error_help("has cos4, but no focal_length", "add focal_length, or remove cos4");
-            return None;
-        }
-        is_on => focal.filter(|_| is_on),
+    let cos4 = fields.get("cos4").map_or(Some(false), |item| item.boolean())?;
+    let blur = blur(&fields)?;
+    let optics = Optics {
+        f_number,
+        transmittance: Curve::Constant(1.0),
+        blur,
+        focal_length: focal,
+        cos4,
+        temperature: temperature?,
+        cold_shield: shield?,
     };
-    let transmitted = Curve::Constant(1.0);
-    let optics = Optics { f_number, transmittance: transmitted, cos4, temperature: temperature?, cold_shield: shield? };
     if optics.cold_shield.is_some() && optics.temperature.is_none() {
         fields.error_help("has a cold_shield, but no temperature", "add temperature, or remove cold_shield");
         return None;
     }
     Some((optics, transmittance?))
+}
+
+fn blur(fields: &Fields) -> Option<Blur> {
+    #[derive(Clone, Copy, PartialEq)]
+    enum Psf {
+        None,
+        Gaussian,
+        Diffraction,
+    }
+    let words = [("none", Psf::None), ("gaussian", Psf::Gaussian), ("diffraction", Psf::Diffraction)];
+    let psf = fields.get("psf").map_or(Some(Psf::None), |item| item.choice(&words))?;
+    let sigma = positive(fields, "psf_sigma")?;
+    if let Some(item) = fields.get("psf_sigma").filter(|_| psf != Psf::Gaussian) {
+        item.error_help("belongs to psf = \"gaussian\"", "write that, or remove it");
+        return None;
+    }
+    if let Some(item) = fields.get("mtf") {
+        if fields.has("psf") {
+            item.error_help("stands beside psf", "keep one of the two");
+            return None;
+        }
+        let read = mtf::read(&item.cx.path(item.text()?));
+        return read.map(Blur::Measured).map_err(|problem| report_in_file(&item, *problem)).ok();
+    }
+    match (psf, sigma) {
+        (Psf::None, _) => Some(Blur::None),
+        (Psf::Diffraction, _) => Some(Blur::Diffraction),
+        (Psf::Gaussian, Some(sigma)) => Some(Blur::Gaussian(sigma)),
+        (Psf::Gaussian, None) => {
+            fields.error_help("has psf = \"gaussian\", but no psf_sigma", "add psf_sigma = 0.5 (pixels)");
+            None
+        }
+    }
+}
+
+/// Pitch, and a focal length beside it, such that they fit the camera's angle: where one is not written the camera gives it.
+fn fit(
+    detector: &Fields,
+    optics: &mut Optics,
+    written: Option<Option<f64>>,
+    oversampling: u32,
+    seen: Seen,
+) -> Option<f64> {
+    // Of a pixel of the detector, which is several of the cube's.
+    let tangent = seen.pixel_tangent.map(|tangent| tangent * f64::from(oversampling));
+    let pitch = match (written, optics.focal_length, tangent) {
+        (Some(pitch), ..) => pitch?,
+        (None, Some(focal_length), Some(tangent)) => focal_length * tangent,
+        (None, ..) => {
+            detector.require("pitch", "pitch = 15e-6 (m)");
+            return None;
+        }
+    };
+    match (optics.focal_length, tangent) {
+        (Some(focal_length), Some(tangent)) if (pitch / focal_length / tangent - 1.0).abs() > SAME_ANGLE => {
+            let message = format!(
+                "pitch / focal_length is {:.6}, but the cube's camera has pixels of {tangent:.6} (tangent of the angle on the axis)",
+                pitch / focal_length
+            );
+            let help = format!(
+                "with this pitch the focal length is {:.6} m; or remove one of the two, which then follows from the camera",
+                pitch / tangent
+            );
+            match detector.get("pitch") {
+                Some(item) => item.error_help(message, help),
+                None => detector.error_help(message, help),
+            }
+            return None;
+        }
+        (None, Some(tangent)) => optics.focal_length = Some(pitch / tangent),
+        (Some(_), None) => {
+            detector
+                .warn("the cube does not tell its camera's angle: pitch and focal_length are taken as they are".into());
+        }
+        (None, None) if optics.cos4 => {
+            detector.error_help(
+                "has no angle for cos4: the cube does not tell its camera's",
+                "add optics.focal_length, or remove cos4",
+            );
+            return None;
+        }
+        _ => {}
+    }
+    Some(pitch)
 }
 
 /// Refuses keys that mean nothing for this kind of detector.
@@ -279,13 +396,21 @@ fn bands(top: &Fields) -> Option<Option<Vec<(String, Response)>>> {
     }
     for item in &items {
         let fields = item.table(&keys::BAND)?;
-        let name = fields.require("name", "name = \"MWIR\"").and_then(|item| item.text());
-        let end = |key: &str| fields.require(key, &format!("{key} = 3500 (nm)")).and_then(|item| item.positive());
-        let (name, from, to) = (name?, end("from")?, end("to")?);
+        let name = fields.require("name", "name = \"MWIR\"").and_then(|item| item.text())?;
         if bands.iter().any(|(other, _)| other == name) {
             item.error_help(format!("there are two bands \"{name}\""), "give each a name of its own");
             return None;
         }
+        if let Some(file) = fields.get("response") {
+            if fields.has("from") || fields.has("to") {
+                file.error_help("stands beside from and to", "keep it, or the two others");
+                return None;
+            }
+            bands.push((name.to_owned(), band_response(top, &file, name)?));
+            continue;
+        }
+        let end = |key: &str| fields.require(key, &format!("{key} = 3500 (nm)")).and_then(|item| item.positive());
+        let (from, to) = (end("from")?, end("to")?);
         match Response::new(vec![from, to], vec![1.0, 1.0]) {
             Ok(response) if from < to => bands.push((name.to_owned(), response)),
             _ => {
@@ -298,4 +423,24 @@ fn bands(top: &Fields) -> Option<Option<Vec<(String, Response)>>> {
         }
     }
     Some(Some(bands))
+}
+
+/// The response in a file of one, or the one that is called like the band.
+fn band_response(top: &Fields, item: &Item, name: &str) -> Option<Response> {
+    let read = response::read_responses(&item.cx.path(item.text()?));
+    let read = read.map_err(|problem| report_in_file(item, *problem)).ok()?;
+    read.warnings.into_iter().for_each(|warning| top.warn(warning));
+    let mut named = read.named;
+    if named.len() == 1 {
+        return named.pop().map(|(_, response)| response);
+    }
+    let found = named.iter().position(|(other, _)| other == name);
+    if found.is_none() {
+        let all: Vec<&str> = named.iter().map(|(other, _)| other.as_str()).collect();
+        item.error_help(
+            format!("has several responses, none of them called \"{name}\": {}", all.join(", ")),
+            "call the band as one of them",
+        );
+    }
+    found.map(|at| named.swap_remove(at).1)
 }

@@ -450,6 +450,7 @@ impl<'a> Spectra<'a> {
         let instead = match (outside, quantity) {
             (Outside::Hold, _) => Some("its end values are held there"),
             (Outside::Zero, Quantity::Absorption) => Some("nothing is absorbed there"),
+            (Outside::Zero, Quantity::Efficiency) => Some("it is 0 there"),
             (Outside::Zero, _) => None,
         };
         if let (Some(instead), None) = (instead, source.outside) {

@@ -4,12 +4,12 @@ use std::path::Path;
 
 use super::detect::{Clipped, Electronics};
 use super::{Bands, Figures};
-use crate::scene::{SensorModel, parse_sensor};
+use crate::scene::{Seen, SensorModel, parse_sensor};
 use crate::spectral::Channels;
 use crate::{Error, Result};
 
 fn parsed(text: &str, channels: &Channels) -> Result<SensorModel> {
-    parse_sensor(text, Path::new("sensor.toml"), channels)
+    parse_sensor(text, Path::new("sensor.toml"), channels, Seen::default())
 }
 
 const MWIR: &str = "
@@ -175,8 +175,8 @@ fn wrong_models_are_refused_by_name() {
     for (from, to, key, words) in [
         ("f_number = 2.5", "f_number = 0.2", "optics.f_number", "0.5 or greater"),
         ("f_number = 2.5", "focal_length = 0.1", "optics", "f_number"),
-        ("f_number = 2.5", "f_number = 2.5\npsf = 1", "optics.psf", "not supported yet"),
-        ("bits = 14", "bits = 40", "detector.bits", "1 to 31"),
+        ("f_number = 2.5", "f_number = 2.5\npsf = \"airy\"", "optics.psf", "gaussian"),
+        ("bits = 14", "bits = 40", "detector.bits", "1 to 24"),
         ("bits = 14", "bits = 14\nresponsivity = 1", "detector.responsivity", "not for photon"),
         ("gain = 400", "", "detector.gain", "missing"),
         ("quantum_efficiency = 0.8", "quantum_efficiency = 1.8", "detector.quantum_efficiency", "1"),

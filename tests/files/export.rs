@@ -563,6 +563,44 @@ mod memory {
         assert!(peak <= 150 << 20, "{} MiB", peak >> 20);
     }
 
+    /// A camera whose optics blur, on a sparse cube: the peak, bytes, of what is held, and the cube's size.
+    fn peak_of_sensor(side: u32, channels: usize) -> (u64, u64) {
+        let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("folder");
+        let (cube, bytes) = sparse(folder.path(), side, channels);
+        for tile in 0..cube.grid().count() {
+            let [column, row] = cube.grid().position(tile);
+            let path = folder.path().join(format!("cube.zarr/samples/c/{row}/{column}"));
+            fs::create_dir_all(path.parent().expect("a folder")).expect("made");
+            fs::write(path, 64u32.to_le_bytes()).expect("written");
+        }
+        let model = "[optics]\nf_number = 4\npsf = \"diffraction\"\n[detector]\npitch = 2e-6\nintegration_time = 1\n\
+                     quantum_efficiency = 1\ngain = 1\nbits = 16\n";
+        fs::write(folder.path().join("sensor.toml"), model).expect("written");
+        let arguments =
+            ["sensor", "cube.zarr", "--model", "sensor.toml", "-o", "s.zarr", "--noise", "off", "--electrons"];
+        let peak = peak(folder.path(), &arguments);
+        println!("sensor: {} MiB of a cube of {} MiB", peak >> 20, bytes >> 20);
+        // The one pixel that shines does so in its neighbours too; how far, other tests say.
+        let tile = fs::read(folder.path().join("s.zarr/electrons/c/0/1/1")).expect("a tile");
+        let values: &[f32] = bytemuck::cast_slice(&tile);
+        assert!(values[0] > values[1] && values[1] > 0.0, "{:?}", &values[..2]);
+        (peak, bytes)
+    }
+
+    /// A store of 640 MiB, of which tiles, strips of planes and what the program itself needs are held.
+    #[test]
+    fn of_a_sensor_is_bounded() {
+        let (peak, bytes) = peak_of_sensor(512, 640);
+        assert!(peak <= 150 << 20 && bytes > 4 * (150 << 20), "{} MiB of {} MiB", peak >> 20, bytes >> 20);
+    }
+
+    #[test]
+    #[ignore = "reads 20 GiB of holes: minutes"]
+    fn of_a_sensor_on_twenty_gibibytes_is_below_500_mib() {
+        let (peak, bytes) = peak_of_sensor(1040, 5000);
+        assert!(peak <= 500 << 20 && bytes > 20 << 30, "{} MiB of {} MiB", peak >> 20, bytes >> 20);
+    }
+
     #[test]
     #[ignore = "reads 20 GiB of holes: a minute"]
     fn of_a_sparse_cube_of_twenty_gibibytes_is_below_500_mib() {

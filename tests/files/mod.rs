@@ -8,6 +8,7 @@ mod outputs;
 mod python;
 mod refractive;
 mod sensor;
+mod sensor_blur;
 mod sensor_model;
 mod spoilt;
 mod store;

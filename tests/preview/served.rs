@@ -6,8 +6,8 @@ use spectile::cube::{Cube, Header};
 use spectile::spectral::{Channels, planck};
 use tempfile::tempdir;
 
-use super::client::{Events, ask, get, serve};
-use crate::binary::command;
+use super::client::{Events, Running, ask, get, serve};
+use crate::binary::{command, run};
 use crate::cubes::{create, header, pattern, patterned, unit};
 
 const SIZE: [u32; 2] = [100, 70];
@@ -196,4 +196,46 @@ fn what_grows_on_disk_is_told() {
     // Nobody waits for listeners at the end.
     drop(server);
     assert!(Cube::open(cube.path()).is_ok());
+}
+
+/// Counts of a sensor, with their noise as they are, and without it as the detector would count: the store that `--noise off` makes.
+#[test]
+fn counts_are_served_with_their_noise_and_without() {
+    let folder = tempdir().expect("folder");
+    let path = folder.path();
+    patterned(path, "cube.zarr", header([40, 24], [16, 16], 12));
+    let model = "[optics]\nf_number = 2\n[detector]\npitch = 1e-5\nintegration_time = 1e-8\nquantum_efficiency = 0.5\nread_noise = 9\n\
+                 gain = 1e3\noffset = 7\nbits = 14\ndark_current = 1e9\nfull_well = 7.2e6\nprnu = 0.01\n";
+    std::fs::write(path.join("sensor.toml"), model).expect("written");
+    for (out, noise) in [("noisy.zarr", "on"), ("plain.zarr", "off")] {
+        let output =
+            run(path, &["sensor", "cube.zarr", "--model", "sensor.toml", "-o", out, "--electrons", "--noise", noise]);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    }
+    let stored = |store: &str| -> Vec<f32> {
+        let cube = Cube::open_picture(&path.join(store)).expect("counts");
+        let at = |i: u32| cube.spectrum(i % 40, i / 40).expect("read").expect("there")[0];
+        (0..40 * 24).map(at).collect()
+    };
+    let [noisy, plain] = ["noisy.zarr", "plain.zarr"].map(stored);
+    assert_ne!(noisy, plain);
+    // Full wells of 7,200 counts are among them.
+    assert!(plain.contains(&7207.0) && plain.iter().any(|count| *count < 7207.0), "{plain:?}");
+    for (noise, expected) in [("on", &noisy), ("off", &plain)] {
+        let arguments = ["view", "noisy.zarr", "--listen", "127.0.0.1:0", "--noise", noise, "--json"];
+        let running = Running::start(path, &arguments);
+        let channels = get(running.address, "/api/channels").json();
+        assert_eq!((&channels["quantity"], &channels["names"]), (&"counts".into(), &serde_json::json!(["all"])));
+        assert_eq!(channels["thermal"], serde_json::json!([]));
+        let found = get(running.address, "/api/image?show=channel&k=0&scale=1&format=f32").floats();
+        assert_eq!(&found, expected, "{noise}");
+        // Three times the one band.
+        let colour = get(running.address, "/api/image?show=colour&scale=1&format=f32").floats();
+        assert_eq!(colour.iter().step_by(3).copied().collect::<Vec<_>>(), *expected);
+        let blocks = get(running.address, "/api/image?show=channel&k=0&scale=8&format=f32").floats();
+        let mean = (0..64).map(|i| f64::from(expected[40 * (i / 8) + 8 + i % 8])).sum::<f64>() / 64.0;
+        assert!((f64::from(blocks[1]) / mean - 1.0).abs() < 1e-6, "{noise}: {} {mean}", blocks[1]);
+        let csv = get(running.address, "/api/spectrum?x=3&y=2&format=csv");
+        assert!(csv.text().starts_with("wavelength_nm,counts\n"), "{}", csv.text());
+    }
 }

@@ -360,3 +360,43 @@ fn every_evaluator_renders_every_scene_alike() {
         println!("{name}: all evaluators agree");
     }
 }
+
+/// The example of docs/SENSORS.md as it stands there, and the numbers that it gives: of 36 samples for each of the detector's pixels;
+/// another picture, of 32, gave 0.5 % less.
+#[test]
+#[ignore = "renders the infrared aircraft, six minutes"]
+fn the_aircraft_is_seen_as_far_as_the_page_says() {
+    let page = fs::read_to_string(binary::repository("docs/SENSORS.md")).expect("read");
+    let folder = TempDir::new().expect("a folder");
+    let success = |arguments: &[&str]| {
+        let output = run(folder.path(), arguments);
+        assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    };
+    let scene = made().join("aircraft/aircraft-infrared.toml");
+    let command =
+        page.split("scenes/render aircraft-infrared ").nth(1).and_then(|rest| rest.split("spectile sensor").next());
+    let options = command.expect("a command").replace("\\\n", " ").replace(", ", ",").replace('\'', "");
+    let options: Vec<&str> = options.split_whitespace().collect();
+    success(&[&["render", scene.to_str().expect("a name"), "-o", "cube.zarr"], &options[..]].concat());
+    let model = fs::read_to_string(binary::repository("sensors/mwir-insb.toml")).expect("read");
+    let model = model.replace("[detector]", "[detector]\noversampling = 3");
+    fs::write(folder.path().join("camera.toml"), model).expect("written");
+    success(&["sensor", "cube.zarr", "--model", "camera.toml", "-o", "counts.zarr", "--seed", "1", "--electrons"]);
+    let Some(mut python) = crate::outside::python("read_counts.py") else { return };
+    python.arg("example").arg(binary::repository("docs/SENSORS.md")).arg(folder.path());
+    let output = python.output().expect("runs");
+    let found: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    println!("{found}");
+    // `| 100 % | 12.3 km |` in the page's table.
+    let mut checked = 0;
+    for (share, key) in [("100 %", "1.0"), ("10 %", "0.1"), ("1 %", "0.01")] {
+        let row = page.lines().find(|line| line.starts_with(&format!("| {share} |"))).expect("a row");
+        let told: f64 =
+            row.split('|').nth(2).and_then(|cell| cell.trim().strip_suffix(" km")?.parse().ok()).expect("km");
+        let range = found["ranges"][key].as_f64().expect("metres") / 1e3;
+        assert!((range / told - 1.0).abs() < 0.05, "{share}: {range} km, {told} told");
+        checked += 1;
+    }
+    assert_eq!(checked, 3);
+}

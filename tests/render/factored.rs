@@ -169,6 +169,16 @@ fn everything_reads_weights() {
         place.success(&["sensor", name, "--responses", "s.csv", "-o", &format!("seen-{name}")]);
     }
     assert_eq!(values(&place.cube("seen-cube.zarr")), values(&place.cube("seen-plain.zarr")));
+    let model = "[optics]\nf_number = 4\npsf = \"diffraction\"\n[detector]\npitch = 2e-6\nintegration_time = 0.1\n\
+                 quantum_efficiency = 0.5\ngain = 1\nread_noise = 5\nbits = 16\n";
+    fs::write(place.path().join("sensor.toml"), model).expect("written");
+    let counts = ["cube.zarr", "plain.zarr"].map(|name| {
+        let out = format!("counts-{name}");
+        place.success(&["sensor", name, "--model", "sensor.toml", "-o", &out]);
+        place.success(&["spectrum", &out, "5", "7"]).0
+            + &place.success(&["export", &out, "-o", "-", "--format", "csv"]).0
+    });
+    assert_eq!(counts[0], counts[1]);
     let (told, _) = place.success(&["info", "cube.zarr"]);
     assert!(told.contains("relight changes the spectra paint, other, lamp") && !told.contains("\"basis\""), "{told}");
     assert!(told.contains("10 epochs (Student's t, 7 degrees of freedom)"), "{told}");

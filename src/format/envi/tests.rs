@@ -35,7 +35,7 @@ fn what_is_written_is_read() {
         description: "of a test, {1}",
         size: [2, 3, 2],
         interleave: Interleave::Bil,
-        is_double: false,
+        data_type: DataType::F32,
         units: "W m^-2 sr^-1 nm^-1",
         ignore: -9999.0,
         origin: [10, 20],

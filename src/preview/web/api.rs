@@ -185,6 +185,7 @@ async fn status(State(app): State<Arc<App>>) -> Response {
 async fn channels(State(app): State<Arc<App>>) -> std::result::Result<Response, Refused> {
     app.cube(|state| {
         let (cube, channels) = (state.cube(), state.cube().channels());
+        let is_counts = cube.is_counts();
         let (false_colour, rgb) = match cube.projection().kind {
             ProjectionKind::Xyz => (None, three_of(channels, true)),
             ProjectionKind::FalseColour(rgb) => (Some(rgb), rgb),
@@ -197,7 +198,8 @@ async fn channels(State(app): State<Arc<App>>) -> std::result::Result<Response, 
                 "names": channels.names,
                 "false_colour": false_colour,
                 "rgb": rgb,
-                "thermal": (0..channels.len()).filter(|&k| is_thermal(channels, k)).collect::<Vec<_>>(),
+                "thermal": (0..channels.len()).filter(|&k| !is_counts && is_thermal(channels, k)).collect::<Vec<_>>(),
+                "quantity": if is_counts { "counts" } else { "radiance" },
             })
             .to_string(),
         )
@@ -287,7 +289,10 @@ impl<T: serde::Serialize + std::fmt::Debug> Spectrum<T> {
         match format {
             // Numbers and lists of them can always be written.
             Format::Json => serde_json::to_string(self).unwrap_or_default(),
-            Format::Csv => text::spectrum_csv(state.cube().channels(), &self.radiance, self.standard_error.as_deref()),
+            Format::Csv => {
+                let name = if state.cube().is_counts() { "counts" } else { "radiance" };
+                text::values_csv(name, state.cube().channels(), &self.radiance, self.standard_error.as_deref())
+            }
         }
     }
 }

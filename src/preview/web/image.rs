@@ -145,6 +145,9 @@ impl Asked {
             }
             Show::Temperature => {
                 let k = channel("k", self.k)?;
+                if state.cube().is_counts() {
+                    return refuse("these are counts of a sensor: temperatures are those of radiance".into());
+                }
                 if !is_thermal(channels, k) {
                     return refuse(format!(
                         "k={k}: its centre is below {THERMAL_NM} nm, where nothing glows by itself"

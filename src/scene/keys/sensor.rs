@@ -32,17 +32,30 @@ pub static OPTICS: Section = section(
         Key::optional("temperature", Number, "they emit nothing", "Of the optics, which emit what they absorb.")
             .unit("K"),
         Key::optional("cold_shield", Number, "none: the hemisphere", "F-number of the cone that warm optics fill."),
+        Key::default(
+            "psf",
+            Choice(&["none", "gaussian", "diffraction"]),
+            "\"none\"",
+            "How optics blur: the point spread function.",
+        ),
+        Key::optional("psf_sigma", Number, "a Gaussian needs it", "Standard deviation of a Gaussian, along each axis.")
+            .unit("pixels"),
+        Key::optional("mtf", File, "none", "A measured transfer function of modulation, in the place of `psf`."),
     ],
-    &["psf", "mtf", "oversampling"],
+    &[],
 );
 
 pub static DETECTOR: Section = section(
     "detector",
     &[
         Key::default("kind", Choice(&["photon", "thermal"]), "\"photon\"", "What it counts."),
-        Key::required("pitch", Number, "Side of a square pixel.").unit("m"),
+        Key::required("pitch", Number, "Side of a square pixel.")
+            .unless("`focal_length` on a cube that tells its camera's angle")
+            .unit("m"),
+        Key::default("oversampling", Whole, "1", "Pixels of the cube, along each axis, that make one of the detector.")
+            .range("[1, 64]"),
         Key::default("fill_factor", Number, "1.0", "Share of a pixel that is sensitive.").range("(0, 1]"),
-        Key::required("bits", Whole, "Of the converter.").range("[1, 31]"),
+        Key::required("bits", Whole, "Of the converter.").range("[1, 24]"),
         Key::default("offset", Number, "0.0", "Counts without light."),
         Key::default("prnu", Number, "0.0", "Standard deviation of the response over pixels.").range("[0, 0.1]"),
         Key::default("dsnu", Number, "0.0", "Standard deviation of the dark signal over pixels: electrons, or counts."),
@@ -64,8 +77,9 @@ pub static BAND: Section = section(
     "bands",
     &[
         Key::required("name", Text, "Its name."),
-        Key::required("from", Number, "Lower end.").unit("nm"),
-        Key::required("to", Number, "Upper end.").unit("nm"),
+        Key::optional("from", Number, "`response` stands in", "Lower end.").unit("nm"),
+        Key::optional("to", Number, "`response` stands in", "Upper end.").unit("nm"),
+        Key::optional("response", File, "1 between `from` and `to`", "What the band responds to, by wavelength."),
     ],
-    &["response"],
+    &[],
 );

@@ -21,7 +21,7 @@ pub enum Quantity {
     Transmittance,
     /// What a detector absorbs; as [`Quantity::Reflectance`].
     Absorptance,
-    /// Electrons a photon; as [`Quantity::Reflectance`].
+    /// Electrons a photon: dimensionless, in [0, 1]; zero beyond its table, with a warning, since detectors end there.
     Efficiency,
     /// What a surface emits of what a black body does: as [`Quantity::Reflectance`], of which it is the complement.
     Emissivity,
@@ -108,7 +108,8 @@ impl Quantity {
     }
 
     pub(super) fn default_outside(self) -> Outside {
-        if self.is_light() || self == Quantity::Absorption { Outside::Zero } else { Outside::Hold }
+        let is_zero = self.is_light() || matches!(self, Quantity::Absorption | Quantity::Efficiency);
+        if is_zero { Outside::Zero } else { Outside::Hold }
     }
 
     /// Empty where it has none.

@@ -62,6 +62,10 @@ class Spectra {
     this.build();
   }
 
+  isCounts() {
+    return this.channels.quantity === "counts";
+  }
+
   size() {
     return { width: Math.max(200, this.box.clientWidth), height: 270 };
   }
@@ -98,7 +102,7 @@ class Spectra {
       },
       axes: [
         axis("wavelength (nm)", { values: this.logX ? logNumbers : numbers, size: 40 }),
-        axis(`spectral radiance (${RADIANCE})`, { values: this.logY ? logNumbers : numbers, size: 66 }),
+        axis(this.isCounts() ? "counts" : `spectral radiance (${RADIANCE})`, { values: this.logY ? logNumbers : numbers, size: 66 }),
       ],
       legend: { show: false },
       cursor: { drag: { x: true, y: false }, points: { show: false }, y: false },
@@ -244,7 +248,7 @@ class Spectra {
       text.textContent = pin.x1 === undefined ? `${pin.x}, ${pin.y}` : `${pin.x}–${pin.x1 - 1}, ${pin.y}–${pin.y1 - 1}: mean of ${pin.pixels}`;
       value.className = "value";
       const mean = pin.radiance.reduce((sum, v) => sum + v, 0) / pin.radiance.length;
-      value.textContent = `${pin.samples} samples, mean ${short(mean)}`;
+      value.textContent = this.isCounts() ? `mean ${short(mean)}` : `${pin.samples} samples, mean ${short(mean)}`;
       const close = document.createElement("button");
       close.textContent = "×";
       close.title = "Forget this one";
@@ -259,10 +263,10 @@ class Spectra {
   // One line a channel, in the order of the cube; columns for every pin.
   csv() {
     const name = (p) => (p.x1 === undefined ? `${p.x}_${p.y}` : `${p.x}_${p.y}_to_${p.x1 - 1}_${p.y1 - 1}`);
-    const one = this.pins.length === 1;
+    const one = this.pins.length === 1, quantity = this.isCounts() ? "counts" : "radiance";
     const head = this.pins.flatMap((p) => {
       const end = one ? "" : `_${name(p)}`;
-      return p.standard_error ? [`radiance${end}`, `standard_error${end}`] : [`radiance${end}`];
+      return p.standard_error ? [`${quantity}${end}`, `standard_error${end}`] : [`${quantity}${end}`];
     });
     const lines = this.channels.centre_nm.map((nm, k) =>
       [nm, ...this.pins.flatMap((p) => (p.standard_error ? [p.radiance[k], p.standard_error[k]] : [p.radiance[k]]))]
