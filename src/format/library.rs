@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 
 use super::envi;
 use super::instrument::wrong;
+use super::said::Said;
+use super::table::shown;
 use super::text::{Column as Wanted, SpectrumTable, ascending, named, only_one, read};
 use super::unit::{Stated, Unit};
 use crate::error::Problem;
@@ -241,6 +243,7 @@ fn parse_column(bytes: &[u8], path: &Path) -> Read<Column> {
 /// several have, the one whose spectrometer the spectrum's name holds.
 pub fn read_usgs(bytes: &[u8], path: &Path) -> Read<SpectrumTable> {
     let spectrum = parse_column(bytes, path)?;
+    let said = usgs_kind(&spectrum.title, path)?;
     let folder = crate::files::parent(path);
     let name_of = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let mut candidates: Vec<(PathBuf, Column)> = Vec::new();
@@ -268,7 +271,10 @@ pub fn read_usgs(bytes: &[u8], path: &Path) -> Read<SpectrumTable> {
     let help =
         "the USGS library keeps them in files such as splib07a_Wavelengths_ASD_….txt; put the right one beside it";
     match &candidates[..] {
-        [(file, wavelengths)] => pair_usgs(&spectrum, wavelengths, path, file),
+        [(file, wavelengths)] => {
+            let found = pair_usgs(&spectrum, wavelengths, path, file)?;
+            Ok(SpectrumTable { said: Some((said, spectrum.title)), ..found })
+        }
         [] => {
             wrong(path, None, format!("has {count} values, but no file of {count} wavelengths is in its folder"), help)
         }
@@ -277,6 +283,33 @@ pub fn read_usgs(bytes: &[u8], path: &Path) -> Read<SpectrumTable> {
             wrong(path, None, format!("has {count} values, and so have {}", names.join(", ")), help)
         }
     }
+}
+
+/// What a record is of, by the words of its title and of its file's name: a reflectance, but for those that say something else.
+fn usgs_kind(title: &str, path: &Path) -> Read<Said> {
+    let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let about = title.split_once(':').map_or(title, |(_, about)| about);
+    let all = [about, &name].map(str::to_uppercase).join(" ");
+    let words: Vec<&str> = all.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).collect();
+    let any = |starts: &[&str]| words.iter().any(|word| starts.iter().any(|start| word.starts_with(start)));
+    let is = |wanted: &[&str]| words.iter().any(|word| wanted.contains(word));
+    let refuse = |what: &str| wrong(path, Some(1), format!("is a record of {what}: `{}`", shown(about.trim())), "");
+    if any(&["ERROR"]) || is(&["STDEV", "UNCERTAINTY"]) {
+        return refuse("the errors of another");
+    }
+    if any(&["ABSORBANCE"]) || is(&["ABSB", "ABS"]) {
+        return refuse("absorbance, a logarithm");
+    }
+    if any(&["WAVELENGTH", "BANDPASS", "RESOLUTION"]) {
+        return refuse("wavelengths or bandpasses, not of a spectrum");
+    }
+    let is_reflectance = is(&["AREF", "RREF", "RTGC"]) || any(&["REFLECTAN"]);
+    Ok(match () {
+        () if is_reflectance => Said::Reflectance,
+        () if is(&["TRAN", "TRANS"]) || any(&["TRANSMITTAN", "TRANSMISSION"]) => Said::Transmittance,
+        () if any(&["EMISSIVIT"]) || is(&["EMIS"]) => Said::Emissivity,
+        () => Said::Reflectance,
+    })
 }
 
 fn pair_usgs(spectrum: &Column, wavelengths: &Column, path: &Path, of: &Path) -> Read<SpectrumTable> {

@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
+use super::said::Said;
 use super::text::{Column as Wanted, SpectrumTable, ascending, named, only_one};
+use super::unit::{Meaning, Stated};
 use crate::error::Problem;
 
 /// Whether the file is such a table: by its name, or by its header.
@@ -78,9 +80,18 @@ pub fn parse(bytes: &[u8], path: &Path, wanted: Wanted) -> Result<SpectrumTable,
     };
     let index = only_one(&found, ["column", "columns"], &name, choices)
         .map_err(|(message, help)| wrong(Some(header_line), message, &help))?;
-    let has_no_unit = ["TRANS", "DEPTH", "LOG", "BBODY"].iter().any(|word| columns[index].name.contains(word));
+    let name = &columns[index].name;
+    let (said, has_no_unit) = what_it_is(name);
+    let mut after = (1..).zip(text.lines()).skip(header_line);
+    if let Some((line, _)) = after.find(|(_, line)| line.trim_start().starts_with("FREQ")) {
+        let message = "begins a second run here, below the one of line ".to_owned() + &header_line.to_string();
+        return Err(wrong(Some(line), message, "put each run into a file of its own"));
+    }
 
-    let mut table = SpectrumTable::default();
+    let mut table = SpectrumTable { said: said.map(|said| (said, name.clone())), ..SpectrumTable::default() };
+    if name.contains("LOG") {
+        table.unit = Some(Stated { meaning: Meaning::Logarithm, text: name.clone(), certain: true });
+    }
     for (number, line) in lines {
         let words = words(line);
         let Some(&(first, _)) = words.first() else { continue };
@@ -105,6 +116,33 @@ pub fn parse(bytes: &[u8], path: &Path, wanted: Wanted) -> Result<SpectrumTable,
         table.push(nm, if has_no_unit { value } else { value * 1e11 / (nm * nm) }, number);
     }
     ascending(table, path, &format!(" of {}", columns[index].name))
+}
+
+/// What a column is of, by its name, and whether its numbers have no unit of power. What no name here is like is of power.
+fn what_it_is(name: &str) -> (Option<Said>, bool) {
+    /// How columns are called, by parts of their names; of several the first decides.
+    const KINDS: [(&str, Option<Said>, bool); 17] = [
+        ("LOG", None, true),
+        ("TRAN", Some(Said::Transmittance), true),
+        ("DEPTH", Some(Said::OpticalDepth), true),
+        ("BBODY", Some(Said::Temperature), true),
+        ("DIR_EM", Some(Said::Emissivity), true),
+        ("DIREC", Some(Said::Emissivity), true),
+        ("TOA", Some(Said::Irradiance), false),
+        ("REF", Some(Said::Irradiance), false),
+        ("SOL@OBS", Some(Said::Irradiance), false),
+        ("SOL TR", Some(Said::Irradiance), false),
+        ("SOL_TR", Some(Said::Irradiance), false),
+        ("SOLAR", Some(Said::Irradiance), false),
+        ("RAD", Some(Said::Radiance), false),
+        ("THRML", Some(Said::Radiance), false),
+        ("EMIS", Some(Said::Radiance), false),
+        ("SCAT", Some(Said::Radiance), false),
+        ("RFLT", Some(Said::Radiance), false),
+    ];
+    let upper = name.to_uppercase();
+    let found = KINDS.iter().find(|(part, ..)| upper.contains(part));
+    found.map_or((None, false), |(_, said, has_no_unit)| (*said, *has_no_unit))
 }
 
 /// The words of a line and where they end.

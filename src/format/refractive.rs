@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::Deserialize;
 use serde_saphyr::Spanned;
 
+use super::said::Said;
 use super::table;
 use super::text::{self, SpectrumTable};
 use super::unit;
@@ -152,6 +153,13 @@ impl Yaml<'_> {
             let left_out =
                 |(_, kind): &(Option<usize>, &str)| format!("has a block of type `{}`, left out", table::shown(kind));
             table.notes.extend(others.iter().map(left_out));
+        }
+        for (table, said, name) in
+            [(&mut index.n, Said::Index, "n"), (&mut index.k, Said::Extinction, "k")]
+        {
+            if let Some(Ok(table)) = table {
+                table.said = Some((said, name.to_owned()));
+            }
         }
         self.bring_to_vacuum(&mut index, text)?;
         Ok(index)

@@ -19,10 +19,24 @@ pub enum Said {
     OpticalDepth,
     /// An absorption to the base of ten, or per mole.
     Decadic,
+    /// n: of refraction.
+    Index,
+    /// k of a complex index.
+    Extinction,
+    /// k by itself, which may be that of an index, or an absorption.
+    Kay,
+    /// n squared, with an imaginary part.
+    Permittivity,
+    /// n of pulses.
+    GroupIndex,
+    /// n - 1.
+    Refractivity,
+    /// Of a detector, per power.
+    Responsivity,
 }
 
 /// How words begin that name a quantity, in small letters. One that begins so by chance (irradiance) stands first.
-const NOUNS: [(&str, Said); 18] = [
+const NOUNS: [(&str, Said); 20] = [
     ("irradiance", Said::Irradiance),
     ("exitance", Said::Irradiance),
     ("radiance", Said::Radiance),
@@ -41,6 +55,8 @@ const NOUNS: [(&str, Said); 18] = [
     ("scattering", Said::Scattering),
     ("decadic", Said::Decadic),
     ("molar", Said::Decadic),
+    ("permittivit", Said::Permittivity),
+    ("responsivit", Said::Responsivity),
 ];
 
 impl Said {
@@ -62,6 +78,10 @@ impl Said {
                 return Some(Said::Decadic);
             }
             ["1", "r" | "reflectance"] if bare.contains('-') => return Some(Said::Absorptance),
+            ["n", "1"] if bare.contains('-') => return Some(Said::Refractivity),
+            ["group", "index"] | ["ng" | "n_g"] | ["group", "refractive", "index"] => return Some(Said::GroupIndex),
+            [.., "refractive", "index"] | [.., "index", "of", "refraction"] => return Some(Said::Index),
+            ["dielectric", ..] => return Some(Said::Permittivity),
             _ => {}
         }
         let noun = |word: &str| NOUNS.iter().find(|(start, _)| word.starts_with(start)).map(|(_, said)| *said);
@@ -94,6 +114,13 @@ impl Said {
             Said::Temperature => "a temperature",
             Said::OpticalDepth => "an optical depth",
             Said::Decadic => "a decadic or molar absorption",
+            Said::Index => "an index of refraction",
+            Said::Extinction => "the imaginary part of an index of refraction",
+            Said::Kay => "k of an index of refraction, or of an absorption",
+            Said::Permittivity => "a permittivity, which is n squared",
+            Said::GroupIndex => "a group index, which is no n of refraction",
+            Said::Refractivity => "n - 1, and not n",
+            Said::Responsivity => "a responsivity",
         }
     }
 }
@@ -135,6 +162,15 @@ mod tests {
             ("emission", None),
             ("300 K", None),
             ("radians", None),
+            ("group index", Some(Said::GroupIndex)),
+            ("n-1", Some(Said::Refractivity)),
+            ("relative permittivity", Some(Said::Permittivity)),
+            ("dielectric constant", Some(Said::Permittivity)),
+            ("refractive index", Some(Said::Index)),
+            ("responsivity (A/W)", Some(Said::Responsivity)),
+            ("n", None),
+            ("n-butane", None),
+            ("permit", None),
         ] {
             assert_eq!(Said::in_name(name), said, "{name}");
         }

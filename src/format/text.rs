@@ -317,7 +317,10 @@ impl Axis {
         let finish = |(column, mut found): (&usize, SpectrumTable)| {
             let name = table.names.get(*column).map_or("", String::as_str);
             found.unit = Stated::in_name(name);
-            found = found.called(name);
+            found = match optical_constant(&table.names, *column) {
+                Some(said) => SpectrumTable { said: Some((said, name.to_owned())), ..found },
+                None => found.called(name),
+            };
             found.notes.clone_from(&self.notes);
             if let (None, 3.., Some((_, stated))) = (&found.unit, table.columns(), &table.unit_in_comment)
                 && stated.is_percent()
@@ -390,6 +393,24 @@ impl Axis {
         }
         let nm = self.unit.to_nm(x);
         Ok(if self.in_air { unit::vacuum_nm(nm) } else { nm })
+    }
+}
+
+/// What a column called `n` or `k` is: one of an index where the table has both, or is of it alone. Beside other single letters
+/// it is a name as they are.
+fn optical_constant(names: &[String], column: usize) -> Option<Said> {
+    let bare = |name: &String| name.split(['(', '[']).next().unwrap_or("").trim().to_lowercase();
+    let has_unit = |name: &String| Stated::in_name(name).is_some_and(|stated| !stated.is_number());
+    let values = names.get(1..)?;
+    let is = |name: &String, letter: &str| bare(name) == letter && !has_unit(name);
+    let name = names.get(column)?;
+    let both = ["n", "k"].iter().all(|letter| values.iter().any(|name| is(name, letter)));
+    let letters = values.iter().filter(|name| bare(name).chars().count() == 1).count();
+    match () {
+        () if !(both && letters == 2 || values.len() == 1) => None,
+        () if is(name, "n") => Some(Said::Index),
+        () if is(name, "k") => Some(if both { Said::Extinction } else { Said::Kay }),
+        () => None,
     }
 }
 
@@ -471,7 +492,9 @@ impl<'t> Block<'t> {
                 "two are expected",
             ));
         }
-        axis.column(&table, 1, &format!(" of {}", self.name))
+        let found = axis.column(&table, 1, &format!(" of {}", self.name))?;
+        let said = if self.name == "n" { Said::Index } else { Said::Extinction };
+        Ok(SpectrumTable { said: Some((said, self.name.to_owned())), ..found })
     }
 }
 

@@ -403,6 +403,11 @@ impl Stated {
         Some(Stated { meaning: Meaning::Unit(measure), text: text.trim().to_owned(), certain: false })
     }
 
+    /// Whether what is said is a share or a plain number.
+    pub fn is_number(&self) -> bool {
+        matches!(self.meaning, Meaning::Unit(measure) if measure.is_number())
+    }
+
     /// Whether values are said to be percent.
     pub fn is_percent(&self) -> bool {
         self.meaning == Meaning::Unit(Measure { factor: 0.01, ..Measure::ONE })

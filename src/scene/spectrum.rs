@@ -17,6 +17,7 @@ use super::{Definition, Spectrum, SpectrumId};
 use crate::error::{Error, Problem};
 use crate::format::noise;
 use crate::format::refractive;
+use crate::format::said::Said;
 use crate::format::table::shown;
 use crate::format::text::{self, SpectrumTable};
 use crate::format::unit::{Density, Meaning, Stated};
@@ -508,6 +509,13 @@ impl<'a> Spectra<'a> {
         let Some(file) = table.file else { return Some(()) };
         let path = file.path.display();
         let is_scaled = table.source.is_scaled;
+        if quantity == Quantity::Absorption && matches!(file.said, Some((Said::Extinction, _))) {
+            // Radiance falls as the square of a field that falls by k 2π/λ.
+            let per_metre = |nm: &f64| 4.0 * std::f64::consts::PI / (nm * 1e-9);
+            value.iter_mut().zip(table.nm).for_each(|(value, nm)| *value *= per_metre(nm));
+            warnings.push(format!("{path} gives k of an index of refraction: absorption is taken as 4 π k / λ"));
+            return Some(());
+        }
         if let Some((said, text)) = file.said.as_ref().filter(|(said, _)| !quantity.may_be(*said)) {
             let text = shown(text);
             let (noun, wanted) = (said.noun(), quantity.noun());

@@ -93,7 +93,9 @@ impl Quantity {
             Quantity::Intensity => false,
             Quantity::Absorption => said == Said::Absorption,
             Quantity::Scattering => said == Said::Scattering,
-            Quantity::Index | Quantity::CoatIndex | Quantity::Extinction | Quantity::Asymmetry => false,
+            Quantity::Index | Quantity::CoatIndex => said == Said::Index,
+            Quantity::Extinction => matches!(said, Said::Extinction | Said::Kay),
+            Quantity::Asymmetry => false,
         }
     }
 
