@@ -468,9 +468,33 @@ impl Header {
         // Keys that programs add of their own, such as `scale factor`, nobody else applies.
         let scales = |key: &str| FACTORS.iter().any(|word| key.contains(word));
         let is_one = |text: &str| split_list(text).iter().all(|number| number.parse() == Ok(1.0));
-        let own = |(key, (_, text)): &(&String, &(usize, String))| {
-            !KNOWN.contains(&key.as_str()) && scales(key) && !is_one(text)
+        let is_zero = |text: &str| split_list(text).iter().all(|number| number.parse() == Ok(0.0));
+        let has = |key: &str, words: &[&str]| words.iter().any(|word| key.contains(word));
+        // What says in what the values are, beside `data units`.
+        let is_other_unit = |key: &str, text: &str| {
+            let words: Vec<&str> = key.split(' ').collect();
+            let of_values = match words[..] {
+                ["unit" | "units"] => true,
+                [of, "unit" | "units"] => {
+                    ["radiance", "irradiance", "reflectance", "spectra", "value", "values", "y", "intensity"]
+                        .contains(&of)
+                }
+                _ => false,
+            };
+            let is_own = unit::parse(text)
+                .is_some_and(|measure| measure.is_own() || measure.is_number() && measure.factor == 1.0);
+            of_values && !is_own && self.get("data units") != Some(text)
         };
+        let changes = |key: &str, text: &str| match key {
+            _ if text.trim().is_empty() => false,
+            _ if scales(key) || key.contains("coefficient") => !is_one(text),
+            _ if has(key, &["offset", "shift", "intercept"]) => !is_zero(text),
+            "wavelength medium" => !["vacuum", "vac"].contains(&text.trim().to_lowercase().as_str()),
+            _ if has(key, &["no data", "nodata", "ignore value", "fill value", "missing value", "bad band"]) => true,
+            "background" | "bias" => true,
+            _ => is_other_unit(key, text),
+        };
+        let own = |(key, (_, text)): &(&String, &(usize, String))| !KNOWN.contains(&key.as_str()) && changes(key, text);
         if let Some((key, _)) = self.entries.iter().find(own) {
             return refuse(key);
         }

@@ -8,7 +8,7 @@ use exr::image::read::image::ReadLayers;
 use exr::image::read::layers::ReadChannels;
 use exr::image::read::read as exr_reader;
 use exr::meta::MetaData;
-use exr::meta::attribute::SampleType;
+use exr::meta::attribute::{AttributeValue, SampleType};
 
 use super::primaries::Primaries;
 use super::table::shown;
@@ -26,6 +26,8 @@ pub struct Image {
     pub planes: Vec<Plane>,
     /// What its colours are.
     pub colours: Colours,
+    /// In what an attribute says that its numbers are.
+    pub units: Option<String>,
 }
 
 /// What numbers of a picture mean as colours.
@@ -217,7 +219,7 @@ fn png(bytes: &[u8]) -> Result<Image, String> {
         let samples = pixels.map(|pixel| (f64::from(number(pixel)) / largest) as f32).collect();
         Plane { name: (*name).to_owned(), samples, rounding: (0.5 / largest) as f32 }
     };
-    Ok(Image { format: Format::Png, size, planes: names.iter().enumerate().map(plane).collect(), colours })
+    Ok(Image { format: Format::Png, size, planes: names.iter().enumerate().map(plane).collect(), colours, units: None })
 }
 
 /// What the chunks of a PNG say of its colours; those that say most count, as its specification has it.
@@ -290,7 +292,26 @@ fn exr(bytes: &[u8]) -> Result<Image, String> {
         Primaries([xy(given.red), xy(given.green), xy(given.blue), xy(given.white)])
     });
     let primaries = primaries.filter(|primaries| !primaries.are_srgb());
-    let colours = Colours { transfer: Transfer::Linear, primaries, foreign: None };
+    let attributes = || header.own_attributes.other.iter().chain(&header.shared_attributes.other);
+    let text = |wanted: &[&str]| {
+        attributes().find_map(|(key, value)| match value {
+            AttributeValue::Text(text) if is_called(&key.to_string(), wanted) => Some(text.to_string()),
+            _ => None,
+        })
+    };
+    let gamma = attributes().find_map(|(key, value)| match value {
+        AttributeValue::F32(gamma) if is_called(&key.to_string(), &["gamma"]) => Some(f64::from(*gamma)),
+        AttributeValue::F64(gamma) if is_called(&key.to_string(), &["gamma"]) => Some(*gamma),
+        _ => None,
+    });
+    let space = text(&["colorspace", "colourspace"]).filter(|space| !is_linear(space, primaries.is_some()));
+    let foreign = match (space, gamma) {
+        (Some(space), _) => Some(format!("`{}`, by its attribute `ColorSpace`", shown(&space))),
+        (None, Some(gamma)) if (gamma - 1.0).abs() > 1e-3 && gamma != 0.0 => Some(format!("a gamma of {gamma}")),
+        _ => None,
+    };
+    let colours = Colours { transfer: Transfer::Linear, primaries, foreign };
+    let units = text(&["units", "unit"]);
 
     let reader = exr_reader().no_deep_data().largest_resolution_level().all_channels().first_valid_layer();
     let image = reader.all_attributes().non_parallel().from_buffered(Cursor::new(bytes)).map_err(wrong)?;
@@ -302,7 +323,24 @@ fn exr(bytes: &[u8]) -> Result<Image, String> {
         Plane { name: channel.name.to_string(), samples: channel.sample_data.values_as_f32().collect(), rounding }
     };
     let planes = image.layer_data.channel_data.list.into_iter().map(plane).collect();
-    Ok(Image { format: Format::Exr, size, planes, colours })
+    Ok(Image { format: Format::Exr, size, planes, colours, units })
+}
+
+/// Whether an attribute is called so, whatever the program before a colon, and the case.
+fn is_called(key: &str, wanted: &[&str]) -> bool {
+    let bare = key.rsplit([':', '/', '.']).next().unwrap_or("").to_lowercase().replace(['_', ' '], "");
+    wanted.contains(&bare.as_str())
+}
+
+/// Whether the name of a space of colours is that of linear numbers, with the primaries that the file gives or those of sRGB.
+fn is_linear(space: &str, has_primaries: bool) -> bool {
+    let lower = space.to_lowercase();
+    let has = |words: &[&str]| words.iter().any(|word| lower.contains(word));
+    let of_others = has(&["ap0", "ap1", "aces", "2020", "p3", "adobe"]);
+    ["", "raw", "none", "data", "unknown"].contains(&lower.trim())
+        || ((has(&["lin"]) || of_others && has(&["aces"]))
+            && (has_primaries || !of_others)
+            && !has(&["log", "display"]))
 }
 
 #[cfg(test)]

@@ -285,6 +285,11 @@ fn spdx(bytes: &[u8], path: &Path, column: Column) -> Read<SpectrumTable> {
         _ => None,
     };
     found.unit = of.and_then(Stated::of);
+    const OTHERS: [&str; 7] = ["", "other", "relative", "reflectance", "transmittance", "absorptance", "absorbance"];
+    if of.is_none() && !OTHERS.contains(&quantity.as_str()) {
+        let message = format!("says that its quantity is `{}`, which TM-27 does not have", shown(&quantity));
+        return wrong(path, None, message, "write the values as CSV, with their unit: `nm,radiance (W m-2 sr-1 nm-1)`");
+    }
     if quantity == "absorbance" {
         let help = "write the values themselves, as CSV: `nm,value`";
         return wrong(path, None, "says that its quantity is absorbance, a logarithm", help);
@@ -325,6 +330,16 @@ fn rawtoaces(bytes: &[u8], path: &Path, column: Column) -> Read<SpectrumTable> {
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (nm, value) = pairs.into_iter().unzip();
     let unit = data["units"].as_str().unwrap_or("");
+    if unit::is_logarithm_only(unit) {
+        let message = format!("says that its values are in `{}`, logarithms", shown(unit));
+        return wrong(path, None, message, "write the values themselves");
+    }
+    let mut notes = Vec::new();
+    if Stated::of(unit).is_none() && !["", "relative", "radiometric"].contains(&unit.to_lowercase().as_str()) {
+        notes
+            .push(format!("says `{}` of its values, which is not understood: they are taken as they are", shown(unit)));
+    }
+    let said = Said::in_name(unit).map(|said| (said, unit.to_owned()));
     let axis = ["wavelength_units", "wavelength units"]
         .iter()
         .find_map(|key| data[*key].as_str().or(document["header"][*key].as_str()));
@@ -332,7 +347,7 @@ fn rawtoaces(bytes: &[u8], path: &Path, column: Column) -> Read<SpectrumTable> {
         let message = format!("gives its wavelengths in `{}`, where rawtoaces has nm", shown(axis));
         return wrong(path, None, message, "write them in nm");
     }
-    ascending(SpectrumTable { nm, value, unit: Stated::of(unit), ..SpectrumTable::default() }, path, "")
+    ascending(SpectrumTable { nm, value, unit: Stated::of(unit), said, notes, ..SpectrumTable::default() }, path, "")
 }
 
 /// A spectrum of RADIS: arrays by name, the axis in `waveunit`: cm⁻¹, nm (in air) or nm_vac.

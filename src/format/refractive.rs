@@ -154,9 +154,7 @@ impl Yaml<'_> {
                 |(_, kind): &(Option<usize>, &str)| format!("has a block of type `{}`, left out", table::shown(kind));
             table.notes.extend(others.iter().map(left_out));
         }
-        for (table, said, name) in
-            [(&mut index.n, Said::Index, "n"), (&mut index.k, Said::Extinction, "k")]
-        {
+        for (table, said, name) in [(&mut index.n, Said::Index, "n"), (&mut index.k, Said::Extinction, "k")] {
             if let Some(Ok(table)) = table {
                 table.said = Some((said, name.to_owned()));
             }

@@ -47,7 +47,12 @@ pub fn parse_responses(bytes: &[u8], path: &Path) -> Result<Responses, Box<Probl
     let is_long = count == 3 && name(0).eq_ignore_ascii_case("band");
     // pandas writes the numbers of its rows first.
     let is_numbered = !is_long && count > 2 && text::is_row_number(name(0)) && unit::is_axis(name(1));
-    if !is_long && table.names.iter().any(|name| name.eq_ignore_ascii_case("band")) {
+    let has_band = table.names.iter().any(|name| name.eq_ignore_ascii_case("band"));
+    if is_long && !(unit::is_axis(name(1)) || matches!(Unit::stated(name(1)), Ok(Some(_)))) && unit::is_axis(name(2)) {
+        let help = "write the three columns `band,wavelength_nm,response`, in this order";
+        return Err(wrong(Some(table.line), "has the columns of long responses in another order".into(), help));
+    }
+    if !is_long && has_band {
         let help = "write the three columns `band,wavelength_nm,response`, in this order";
         return Err(wrong(Some(table.line), "has a column `band`, but not the columns of long responses".into(), help));
     }
@@ -113,11 +118,7 @@ pub fn parse_responses(bytes: &[u8], path: &Path) -> Result<Responses, Box<Probl
             return Err(wrong(None, "holds no responses".into(), ""));
         }
     }
-    let of_photons = table.comments.iter().find(|text| {
-        let lower = text.to_lowercase();
-        lower.contains("quantum efficienc") && !["from", "convert", "divided"].iter().any(|word| lower.contains(word))
-    });
-    let of_photons = of_photons.cloned();
+    let of_photons = table.comments.iter().map(|(_, text)| text).find(|text| says_per_photon(text)).cloned();
     let value_name = |name: &str| if is_long { table.names[2].clone() } else { name.to_owned() };
     for (name, table) in &mut tables {
         let named = value_name(name);
@@ -164,7 +165,12 @@ fn is_no_response(name: &str) -> bool {
     let last = lower.split(|c: char| !c.is_alphabetic()).rfind(|word| !word.is_empty()).unwrap_or("");
     const SPREADS: [&str; 12] =
         ["stdev", "stddev", "std", "sd", "uncertainty", "unc", "uncert", "sigma", "err", "error", "fwhm", "bandwidth"];
+    // An axis by its unit, but for a wavelength, which may be that of a band.
+    let other_axis = matches!(Unit::stated(name), Ok(Some(Unit::Wavenumber(_) | Unit::Frequency(_) | Unit::Energy(_))))
+        && Stated::in_name(name).is_none_or(|stated| !stated.is_number());
     unit::is_axis(name)
+        || other_axis
+        || ["freq", "flag", "flags", "mask", "quality", "reference", "comment"].contains(&lower.trim())
         || ["wavelength", "wavenumber", "frequency"].contains(&first)
         || SPREADS.contains(&first)
         || (last != lower && SPREADS.contains(&last))
@@ -206,10 +212,26 @@ fn says_percent(name: &str) -> bool {
     Stated::in_name(name).is_some_and(|stated| stated.is_percent())
 }
 
+/// Abbreviations of efficiencies that count photons.
+const EFFICIENCIES: [&str; 5] = ["qe", "eqe", "iqe", "ipce", "pde"];
+
 fn is_per_photon(name: &str) -> bool {
-    let lower = name.to_lowercase();
+    let lower = name.to_lowercase().replace("q.e.", "qe");
     let mut words = lower.split(|c: char| !c.is_alphanumeric());
-    words.any(|word| ["qe", "eqe", "iqe", "ipce", "quantum", "quantal", "quanta", "photon", "photons"].contains(&word))
+    words.any(|word| {
+        EFFICIENCIES.contains(&word) || ["quantum", "quantal", "quanta", "photon", "photons"].contains(&word)
+    }) || lower.replace(' ', "").contains("e-/ph")
+}
+
+/// Whether a comment says that responses are per photon, and not that they were made from such.
+fn says_per_photon(text: &str) -> bool {
+    let lower = text.to_lowercase().replace("q.e.", "qe");
+    let words: Vec<&str> = lower.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).collect();
+    let of_photons = words.iter().any(|word| EFFICIENCIES.contains(word) || *word == "quantal")
+        || ["quantum efficienc", "per photon", "photon response", "photon sensitivity", "response to photons", "e-/ph"]
+            .iter()
+            .any(|phrase| lower.contains(phrase));
+    of_photons && !["from", "convert", "divided", "per energy", "not "].iter().any(|word| lower.contains(word))
 }
 
 /// Percent become shares.

@@ -9,6 +9,9 @@ use super::said::Said;
 use super::unit::{self, FACTORS, Stated, Unit};
 use crate::error::Problem;
 
+mod statement;
+use statement::Statement;
+
 type Read<T> = Result<T, Box<Problem>>;
 
 /// A table in a text file.
@@ -24,8 +27,10 @@ pub struct Table<'p> {
     pub notes: Vec<String>,
     /// The unit of power that the comments before the numbers speak of, and the line of the first that does.
     pub unit_in_comment: Option<(usize, Stated)>,
-    /// The lines that are about the table.
-    pub comments: Vec<String>,
+    /// What lines before the numbers call the values, and the first line that does.
+    pub said: Option<(Said, String)>,
+    /// The lines that are about the table, by number.
+    pub comments: Vec<(usize, String)>,
     decimal: Decimal,
 }
 
@@ -43,6 +48,7 @@ struct Header {
     row: usize,
     /// Of names and units the row that stands first.
     first: usize,
+    notes: Vec<String>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,6 +63,9 @@ enum Separator {
     Char(u8),
     Space,
 }
+
+/// What to do about a table that is none.
+const SPECTRA: &str = "write lines of `nm,value`";
 
 /// Cells that say that there is no number.
 const NOT_GIVEN: [&str; 12] =
@@ -213,6 +222,17 @@ pub fn read<'p>(bytes: &[u8], path: &'p Path) -> Read<Table<'p>> {
     parse(&text, 1, path)
 }
 
+/// Like [`read`], of a table of other numbers than spectra; `rows` says in messages what its lines are.
+pub fn read_for<'p>(bytes: &[u8], path: &'p Path, rows: &str) -> Read<Table<'p>> {
+    read(bytes, path).map_err(|mut problem| {
+        problem.help = problem.help.map(|help| match help.as_str() {
+            SPECTRA => format!("write lines of {rows}"),
+            _ => help,
+        });
+        problem
+    })
+}
+
 /// Like [`read`], of text whose first line has the number `first_line` in the file.
 pub fn parse<'p>(text: &str, first_line: usize, path: &'p Path) -> Read<Table<'p>> {
     let mut comments: Vec<(usize, &str)> = Vec::new();
@@ -236,7 +256,15 @@ pub fn parse<'p>(text: &str, first_line: usize, path: &'p Path) -> Read<Table<'p
         }
     }
     if lines.is_empty() {
-        return Err(wrong(path, None, "holds no data".to_owned(), "write lines of `nm,value`"));
+        return Err(wrong(path, None, "holds no data".to_owned(), SPECTRA));
+    }
+    // IPAC's, of which names, types and units stand between bars over numbers between blanks.
+    let is_barred = |line: &str| line.starts_with('|') && line.ends_with('|') && line.len() > 2;
+    if let Some((line, _)) = lines.iter().find(|(_, line)| is_barred(line))
+        && lines.iter().any(|(_, line)| line.starts_with(|c: char| c.is_ascii_digit()) && !line.contains('|'))
+    {
+        let help = "export it as CSV, with the units in the names: `wavelength (um),radiance (W m-2 sr-1 um-1)`";
+        return Err(wrong(path, Some(*line), "is a table of IPAC, which is not read".to_owned(), help));
     }
     let is_spd = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("spd"));
     let separator = match declared {
@@ -248,7 +276,7 @@ pub fn parse<'p>(text: &str, first_line: usize, path: &'p Path) -> Read<Table<'p
     let decimal = decimal_of(&rows, separator, path)?;
     drop_empty(&mut rows);
     if rows.is_empty() {
-        return Err(wrong(path, None, "holds no data".to_owned(), "write lines of `nm,value`"));
+        return Err(wrong(path, None, "holds no data".to_owned(), SPECTRA));
     }
     let mut table = Table {
         path,
@@ -257,7 +285,8 @@ pub fn parse<'p>(text: &str, first_line: usize, path: &'p Path) -> Read<Table<'p
         rows,
         notes: Vec::new(),
         unit_in_comment: None,
-        comments: comments.iter().map(|(_, text)| (*text).to_owned()).collect(),
+        said: None,
+        comments: comments.iter().map(|(line, text)| (*line, (*text).to_owned())).collect(),
         decimal,
     };
     table.find_header(separator, &comments)?;
@@ -373,6 +402,18 @@ impl Table<'_> {
         Err(self.problem(Some(row.line), message, help))
     }
 
+    /// Refuses comments that say another unit of length than the metre, for tables of places.
+    pub fn check_metres(&self) -> Read<()> {
+        for (line, text) in &self.comments {
+            let other = |statement: &Statement| matches!(statement, Statement::Axis(unit) if *unit != Unit::METRE);
+            if statement::of(&[text]).iter().any(other) {
+                let message = format!("says `{}`, which is not applied: places are in metres", shown(text));
+                return Err(self.problem(Some(*line), message, "write them in metres, and remove the comment"));
+            }
+        }
+        Ok(())
+    }
+
     fn is_number(&self, cell: &str) -> bool {
         parse_number(cell, self.decimal).is_some()
     }
@@ -387,6 +428,7 @@ impl Table<'_> {
         let mut preamble = header.as_ref().map_or(start, |header| header.first);
         let mut names = Vec::new();
         if let Some(header) = header {
+            self.notes.extend(header.notes);
             (names, self.line) = (header.names, self.rows[header.row].line);
         } else if let Some((line, found)) = self.header_in_comment(separator, width, start, comments) {
             let axis = &found[0];
@@ -399,12 +441,16 @@ impl Table<'_> {
             (names, self.line) = (vec![unit, "n".to_owned(), "k".to_owned()], self.rows[start - 2].line);
             preamble = start - 2;
         } else if start > 0 {
+            let notes = self.notes.len();
+            self.look_at_preamble(start, &[])?;
+            self.notes.truncate(notes);
             self.refuse_names_of_other_columns(start - 1, width)?;
         }
-        self.look_at_preamble(preamble)?;
-        self.warn_of_units_in_comments(&names, start, comments);
+        self.look_at_preamble(preamble, &names)?;
+        self.warn_of_statements_in_comments(&names, start, comments);
         self.warn_of_factors_in_comments(&names, comments);
         self.unit_in_comment = self.unit_of_comments(start, comments);
+        self.warn_of_rows_in_comments(separator, &names, comments);
         if names.is_empty() {
             self.line = self.rows.get(start).map_or(self.line, |row| row.line);
         }
@@ -416,12 +462,17 @@ impl Table<'_> {
     /// The place of the first row of numbers, of which most have `usual` cells; that of a long table of responses begins with a
     /// name.
     fn first_row(&self, usual: usize) -> Read<usize> {
-        let is_long =
-            |row: &Row| row.cells.len() == 3 && row.cells.get(0).is_some_and(|c| c.eq_ignore_ascii_case("band"));
-        if let Some(header) = self.rows.iter().position(is_long) {
+        let begins = |row: &Row| row.cells.get(0).is_some_and(|cell| self.is_number(cell));
+        let is_long = |i: &usize| {
+            let cells = &self.rows[*i].cells;
+            let next_is_named =
+                || self.rows.get(i + 1).is_some_and(|next| !begins(next) && !self.is_line_of_units(i + 1));
+            cells.get(0).is_some_and(|c| c.eq_ignore_ascii_case("band"))
+                && (cells.len() == 3 || cells.len() > 3 && next_is_named())
+        };
+        if let Some(header) = (0..self.rows.len()).find(is_long) {
             return Ok(header + 1);
         }
-        let begins = |row: &Row| row.cells.get(0).is_some_and(|cell| self.is_number(cell));
         let whole = |row: &Row| begins(row) && row.cells.len() == usual;
         self.rows.iter().position(whole).or_else(|| self.rows.iter().position(begins)).ok_or_else(|| {
             let row = &self.rows[self.rows.len().min(2) - 1];
@@ -429,7 +480,7 @@ impl Table<'_> {
             let message = format!("`{cell}` is not a finite number, and no line begins with one");
             let help = match cell.contains(',') {
                 true => "write decimal points, and no commas within numbers",
-                false => "write lines of `nm,value`",
+                false => SPECTRA,
             };
             self.problem(Some(row.line), message, help)
         })
@@ -446,7 +497,13 @@ impl Table<'_> {
         let units =
             (head + 1..start).find(|&row| self.is_line_of_units(row) && !unit::states_a_factor(&whole(row - 1)));
         let row = units.unwrap_or(start) - 1;
+        // A line that says something of the table is none of names, and goes with those before it.
+        if statement::is_no_header(&self.rows[row].cells.iter().collect::<Vec<_>>()) {
+            return None;
+        }
         let mut names = cells(row);
+        let line = units.map_or(0, |units| self.rows[units].line);
+        let mut notes = Vec::new();
         // Some write the units first.
         let before = row.checked_sub(1).filter(|before| {
             units.is_none()
@@ -457,11 +514,19 @@ impl Table<'_> {
         let units = units.or(before);
         for (name, unit) in names.iter_mut().zip(units.map(cells).unwrap_or_default()) {
             let bare = unit.trim_matches(['(', ')', '[', ']', ' ']);
-            if !bare.is_empty() && *bare != *name {
-                *name = format!("{name} ({bare})");
+            if !bare.chars().any(|c| c.is_alphanumeric() || matches!(c, '%' | '\u{2030}')) || *bare == *name {
+                continue;
+            }
+            let joined = format!("{name} ({bare})");
+            let is_bracketed = *bare != *unit;
+            if is_bracketed || unit::parse(bare).is_some() || Stated::in_name(&joined).is_some() {
+                *name = joined;
+            } else {
+                let bare = shown(bare);
+                notes.push(format!("has a line of units, {line}, of which `{bare}` is not understood: it is left out"));
             }
         }
-        Some(Header { names, row, first: before.unwrap_or(row) })
+        Some(Header { names, row, first: before.unwrap_or(row), notes })
     }
 
     /// Whether every cell of a row can be nothing but a unit, the first that of a spectral axis.
@@ -483,7 +548,10 @@ impl Table<'_> {
     fn header_of_words(&self, start: usize, width: usize) -> Option<Header> {
         let row = start.checked_sub(1)?;
         let words: Vec<&str> = self.rows[row].cells.iter().collect();
-        Some(Header { names: join_names(&words, width)?, row, first: row })
+        if statement::is_no_header(&words) {
+            return None;
+        }
+        Some(Header { names: join_names(&words, width)?, row, first: row, notes: Vec::new() })
     }
 
     /// A line before the numbers that names columns, but not these.
@@ -493,7 +561,17 @@ impl Table<'_> {
         if !names_something {
             return Ok(());
         }
-        let message = format!("has {} cells where the numbers below have {width}", row.cells.len());
+        // `Wavelength: nm` changes nothing.
+        let cells: Vec<&str> = row.cells.iter().collect();
+        if cells.len() == width && statement::is_no_header(&cells) && statement::is_of_axis(&cells) {
+            return Ok(());
+        }
+        let message = match row.cells.len() {
+            cells if cells == width => {
+                format!("says `{}`, which names no columns", shown(&row.cells.iter().collect::<Vec<_>>().join(" ")))
+            }
+            cells => format!("has {cells} cells where the numbers below have {width}"),
+        };
         let help = "give the header a name for every column, and begin lines about something else with `# `";
         Err(self.problem(Some(row.line), message, help))
     }
@@ -529,6 +607,9 @@ impl Table<'_> {
         } else {
             return None;
         };
+        if statement::is_no_header(&names.iter().map(String::as_str).collect::<Vec<_>>()) {
+            return None;
+        }
         let is_axis = |name: &str| {
             let lower = name.to_lowercase();
             ["wave", "wl", "lambda", "\u{3bb}", "lam", "freq", "energy"].iter().any(|word| lower.starts_with(word))
@@ -537,18 +618,28 @@ impl Table<'_> {
         says_something.then_some((*line, names))
     }
 
-    /// Lines before the header are about something else; one that speaks of units or factors is not left out in silence.
-    fn look_at_preamble(&mut self, end: usize) -> Read<()> {
+    /// Lines before the header are about something else; one that says what would change the numbers, and that no name of a column
+    /// says too, is not left out in silence.
+    fn look_at_preamble(&mut self, end: usize, names: &[String]) -> Read<()> {
         for row in &self.rows[..end] {
-            let whole = row.cells.iter().collect::<Vec<_>>().join(" ");
+            let cells: Vec<&str> = row.cells.iter().collect();
+            let whole = cells.join(" ");
             let key = whole.split([':', '=']).next().unwrap_or("").to_lowercase();
             let has_value =
                 row.cells.iter().flat_map(|cell| cell.split([':', '=', ' '])).any(|word| self.is_number(word));
             let scales = FACTORS.iter().chain(["offset"].iter()).any(|word| key.contains(word));
             let of_units =
                 key.contains("unit") && (Unit::stated(&whole) != Ok(None) || unit::speaks_of_percent(&whole));
-            let is_unit = row.cells.len() == 1 && Unit::named(&whole).is_some_and(|unit| unit != Unit::NANOMETRE);
-            if (scales && has_value) || of_units || is_unit || unit::states_a_factor(&whole) || says_an_axis(&whole) {
+            let mut is_wrong = (scales && has_value) || of_units || unit::states_a_factor(&whole);
+            for statement in statement::of(&cells) {
+                match statement {
+                    Statement::Of(said) if said != Said::Counts => {
+                        self.said.get_or_insert((said, whole.clone()));
+                    }
+                    other => is_wrong |= !is_said_by(&other, names),
+                }
+            }
+            if is_wrong {
                 let message = format!("says `{}`, which is not applied", shown(&whole));
                 let help = "apply it, put units into the header (`wavelength (um)`), and begin the line with `# `";
                 return Err(self.problem(Some(row.line), message, help));
@@ -567,6 +658,27 @@ impl Table<'_> {
         Ok(())
     }
 
+    /// Lines of a long table whose band begins with the mark of a comment, `#1,400,0.5`: they are none of its rows.
+    fn warn_of_rows_in_comments(&mut self, separator: Separator, names: &[String], comments: &[(usize, &str)]) {
+        let is_long = names.first().is_some_and(|name| name.eq_ignore_ascii_case("band"));
+        let is_row = |(line, text): &&(usize, &str)| {
+            let is_name = text.chars().nth(1).is_some_and(char::is_alphanumeric);
+            let rows = records(&[(*line, text)], separator);
+            is_name
+                && rows.first().is_some_and(|row| {
+                    row.cells.len() == names.len() && row.cells.iter().skip(1).all(|cell| self.is_number(cell))
+                })
+        };
+        let found: Vec<usize> = comments.iter().filter(|_| is_long).filter(is_row).map(|(line, _)| *line).collect();
+        if let [first, ..] = found[..] {
+            self.notes.push(format!(
+                "has {} lines that look like rows, the first of them {first}, and begin as comments do: they are left out (give \
+                 the band a name that does not begin so)",
+                found.len()
+            ));
+        }
+    }
+
     /// The unit of spectral power in the comments, as those of libRadtran's solar spectra have it, if it is the same in all that
     /// speak of one.
     fn unit_of_comments(&self, start: usize, comments: &[(usize, &str)]) -> Option<(usize, Stated)> {
@@ -577,26 +689,56 @@ impl Table<'_> {
         found.all(|(_, other)| other.meaning == one.1.meaning).then_some(one)
     }
 
-    /// A comment that speaks of another unit than nm, where nothing else says the unit.
-    fn warn_of_units_in_comments(&mut self, names: &[String], start: usize, comments: &[(usize, &str)]) {
-        if names.first().is_some_and(|name| Unit::stated(name) != Ok(None)) {
-            return;
-        }
+    /// Comments that say what would change the numbers, and that no name of a column says.
+    fn warn_of_statements_in_comments(&mut self, names: &[String], start: usize, comments: &[(usize, &str)]) {
         let first = self.rows.get(start).map_or(usize::MAX, |row| row.line);
-        for (line, text) in comments.iter().filter(|(line, _)| *line < first) {
-            let about_axis = text.to_lowercase();
+        let axis_is_said = names.first().is_some_and(|name| Unit::stated(name) != Ok(None));
+        let mut seen: Vec<Statement> = Vec::new();
+        for (line, text) in
+            comments.iter().filter(|(line, _)| *line < first && !(*line == self.line && !names.is_empty()))
+        {
+            let mut found = statement::of(&[text]);
+            let lower = text.to_lowercase();
             let about_axis =
-                ["wave", "lambda", "first column", "column 1", "wl"].iter().any(|word| about_axis.contains(word));
+                ["wave", "lambda", "first column", "column 1", "wl"].iter().any(|word| lower.contains(word));
             if about_axis
-                && let Ok(Some(unit)) = Unit::stated(text.trim_start_matches(['#', '%', '!', '/', ' ']))
+                && let Ok(Some(unit)) = Unit::stated(unit::without_mark(text))
                 && unit != Unit::NANOMETRE
             {
+                found.push(Statement::Axis(unit));
+            }
+            for statement in found {
+                let is_said = match statement {
+                    Statement::Axis(_) | Statement::OtherAxis => axis_is_said,
+                    // What is said of a unit of power or of percent is applied, or told of, by column.
+                    Statement::Percent => true,
+                    Statement::Logarithm => is_said_by(&statement, names),
+                    Statement::Of(said) => {
+                        self.said.get_or_insert((said, (*text).to_owned()));
+                        true
+                    }
+                };
+                let kind = std::mem::discriminant(&statement);
+                if is_said || seen.iter().any(|other| std::mem::discriminant(other) == kind) {
+                    continue;
+                }
+                let what = match statement {
+                    Statement::Axis(_) | Statement::OtherAxis => {
+                        "but no header says a unit: its wavelengths are taken as nm (say `unit = …` in the scene)"
+                    }
+                    _ => "which is not applied: its values are taken as they are (write the values themselves)",
+                };
+                self.notes.push(format!("has the comment `{}` on line {line}, {what}", shown(text)));
+                seen.push(statement);
+            }
+            if let Some(unit) = unit::of_matter_within(text)
+                && !names.iter().skip(1).any(|name| Stated::in_name(name).is_some())
+            {
                 self.notes.push(format!(
-                    "has the comment `{}` on line {line}, but no header says a unit: its wavelengths are taken as nm (say \
-                     `unit = …` in the scene)",
+                    "has the comment `{}` on line {line}, but no header says that its values are in `{unit}`: they are taken as they \
+                     are",
                     shown(text)
                 ));
-                return;
             }
         }
     }
@@ -619,16 +761,17 @@ impl Table<'_> {
     }
 }
 
-/// Whether a line such as `XAxis mode: Raman Shifts` or `Y-axis: % Reflectance` says of an axis what is not so without it.
-fn says_an_axis(line: &str) -> bool {
-    let Some((key, value)) = line.split_once([':', '=']) else { return false };
-    let key: String = key.to_lowercase().chars().filter(char::is_ascii_alphabetic).collect();
-    let value = value.trim();
-    if key.starts_with("xaxis") {
-        let is_plain = value.is_empty() || value.to_lowercase().contains("wavelength") || Unit::named(value).is_some();
-        return !(is_plain && matches!(Unit::stated(value), Ok(None | Some(Unit::NANOMETRE))));
+/// Whether the names of columns say the same as a statement.
+fn is_said_by(statement: &Statement, names: &[String]) -> bool {
+    let values = || names.iter().skip(1).filter_map(|name| Stated::in_name(name));
+    match statement {
+        Statement::Axis(unit) => names.first().is_some_and(|name| Unit::stated(name) == Ok(Some(*unit))),
+        Statement::OtherAxis => false,
+        Statement::Percent => values().any(|stated| stated.is_percent()),
+        // A column that says a unit is no logarithm, whatever the others are.
+        Statement::Logarithm => values().next().is_some(),
+        Statement::Of(said) => names.iter().skip(1).any(|name| Said::in_name(name) == Some(*said)),
     }
-    key.starts_with("yaxis") && (Stated::in_name(value).is_some() || Said::in_name(value) == Some(Said::Counts))
 }
 
 /// Names that hold blanks, where columns are separated by blanks: those in brackets belong to the word before, and of two

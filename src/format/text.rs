@@ -321,6 +321,10 @@ impl Axis {
                 Some(said) => SpectrumTable { said: Some((said, name.to_owned())), ..found },
                 None => found.called(name),
             };
+            // Of one column, what lines before the numbers call it.
+            if table.columns() == 2 && found.said.is_none() {
+                found.said.clone_from(&table.said);
+            }
             found.notes.clone_from(&self.notes);
             if let (None, 3.., Some((_, stated))) = (&found.unit, table.columns(), &table.unit_in_comment)
                 && stated.is_percent()

@@ -34,7 +34,8 @@ pub fn read(path: &Path) -> Read<Vec<Station>> {
 /// # Errors
 /// As [`read`].
 pub fn parse(bytes: &[u8], path: &Path) -> Read<Vec<Station>> {
-    let table = table::read(bytes, path)?;
+    let table = table::read_for(bytes, path, "`x,y,z,yaw_degrees`, as its header has them")?;
+    table.check_metres()?;
     let help =
         "begin the file with x,y,z,yaw_degrees,pitch_degrees,roll_degrees, of which the last three may be left out";
     let column = |name: &str| table.names.iter().position(|found| found.trim().eq_ignore_ascii_case(name));
@@ -42,6 +43,12 @@ pub fn parse(bytes: &[u8], path: &Path) -> Read<Vec<Station>> {
     if let Some(name) = table.names.iter().find(|name| !known(name)) {
         let message = format!("has a column `{}`, which says nothing of a line", table::shown(name));
         return Err(table.problem(Some(table.line), message, help));
+    }
+    let lower = |name: &String| name.trim().to_lowercase();
+    let twice = |i: usize| table.names[..i].iter().any(|other| lower(other) == lower(&table.names[i]));
+    if let Some(i) = (0..table.names.len()).find(|i| twice(*i)) {
+        let message = format!("has a column `{}`, twice", table::shown(&table.names[i]));
+        return Err(table.problem(Some(table.line), message, "keep one of the two"));
     }
     let mut position = [0; 3];
     for (place, name) in position.iter_mut().zip(POSITION) {
@@ -87,6 +94,10 @@ mod tests {
             ("x,y,z,speed\n1,2,3,4\n", "a column `speed`"),
             ("x,y,z\n1,2,3\n1,,3\n", "Some(3) has no number"),
             ("x,y,z\n1,2,three\n", "not a finite number"),
+            ("x,y,z,x\n1,2,3,4\n", "a column `x`, twice"),
+            ("x,y,z,Z \n1,2,3,4\n", "a column `Z`, twice"),
+            ("# units: cm\nx,y,z\n1,2,3\n", "Some(1) says `# units: cm`"),
+            ("# in km\nx,y,z\n1,2,3\n", "Some(1) says `# in km`"),
         ] {
             let error = read(text).expect_err(what);
             assert!(error.contains(what), "{text}: {error}");

@@ -1,17 +1,21 @@
 //! Units as files spell them: of spectral axes (nm, cm⁻¹, THz, eV …) and of what stands over them (W m⁻² sr⁻¹ nm⁻¹ …). The one
 //! place where they are understood.
 
+mod axis;
+mod sentence;
 mod spelling;
 #[cfg(test)]
 mod tests;
 
-use spelling::{
-    begins_with_factor, bracketed, has_factor, is_about_the_medium, is_logarithm, is_percent, is_power_of_ten,
-    is_wavenumber, looks_like_unit, plain, spectral_power_at_end, spells_power, words,
+use super::said::Said;
+use sentence::{
+    begins_with_factor, has_arithmetic, has_factor, is_logarithm, is_percent, is_percent_of, is_power_of_ten,
 };
+use spelling::{bracketed, is_about_the_medium, looks_like_unit, plain, spectral_power_at_end, spells_power, words};
 
 use crate::spectral::planck::{CHARGE, LIGHT_SPEED, PLANCK};
 
+pub use sentence::without_mark;
 pub use spelling::parse;
 
 /// Planck's constant, eV s.
@@ -100,6 +104,7 @@ pub enum Unit {
 impl Unit {
     pub const NANOMETRE: Unit = Unit::Wavelength(1.0);
     pub const MICROMETRE: Unit = Unit::Wavelength(1e3);
+    pub const METRE: Unit = Unit::Wavelength(1e9);
     pub const WAVENUMBER: Unit = Unit::Wavenumber(1.0);
 
     /// A place on the axis, above 0, as a wavelength in nm.
@@ -134,11 +139,8 @@ impl Unit {
         if let Some(unit) = parse(&text).and_then(Unit::of) {
             return Some(unit);
         }
-        let words: Vec<&str> = text.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).collect();
-        match words[..] {
-            [word] if is_wavenumber(word) => Some(Unit::WAVENUMBER),
-            _ => None,
-        }
+        let bare = text.trim_matches(|c: char| !c.is_alphanumeric());
+        axis::is_nothing_but_wavenumber(bare).then_some(Unit::WAVENUMBER)
     }
 
     /// The unit that the name of a column or axis states: `wavelength (nm)`, `nu [1 / cm]`, `lambda_A`, `Photon energy (meV)`.
@@ -156,6 +158,9 @@ impl Unit {
         if has_factor(&text)
             || words(&lower).any(|word| ["tenths", "tenth", "hundreds", "hundredths", "tens"].contains(&word))
         {
+            return Err(format!("`{text}`"));
+        }
+        if axis::is_none(&lower) {
             return Err(format!("`{text}`"));
         }
         // A letter by itself is a name as often as an ångström; ν is a frequency to some and a wavenumber to others.
@@ -204,14 +209,14 @@ impl Unit {
                 }
             }
         }
-        let is_wavenumber = words.iter().any(|word| is_wavenumber(word)) || lower.contains("wave number");
+        let is_wavenumber = axis::speaks_of_wavenumber(&lower);
         // `wavenumber (kcm-1)` says more than `wavenumber (measured)`.
         if is_wavenumber && !lower.contains("cm") {
             return Ok(Some(Unit::WAVENUMBER));
         }
         if let Some(bracketed) = bracketed(&text)
             && !is_about_the_medium(bracketed)
-            && bracketed.chars().any(char::is_alphabetic)
+            && bracketed.chars().any(|c| c.is_alphabetic() || c.is_control())
         {
             return Err(format!("`{}`", bracketed.trim()));
         }
@@ -219,14 +224,7 @@ impl Unit {
             return Err(format!("`{text}`"));
         }
         // What is no length and says not in what it is.
-        let lower = spaced.to_lowercase();
-        let is_word = |wanted: &str| lower.split_whitespace().any(|word| word == wanted);
-        for other in ["frequency", "freq", "energy", "kelvin", "temperature", "time", "year", "date", "angle"] {
-            if is_word(other) {
-                return Err(format!("`{}`", name.trim()));
-            }
-        }
-        Ok(None)
+        if axis::needs_unit(&spaced.to_lowercase()) { Err(format!("`{}`", name.trim())) } else { Ok(None) }
     }
 }
 
@@ -380,7 +378,7 @@ pub struct Stated {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Meaning {
     Unit(Measure),
-    /// That of something else than the values themselves: their logarithms, or K/S.
+    /// That of something else than the values themselves: their logarithms, K/S, a derivative, their inverse.
     Logarithm,
     /// A unit that is not known here.
     Unknown,
@@ -431,6 +429,18 @@ impl Stated {
             if parse(inner).is_none() && states_a_factor(inner) || has_factor(&text.replacen(inner, "", 1)) {
                 return stated(Meaning::Factor, true);
             }
+            // A unit by a line of its own, or in brackets: %R, Abs, which of a reflectance is that it is absolute.
+            if is_percent_of(inner) {
+                return stated(Meaning::Unit(Measure { factor: 0.01, ..Measure::ONE }), true);
+            }
+            let before = text.split(['(', '[']).next().unwrap_or("");
+            let is_absolute = inner.to_lowercase().starts_with("abs") && Said::in_name(before).is_some();
+            if is_logarithm(inner) && !is_absolute {
+                return stated(Meaning::Logarithm, true);
+            }
+            if has_arithmetic(before) {
+                return stated(Meaning::Factor, true);
+            }
             // No factor makes degrees Celsius anything else than a temperature.
             if inner.starts_with(['°', 'º']) && is_celsius(inner) {
                 return stated(Meaning::Unit(Measure::of(KELVIN, 1.0)), true);
@@ -444,7 +454,7 @@ impl Stated {
                 None => None,
             };
         }
-        if has_factor(&text) || begins_with_factor(&text) {
+        if has_factor(&text) || begins_with_factor(&text) || has_arithmetic(&text) {
             return stated(Meaning::Factor, true);
         }
         // Nothing but a unit, and one of so many parts that no name is like it: photons/s/m2/nm/sr.
@@ -504,12 +514,44 @@ pub fn speaks_of_air(text: &str) -> bool {
 /// Whether a sentence says that values are to be, or have been, multiplied: `scale factor: 0.001`, `multiply by 1e-3`,
 /// `values x 1000`.
 pub fn states_a_factor(text: &str) -> bool {
-    spelling::states_a_factor(&plain(text))
+    sentence::states_a_factor(&plain(text))
 }
 
 /// Whether a sentence says that the values are in percent: `Reflectance in percent`, `column 2: reflectance (%)`, `units: percent`.
 pub fn speaks_of_percent(text: &str) -> bool {
-    spelling::speaks_of_percent(&plain(text))
+    sentence::speaks_of_percent(text)
+}
+
+/// The unit of an absorption or of a cross section that a sentence about one holds, if it does.
+pub fn of_matter_within(text: &str) -> Option<String> {
+    let text = plain(without_mark(text));
+    let lower = text.to_lowercase();
+    let is_about =
+        ["absor", "cross", "coeff", "scatter", "extinc", "kappa", "sigma"].iter().any(|of| lower.contains(of));
+    let all: Vec<&str> = text.split_whitespace().collect();
+    let runs = (1..=4usize.min(all.len())).rev().flat_map(|length| all.windows(length));
+    let of_run = |run: &[&str]| {
+        let run = run.join(" ");
+        let run = run.trim_matches([',', ';', ':', '.', '(', ')', '[', ']']);
+        let measure = parse(run)?;
+        let is_one = measure.to(Kind::Absorption).is_some() || measure.cross_section_per_atmosphere(1.0).is_some();
+        (is_one && measure.to(Kind::Absorption) != Some(Density::Plain(1.0))).then(|| run.to_owned())
+    };
+    let of_axis = lower.contains("wave");
+    runs.filter(|_| is_about && !of_axis).find_map(of_run)
+}
+
+/// Whether a text is nothing but what values are of that are no values: `absorbance`, `log(1/R)`, `K/S`.
+pub fn is_logarithm_only(text: &str) -> bool {
+    let text = plain(text);
+    text.split_whitespace().count() <= 3 && is_logarithm(&text)
+}
+
+/// Whether a text is nothing but percent, or percent of a quantity: `%`, `%R`, `% Reflectance`, `R (%)`.
+pub fn is_percent_only(text: &str) -> bool {
+    let text = plain(text);
+    text.split_whitespace().count() <= 3
+        && (is_percent_of(&text) || Stated::in_name(&text).is_some_and(|stated| stated.is_percent()))
 }
 
 /// What is said of wavelengths in air, after the name of their file.

@@ -209,8 +209,22 @@ impl Variable {
 
     /// `units`, and what they are where they are understood.
     pub fn units(&self) -> Option<(&str, Option<Measure>)> {
-        let text = self.attributes.get("units")?.as_str()?.trim();
-        (!text.is_empty()).then(|| (text, unit::parse(text)))
+        let text = self.units_text()?;
+        Some((text, unit::parse(text)))
+    }
+
+    /// `units` in any case, or `unit`.
+    fn units_text(&self) -> Option<&str> {
+        let text = |wanted: &str| {
+            let mut found = self.attributes.iter().filter(|(key, _)| key.eq_ignore_ascii_case(wanted));
+            found.find_map(|(_, value)| value.as_str().map(str::trim).filter(|text| !text.is_empty()))
+        };
+        self.attributes
+            .get("units")
+            .and_then(Value::as_str)
+            .map(str::trim)
+            .filter(|text| !text.is_empty())
+            .or_else(|| text("units").or_else(|| text("unit")))
     }
 
     fn broken(&self, e: &dyn std::fmt::Display) -> Box<Problem> {
@@ -231,10 +245,23 @@ impl Variable {
         let changes = |(key, value): &(&String, &Value)| {
             let lower = key.to_lowercase().replace(['_', '-'], " ");
             let has = |words: &[&str]| words.iter().any(|word| lower.contains(word));
-            let neutral = match (has(&FACTORS) || has(&["slope"]), has(&["offset", "intercept"])) {
+            // By other keys only numbers can be meant: a `calibration` is mostly a date.
+            let is_number = || matches!(value, Value::Number(_) | Value::Bool(true)) || value.is_array();
+            let is = |words: &[&str]| words.contains(&lower.as_str());
+            let scales = has(&FACTORS) || has(&["slope"]) || (has(&["scaling", "calibration"]) && is_number());
+            let shifts = has(&["offset", "intercept"]) || (is(&["bias", "zero"]) && is_number());
+            let is_missing = has(&NO_VALUE) || is(&["fill", "missing", "mask value"]);
+            let is_function = is(&["db", "log", "log10", "logarithm"]);
+            let other_units = is(&["units", "unit"]) && value.as_str().map(str::trim) != self.units_text();
+            let neutral = match (scales, shifts) {
                 (true, _) => 1.0,
                 (false, true) => 0.0,
-                (false, false) => return has(&NO_VALUE) && !value.is_null(),
+                (false, false) if other_units => return value.as_str().is_some_and(|text| !text.trim().is_empty()),
+                (false, false) if is_function => {
+                    return !matches!(value, Value::Null | Value::Bool(false)) && number(value) != Some(0.0);
+                }
+                (false, false) if is(&["transform"]) => return value.as_str().is_some_and(unit::is_logarithm_only),
+                (false, false) => return is_missing && !value.is_null(),
             };
             let is_neutral = |value: &Value| number(value) == Some(neutral);
             match value {

@@ -85,7 +85,7 @@ impl Data {
         };
         let colours = Colours { transfer: Transfer::Linear, primaries: None, foreign: None };
         let planes = (0..channels).map(plane).collect();
-        Ok(Image { format: Format::Memory, size: [width, height], planes, colours })
+        Ok(Image { format: Format::Memory, size: [width, height], planes, colours, units: None })
     }
 
     /// As voxels, of the unit that the scene expects.

@@ -186,7 +186,8 @@ impl Columns {
 
 /// An instance a line.
 fn read_placements(bytes: &[u8], path: &Path, up: DVec3) -> Result<Vec<Placed>, Box<Problem>> {
-    let table = table::read(bytes, path)?;
+    let table = table::read_for(bytes, path, "`x,y,z` and the like")?;
+    table.check_metres()?;
     let columns = Columns::of(&table)?;
     let placed = |row: &table::Row| {
         table.check_row(row)?;

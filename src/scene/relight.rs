@@ -212,7 +212,11 @@ fn decode<'a>(
 /// Sources that shine in none of the channels, as of scenes; what is 0 everywhere has been switched off.
 fn dark<'b>(basis: &'b Basis, channels: &'b Channels) -> impl Iterator<Item = String> + use<'b> {
     let shines = |curve: &Curve| channels.bounds.iter().any(|&[a, b]| curve.mean(a, b) >= f64::from(f32::MIN_POSITIVE));
-    let is_on = |curve: &Curve| curve.max(1e-3, 1e15) > 0.0;
+    // Also of wavelengths that nobody's channels have, by a unit that is not meant.
+    let is_on = |curve: &Curve| match curve {
+        Curve::Linear { value, .. } => value.iter().any(|value| *value > 0.0),
+        other => other.max(1e-3, 1e15) > 0.0,
+    };
     let is_dark = move |leaf: &&Leaf| {
         quantity(leaf).is_some_and(Quantity::is_light) && !shines(&leaf.curve) && is_on(&leaf.curve)
     };

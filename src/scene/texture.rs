@@ -16,6 +16,7 @@ use super::{Placement, Texture, TextureFilter, TextureId, TextureKind};
 use crate::format::image::{self, Format, Image, Plane, Rgb};
 use crate::format::noise::{self, Range};
 use crate::format::primaries::{self, White};
+use crate::format::unit;
 use crate::spectral::{Curve, upsample};
 
 /// Spectra that one texture may mix: each costs a record at every vertex.
@@ -572,7 +573,13 @@ fn numbers(file: &Item, number: Number, image: &Image, name: &str) -> Option<(Ve
     let samples = match number {
         Number::Weight => shares(file, image, name, plane, "a weight must lie in [0, 1]", &mut warnings)?,
         Number::Temperature => {
-            let samples = not_negative(plane, name, &mut warnings);
+            let samples = match kelvins(plane, image, name, &mut warnings) {
+                Ok(samples) => samples,
+                Err(unit) => {
+                    file.error_help(format!("{name} gives its temperatures in `{unit}`"), "write them in kelvins");
+                    return None;
+                }
+            };
             if let Some(i) = samples.iter().position(|v| !(0.0..=1e9).contains(v)) {
                 let (channel, value) = (&plane.name, samples[i]);
                 let range = "a temperature must lie in [0, 1e9] K";
@@ -583,6 +590,32 @@ fn numbers(file: &Item, number: Number, image: &Image, name: &str) -> Option<(Ve
         }
     };
     Some((samples, warnings))
+}
+
+/// The numbers of a channel in kelvins, by its name, such as `temperature_C`, or what its picture says of units; the error is a unit
+/// that is not understood.
+fn kelvins(plane: &Plane, image: &Image, name: &str, warnings: &mut Vec<String>) -> Result<Vec<f32>, String> {
+    let (_, channel) = plane.parts();
+    let last = channel.trim_end_matches([')', ']']).rsplit(['_', '(', '[', ' ']).next().unwrap_or("");
+    let is_after = last.len() < channel.len() && channel.to_lowercase().starts_with('t');
+    let of_name = Some(last).filter(|_| is_after).filter(|last| {
+        let lower = last.to_lowercase();
+        let known = ["f", "k", "degf", "fahrenheit", "kelvin", "kelvins", "mk", "r", "rankine"];
+        unit::is_celsius(last) || known.contains(&lower.as_str())
+    });
+    let Some(unit) = image.units.as_deref().or(of_name) else { return Ok(not_negative(plane, name, warnings)) };
+    if unit::is_celsius(unit) {
+        warnings.push(format!("texture {name} gives its temperatures in `{unit}`: they are converted to K"));
+        return Ok(plane.samples.iter().map(|v| (f64::from(*v) + 273.15) as f32).collect());
+    }
+    match unit::parse(unit).and_then(unit::Measure::kelvin) {
+        Some(1.0) => Ok(not_negative(plane, name, warnings)),
+        Some(factor) => {
+            warnings.push(format!("texture {name} gives its temperatures in `{unit}`: they are converted to K"));
+            Ok(not_negative(plane, name, warnings).iter().map(|v| (f64::from(*v) * factor) as f32).collect())
+        }
+        None => Err(unit.to_owned()),
+    }
 }
 
 /// The channels but an A that is 1 everywhere.

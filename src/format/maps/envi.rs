@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::{Bands, Map, checked_size, spectral, whole, with_help};
 use crate::error::Problem;
 use crate::format::envi::{Header, header_path, is_header, parse};
+use crate::format::said::Said;
 use crate::format::unit::{Meaning, Stated};
 
 /// The header of the data file at `path`, if it is one of ENVI's.
@@ -77,6 +78,16 @@ pub fn read(path: &Path, data: Option<&Path>) -> Result<Map, Box<Problem>> {
         )
     })?;
     check_place(&header)?;
+    if let Some(said) = header.called().and_then(Said::in_name).filter(|said| *said != Said::Radiance) {
+        let key =
+            if header.get("data units").and_then(Said::in_name).is_some() { "data units" } else { "z plot titles" };
+        let message = format!("calls the values {}: a map holds radiance", said.noun());
+        return Err(header.problem(key, &message));
+    }
+    let names = header.list("band names").unwrap_or_default();
+    if names.len() == 3 && ["X", "Y", "Z"].iter().zip(&names).all(|(one, name)| name.eq_ignore_ascii_case(one)) {
+        return Err(header.problem("band names", "are those of CIE X, Y and Z, which are no spectrum: export radiance"));
+    }
     let mut warnings: Vec<String> = header.notes.clone();
     let density = match header.unit() {
         Some(Stated { meaning, text, .. }) => {

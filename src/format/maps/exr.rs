@@ -25,6 +25,9 @@ pub fn read_map(path: &Path) -> Result<Map, Box<Problem>> {
     let header = meta.as_ref().and_then(|meta| meta.headers.first());
     let attribute = |name: &str| text_attribute(header?, name);
     said(path, header, &mut warnings)?;
+    if let Some(foreign) = &picture.colours.foreign {
+        return Err(with_help(path, format!("has values that are those of {foreign}"), "convert it to linear numbers"));
+    }
     let emissive: Vec<(f64, &Plane)> =
         planes.iter().filter_map(|plane| Some((emissive_band(&plane.name)?, plane))).collect();
     if !emissive.is_empty() {

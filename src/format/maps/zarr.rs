@@ -61,6 +61,8 @@ pub fn read(path: &Path) -> Result<Map, Box<Problem>> {
     let bands = bands(path, &arrays, axis, &mut warnings)?;
     refuse_other_quantities(path, radiance)?;
     warnings.extend(bad_bands(&arrays, axis)?);
+    warnings.extend(unknown_attributes(radiance));
+    warnings.extend(told_in_texts(radiance));
     let density = density(path, radiance, axis.unit()?, &mut warnings)?;
     let rows = match coordinate(y, &LATITUDE) {
         Some(array) => from_north(path, array, &mut warnings)?,
@@ -380,11 +382,14 @@ fn says_logarithm(name: &str) -> bool {
 
 /// Refuses an array that CF's names call something else than a radiance.
 fn refuse_other_quantities(path: &Path, array: &Variable) -> Result<(), Box<Problem>> {
-    for key in ["standard_name", "long_name"] {
-        let Some(name) = array.attributes.get(key).and_then(|value| value.as_str()) else { continue };
+    let text = |key: &str| array.attributes.get(key).and_then(|value| value.as_str());
+    let says = ["standard_name", "long_name", "quantity"].map(|key| (key, text(key)));
+    for (key, name) in says.into_iter().chain([("its name", Some(array.name.as_str()))]) {
+        let Some(name) = name else { continue };
         let what = match Said::in_name(name) {
             _ if says_logarithm(name) => "logarithms",
             Some(said) if said != Said::Radiance => said.noun(),
+            _ if name == "xyz" => "CIE X, Y and Z",
             _ => continue,
         };
         let message = format!("says that `{}` is {what} (`{key}`: `{}`)", array.name, shown(name));
@@ -404,6 +409,78 @@ fn bad_bands(arrays: &[Variable], axis: SpectralAxis) -> Result<Option<String>, 
 fn density(path: &Path, array: &Variable, axis: Unit, warnings: &mut Vec<String>) -> Result<Density, Box<Problem>> {
     match array.units() {
         Some((text, measure)) => super::radiance_of(path, text, measure, axis, warnings),
-        None => super::radiance_unsaid(path, axis),
+        None => match array.attributes.get("long_name").and_then(|value| value.as_str()).and_then(Stated::in_name) {
+            Some(Stated { meaning: Meaning::Unit(measure), text, certain: true }) => {
+                super::radiance_of(path, &text, Some(measure), axis, warnings)
+            }
+            Some(Stated { meaning: Meaning::Factor | Meaning::Unknown, text, .. }) => {
+                let message = format!("says `{}` of its values, which is not applied", shown(&text));
+                Err(with_help(path, message, "give the array the attribute units = \"W m-2 sr-1 nm-1\""))
+            }
+            _ => super::radiance_unsaid(path, axis),
+        },
     }
+}
+
+/// What to say of attributes that may change what the numbers are, and that nothing here knows.
+fn unknown_attributes(array: &Variable) -> Option<String> {
+    /// Of CF, xarray, GDAL and Spectile.
+    const KNOWN: [&str; 34] = [
+        "units",
+        "unit",
+        "long_name",
+        "standard_name",
+        "quantity",
+        "coordinates",
+        "grid_mapping",
+        "cell_methods",
+        "ancillary_variables",
+        "flag_values",
+        "flag_meanings",
+        "flag_masks",
+        "comment",
+        "description",
+        "title",
+        "source",
+        "history",
+        "institution",
+        "references",
+        "axis",
+        "bounds",
+        "positive",
+        "calendar",
+        "name",
+        "valid_min",
+        "valid_max",
+        "valid_range",
+        "actual_range",
+        "scale_factor",
+        "add_offset",
+        "missing_value",
+        "created",
+        "date",
+        "crs",
+    ];
+    let is_known = |key: &str| {
+        let lower = key.to_lowercase();
+        KNOWN.contains(&lower.as_str()) || lower.starts_with('_') || lower.contains("stat")
+    };
+    let mut said: Vec<String> = array
+        .attributes
+        .iter()
+        .filter(|(key, value)| !is_known(key) && !value.is_null())
+        .map(|(key, _)| shown(key))
+        .collect();
+    said.truncate(8);
+    (!said.is_empty())
+        .then(|| format!("has attributes of `{}` that are not known, and left out: {}", array.name, said.join(", ")))
+}
+
+/// What the texts about an array say of a factor, or percent.
+fn told_in_texts(array: &Variable) -> Option<String> {
+    ["description", "comment", "title", "note"].into_iter().find_map(|key| {
+        let text = array.attributes.get(key)?.as_str()?;
+        (unit::states_a_factor(text) || unit::speaks_of_percent(text))
+            .then(|| format!("has the attribute `{key}` = \"{}\", which is not applied", shown(text)))
+    })
 }

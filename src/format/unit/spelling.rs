@@ -1,6 +1,6 @@
 //! How units are spelt: in words, in powers, in brackets at the end of names.
 
-use super::{ATMOSPHERE, COUNT, ELECTRONVOLT, FACTORS, KELVIN, LUMEN, METRE, Measure, SECOND, STERADIAN, WATT};
+use super::{ATMOSPHERE, COUNT, ELECTRONVOLT, KELVIN, LUMEN, METRE, Measure, SECOND, STERADIAN, WATT};
 
 pub(super) fn words(text: &str) -> impl Iterator<Item = &str> {
     text.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty())
@@ -12,78 +12,29 @@ const QUANTITIES: [&str; 17] = [
     "cross", "power", "albedo", "value", "kappa",
 ];
 
-fn is_quantity(word: &str) -> bool {
+pub(super) fn is_quantity(word: &str) -> bool {
     QUANTITIES.iter().any(|start| word.starts_with(start))
-}
-
-/// Whether the name of a column says that its numbers are logarithms, or Kubelka and Munk's function, of the values.
-pub(super) fn is_logarithm(text: &str) -> bool {
-    let lower = text.to_lowercase();
-    let all: Vec<&str> = words(&lower).collect();
-    let always = ["log10", "ln", "db", "decibel", "decibels", "absorbance", "kubelka"];
-    if lower.contains("log(") || lower.starts_with("-log") || all.iter().any(|word| always.contains(word)) {
-        return true;
-    }
-    // Timber has logs too: "log, oak".
-    let is_of = |word: &str| is_quantity(word) || ["irr", "int"].iter().any(|start| word.starts_with(start));
-    let is_letter = |word: &str| matches!(word, "r" | "t" | "1");
-    let is_of = |word: &str| is_of(word) || ["energy", "sensitivity", "response", "quantal"].contains(&word);
-    if matches!(all[..], ["log", next, ..] if is_of(next) || (is_letter(next) && !lower.starts_with("log,"))) {
-        return true;
-    }
-    let before_log = lower.trim_end_matches([')', ']']).strip_suffix("log").map(str::trim_end);
-    let before_log = before_log.and_then(|before| before.strip_suffix([',', '(', '[', '_']));
-    if before_log.is_some_and(|before| words(before).any(|word| is_of(word) || is_letter(word))) {
-        return true;
-    }
-    // `OD 2` is a filter, of which the column may hold the transmittance.
-    let mut pairs = words(text).zip(words(text).skip(1).map(Some).chain([None]));
-    if pairs.any(|(word, next)| word == "OD" && next.is_none_or(|next| next.parse::<f64>().is_err())) {
-        return true;
-    }
-    // Of an absorption, `Abs (cm-1)`, and of a share, `Abs (%)`, the unit speaks.
-    let of_number = bracketed(text).and_then(parse).is_none_or(|measure| measure == Measure::ONE);
-    let bare = lower.split(['(', '[']).next().unwrap_or("").replace(' ', "");
-    let squeezed = lower.replace(' ', "");
-    all.windows(2).any(|pair| pair == ["optical", "density"])
-        || (of_number && matches!(bare.trim_end_matches('.'), "abs" | "od"))
-        || matches!(squeezed.as_str(), "k/s" | "k-m" | "density" | "f(r)" | "f(r\u{221e})")
-}
-
-/// Whether the words of a name make it a share in percent: the first or the last is that word. `None` where a number stands
-/// before it, which may be that of a mixture.
-pub(super) fn is_percent(text: &str) -> Option<bool> {
-    // PercentReflectance, ReflectancePercent.
-    let mut text = text.to_owned();
-    let is_capital = |after: &str| after.starts_with(|c: char| c.is_uppercase());
-    if text.strip_prefix("Percent").is_some_and(is_capital) {
-        text.insert("Percent".len(), ' ');
-    } else if text.strip_suffix("Percent").is_some_and(|before| before.ends_with(char::is_lowercase)) {
-        text.insert(text.len() - "Percent".len(), ' ');
-    }
-    let lower = text.to_lowercase().replace("per cent", "percent").replace('_', " ");
-    let is = |word: &str| ["percent", "pct", "perc", "%"].contains(&word.trim_end_matches('.'));
-    let all: Vec<&str> = lower.split_whitespace().collect();
-    let at_end = match lower.trim_end().strip_suffix('%') {
-        Some(before) => Some(before.trim_end()),
-        None => {
-            all.last().filter(|word| is(word)).map(|word| lower.trim_end().strip_suffix(word).unwrap_or("").trim_end())
-        }
-    };
-    match at_end {
-        Some(before) if before.ends_with(|c: char| c.is_ascii_digit()) => None,
-        Some(_) => Some(true),
-        None => Some(
-            all.first().is_some_and(|word| is(word))
-                || lower.strip_prefix('%').is_some_and(|rest| rest.trim_start().starts_with(char::is_alphabetic)),
-        ),
-    }
 }
 
 /// Whether what stands in brackets after `before` can hardly be anything but a unit, or says that there is none.
 pub(super) fn looks_like_unit(before: &str, inner: &str) -> bool {
-    const RELATIVE: [&str; 9] =
-        ["a.u.", "au", "a. u.", "arb. units", "arb", "arbitrary units", "relative", "normalized", "normalised"];
+    const RELATIVE: [&str; 15] = [
+        "a.u.",
+        "au",
+        "a. u.",
+        "arb. units",
+        "arb",
+        "arbitrary units",
+        "relative",
+        "normalized",
+        "normalised",
+        "rel.",
+        "rel",
+        "norm.",
+        "norm",
+        "bp",
+        "bps",
+    ];
     // What is said of a quantity, and changes no number.
     const PLAIN: &str = "no unit units n a 0 1 mean average avg median measured calculated simulated total direct diffuse specular \
                          hemispherical spectral";
@@ -140,106 +91,6 @@ pub(super) fn spells_power(text: &str) -> bool {
     let all: Vec<&str> = words(text).collect();
     let any = |of: &[&str]| all.iter().any(|word| of.contains(word));
     any(&["W", "mW", "uW"]) && any(&["m2", "cm2", "sr", "nm", "um"])
-}
-
-/// Whether a name says that its values are multiplied by something: `reflectance x 10000`, `R (x1e4)`, `R*100`.
-pub(super) fn has_factor(text: &str) -> bool {
-    text.char_indices().filter(|(_, c)| matches!(c, 'x' | 'X' | '*')).any(|(i, c)| {
-        let alone = c == '*' || text[..i].chars().next_back().is_some_and(|before| !before.is_alphanumeric());
-        let after = text[i + 1..].trim_start();
-        let end = after
-            .find(|c: char| !(c.is_ascii_digit() || matches!(c, '.' | 'e' | 'E' | '^' | '-')))
-            .unwrap_or(after.len());
-        let number = after[..end].replace("10^", "1e");
-        alone && number.parse::<f64>().is_ok_and(|factor| factor != 1.0)
-    })
-}
-
-/// Whether a name begins with a factor of its values: `100*R`, `10^4 rho`, `1e4 R`.
-pub(super) fn begins_with_factor(text: &str) -> bool {
-    let end = text
-        .find(|c: char| !(c.is_ascii_digit() || matches!(c, '.' | 'e' | 'E' | '^' | '-' | '+')))
-        .unwrap_or(text.len());
-    let (number, rest) = text.split_at(end);
-    let after = rest.trim_start();
-    let is_written = number.contains(['e', 'E', '^']) || after.starts_with('*') || rest.starts_with(" x ");
-    let factor = number.replace("10^", "1e").parse::<f64>();
-    is_written
-        && factor.is_ok_and(|factor| factor != 1.0)
-        && after.trim_start_matches(['*', 'x', ' ']).starts_with(char::is_alphabetic)
-}
-
-/// Whether this is 1 over a power of ten above one: 1/10000.
-pub(super) fn is_power_of_ten(text: &str) -> bool {
-    let under = text.split_once('/').filter(|(over, _)| over.trim() == "1").map(|(_, under)| under.trim());
-    under
-        .is_some_and(|under| under.len() > 1 && under.starts_with('1') && under[1..].bytes().all(|digit| digit == b'0'))
-}
-
-/// Whether a sentence says that values are in percent: a quantity `in percent` or with it in brackets, or a key for units.
-pub(super) fn speaks_of_percent(text: &str) -> bool {
-    let lower = text.trim_start_matches(['#', '%', '!', '/', ' ']).to_lowercase().replace("per cent", "percent");
-    let is = |word: &str| ["percent", "pct", "%"].contains(&word.trim_matches(['.', ',', ';', '(', ')', '[', ']']));
-    if let Some((key, value)) = lower.split_once([':', '='])
-        && words(key).any(|word| word.starts_with("unit"))
-        && !words(key).any(|word| word.starts_with('x') || word.starts_with("wave"))
-    {
-        return is(value.trim());
-    }
-    let all: Vec<&str> = lower.split_whitespace().collect();
-    let is_of = |word: &str| {
-        let word = word.trim_start_matches('(').trim_end_matches([',', ':', ')']);
-        is_quantity(word) || matches!(word, "r" | "t" | "values" | "data" | "y")
-    };
-    all.iter().enumerate().any(|(i, word)| {
-        if !is(word) || i == 0 {
-            return false;
-        }
-        let in_brackets = word.starts_with(['(', '[']);
-        match all[i - 1] {
-            "in" | "as" | "=" | ":" | "are" => i > 1 && is_of(all[i - 2]),
-            before => in_brackets && is_of(before) || before.ends_with([',', ':']) && is_of(before),
-        }
-    })
-}
-
-/// Whether a sentence states a factor, or an offset, other than none.
-pub(super) fn states_a_factor(text: &str) -> bool {
-    /// What may stand between the word and its number.
-    const BETWEEN: [&str; 12] =
-        ["factor", "factors", "of", "by", "is", "was", "are", "all", "value", "values", "data", "the"];
-    let lower = text.to_lowercase();
-    let scales = |word: &str| FACTORS.iter().any(|start| word.starts_with(start)) || word.starts_with("divide");
-    let offsets = |word: &str| word.starts_with("offset");
-    let number = |word: &str| {
-        word.trim_start_matches(['x', '*'])
-            .trim_end_matches(['.', ',', ';', ')'])
-            .replace("10^", "1e")
-            .parse::<f64>()
-            .ok()
-    };
-    let changes = |word: &str, value: f64| if offsets(word) { value != 0.0 } else { value != 1.0 };
-    // As keys of a list: `radiance scale to nm: 0.001`.
-    if let Some((key, value)) = lower.split_once([':', '='])
-        && let Some(word) =
-            words(key.rsplit([';', ',']).next().unwrap_or("")).find(|word| scales(word) || offsets(word))
-        && let Some(value) = value.split_whitespace().next().and_then(number)
-    {
-        return changes(word, value);
-    }
-    let all: Vec<&str> = lower
-        .split(|c: char| c.is_whitespace() || matches!(c, ':' | '=' | '('))
-        .filter(|word| !word.is_empty())
-        .collect();
-    let stated = all.iter().enumerate().filter(|(_, word)| scales(word) || offsets(word)).any(|(i, word)| {
-        // One more word may be what is scaled: multiply radiance by 1000.
-        let mut after = all[i + 1..].iter().filter(|word| !BETWEEN.contains(word)).take(2);
-        after.any(|next| number(next).is_some_and(|value| changes(word, value)))
-    });
-    let of_values = all.iter().any(|word| {
-        is_quantity(word) || ["data", "number", "column", "unit", "y"].iter().any(|start| word.starts_with(start))
-    });
-    stated || (of_values && has_factor(&lower))
 }
 
 /// One form for the many ways to write the same characters: superscripts, minus signs, dots, µ and Å, LaTeX.
@@ -325,11 +176,6 @@ pub(super) fn bracketed(text: &str) -> Option<&str> {
 
 pub(super) fn is_about_the_medium(text: &str) -> bool {
     ["air", "vac", "vacuum"].contains(&text.trim().to_lowercase().as_str())
-}
-
-pub(super) fn is_wavenumber(word: &str) -> bool {
-    let word = word.to_lowercase();
-    ["wavenumber", "wavenumbers", "wavenum", "wvnum", "kayser", "kaysers", "wellenzahl"].contains(&word.as_str())
 }
 
 /// A unit: products and quotients of symbols or names with powers. `None` where any part of it is not understood.

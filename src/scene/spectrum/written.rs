@@ -179,6 +179,10 @@ pub(super) fn column_kelvin(name: &str) -> Option<f64> {
     // The unit of the values may follow: `300 K (cm2/molecule)`.
     let bracket = name.rfind(['(', '[']).filter(|i| name.trim_end().ends_with([')', ']']) && *i > 0);
     let number = name[..bracket.unwrap_or(name.len())].trim_end_matches(['K', 'k', ' ']);
+    // A number below 0 is none of kelvins; `kappa-300` is.
+    if number.trim_start().starts_with(['-', '\u{2212}']) {
+        return None;
+    }
     let start = number.rfind(|c: char| !c.is_ascii_digit() && c != '.').map_or(0, |i| i + 1);
     number.get(start..)?.parse().ok().filter(|kelvin: &f64| kelvin.is_finite() && *kelvin > 0.0)
 }
