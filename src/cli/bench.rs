@@ -98,6 +98,16 @@ struct Step<'a> {
 }
 
 pub fn run(args: &Args, output: &Output) -> Result<()> {
+    let was_there = args.output.exists();
+    let measured = run_all(args, output);
+    if measured.is_err() && !was_there {
+        // Only where nothing was measured: what is not empty stays.
+        let _ = std::fs::remove_dir(&args.output);
+    }
+    measured
+}
+
+fn run_all(args: &Args, output: &Output) -> Result<()> {
     let interrupt = output.interrupt()?;
     let files = if args.scenes.is_empty() { SCENES.map(PathBuf::from).to_vec() } else { args.scenes.clone() };
     if let Some(missing) = files.iter().find(|file| args.scenes.is_empty() && !file.exists()) {

@@ -52,6 +52,14 @@ impl SceneArgs {
         let mut overrides = self.overrides.clone();
         overrides.extend(more);
         if let Some([width, height]) = self.size {
+            let of_film = |(key, _): &&(String, String)| {
+                let key = key.replace([' ', '"', '\''], "");
+                ["film.width", "film.height", "film"].contains(&key.as_str())
+            };
+            if let Some((key, _)) = self.overrides.iter().find(of_film) {
+                let message = format!("--size and --set {key} both say the size: keep one of them");
+                return Err(crate::Error::Usage(message));
+            }
             overrides.push(("film.width".into(), width.to_string()));
             overrides.push(("film.height".into(), height.to_string()));
         }

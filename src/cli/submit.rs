@@ -101,7 +101,7 @@ pub struct Args {
 
     /// Time limit of a task, such as 2h; else the partition's
     ///
-    /// In whole minutes, rounded up. A task that needs longer commits what it has, requeues itself and goes on.
+    /// A number without a unit is seconds, as everywhere here; Slurm's own are minutes. In whole minutes, rounded up. A task that needs longer commits what it has, requeues itself and goes on.
     #[arg(long, value_name = "TIME", value_parser = super::render::parse_time)]
     pub time_limit: Option<Duration>,
 

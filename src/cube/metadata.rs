@@ -482,10 +482,15 @@ impl Header {
             (Some(shape), Some(chunk)) if shape.len() == 3 && chunk.len() == 3 => {
                 ([shape[0], shape[1]], [chunk[0], chunk[1]])
             }
-            _ => return Err(damaged("gives no shape [y, x, rgb] and chunk of `preview`")),
+            (Some(_), _) => return Err(rewritten(path, "preview")),
+            _ => {
+                let what = "is a copy of a cube that another program has changed: it has no `preview`";
+                return Err(Error::storage(path, format!("{what}; {COPY}")));
+            }
         };
         let Some(&[count]) = shape_of("wavelength").as_deref() else {
-            return Err(damaged("gives no shape [wavelength] of `wavelength`"));
+            let what = "is a copy of a cube that another program has changed: it has no list `wavelength`";
+            return Err(Error::storage(path, format!("{what}; {COPY}")));
         };
         let bounds = "wavelength_bounds";
         if !stored[bounds].is_object() {
@@ -583,17 +588,28 @@ pub(super) fn check_meaning(path: &Path, who: &str, name: &str, ours: &Value, st
     Err(Error::storage(path, format!("{who} `{name}` {what}; {help}")))
 }
 
+/// What to do about a cube that is no more what Spectile writes.
+const COPY: &str = "copy the folder itself, or open this one with xarray";
+
 /// The error of an array that another program has stored anew.
 fn rewritten(path: &Path, name: &str) -> Error {
     let what = format!(
         "is a copy of a cube in which another program has stored `{name}` in another way (codecs, chunks or shape)"
     );
-    Error::storage(path, format!("{what}: copy the folder itself, or open this one with xarray"))
+    Error::storage(path, format!("{what}: {COPY}"))
 }
 
 /// What of an array's attributes makes other numbers of the stored ones than `ours`, in words.
 fn other_meaning(ours: &Value, stored: &Value) -> Option<String> {
-    let text = |attributes: &Value, name: &str| attributes[name].as_str().map(str::to_owned);
+    // Whatever the case of the key, and also as `unit`.
+    let text = |attributes: &Value, name: &str| {
+        let singular = name.trim_end_matches('s');
+        let of = |(key, value): (&String, &Value)| {
+            let is = key.eq_ignore_ascii_case(name) || key.eq_ignore_ascii_case(singular);
+            value.as_str().filter(|_| is).map(str::to_owned)
+        };
+        attributes.as_object()?.iter().find_map(of)
+    };
     match (text(ours, "units"), text(stored, "units")) {
         (Some(ours), Some(stored)) if ours != stored => {
             return Some(format!("the units `{stored}` instead of `{ours}`"));

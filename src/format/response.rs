@@ -5,6 +5,7 @@ use std::path::Path;
 
 use super::instrument::Format;
 use super::noise::{self, Range};
+use super::said::Said;
 use super::table;
 use super::text::{self, SpectrumTable, ascending, read};
 use super::unit::{self, Density, Kind, Meaning, Stated, Unit};
@@ -20,18 +21,36 @@ pub struct Responses {
     pub warnings: Vec<String>,
 }
 
+/// What numbers of responses are to be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Of {
+    /// Per energy, in any unit: what is per photon is multiplied by the wavelength.
+    Energy,
+    /// The share of light, and so of photons, that passes.
+    Light,
+}
+
 pub fn read_responses(path: &Path) -> Result<Responses, Box<Problem>> {
     parse_responses(&read(path)?, path)
 }
 
+/// Like [`read_responses`], of what multiplies a quantum efficiency: shares of the light, in [0, 1].
+pub fn read_shares(path: &Path) -> Result<Responses, Box<Problem>> {
+    parse(&read(path)?, path, Of::Light)
+}
+
 /// [`read_responses`] on the content of the file; `path` stands in messages.
 pub fn parse_responses(bytes: &[u8], path: &Path) -> Result<Responses, Box<Problem>> {
+    parse(bytes, path, Of::Energy)
+}
+
+fn parse(bytes: &[u8], path: &Path, of: Of) -> Result<Responses, Box<Problem>> {
     let wrong = |line: Option<usize>, message: String, help: &str| {
         let help = (!help.is_empty()).then(|| help.to_owned());
         Box::new(Problem { file: path.to_owned(), line, message, help, ..Problem::default() })
     };
     if let Some(found) = Format::of(path, bytes).and_then(|format| format.responses(bytes, path)) {
-        return responses(found?, Vec::new(), path);
+        return responses(found?, Vec::new(), path, of);
     }
     let table = table::read(bytes, path)?;
     let mut notes = table.notes.clone();
@@ -127,6 +146,16 @@ pub fn parse_responses(bytes: &[u8], path: &Path) -> Result<Responses, Box<Probl
         if let Some(stated) = Stated::in_name(&named).filter(is_factor) {
             notes.push(format!("says `{}` of its responses: they are taken as written", table::shown(&stated.text)));
         }
+        if of == Of::Light {
+            // Electrons a photon are a share as well; amperes a watt are none.
+            if Said::in_name(&named) == Some(Said::Responsivity) || is_per_watt(&named) {
+                let message =
+                    format!("gives the responsivity \"{}\", which is no share of light", named.escape_debug());
+                let help = "divide it by λ / 1239.84 nm, or write what passes the band's filter, in [0, 1]";
+                return Err(wrong(None, message, help));
+            }
+            continue;
+        }
         if let Some(comment) = &of_photons
             && !is_per_photon(&named)
         {
@@ -155,7 +184,13 @@ pub fn parse_responses(bytes: &[u8], path: &Path) -> Result<Responses, Box<Probl
         let message = format!("has two channels named \"{}\"", name.escape_debug());
         return Err(wrong(Some(table.line), message, "give each its own name"));
     }
-    responses(tables, notes, path)
+    responses(tables, notes, path, of)
+}
+
+/// Whether the unit of a response is one per watt.
+fn is_per_watt(name: &str) -> bool {
+    let squeezed = name.replace(' ', "");
+    ["A/W", "AW-1", "A.W-1", "V/W", "VW-1"].iter().any(|unit| squeezed.contains(unit))
 }
 
 /// Whether a column is another axis, as NOAA's files have one, or the uncertainty of the one before, as those of Landsat.
@@ -254,7 +289,12 @@ fn per_photon(name: &str, table: &mut SpectrumTable) -> bool {
     is
 }
 
-fn responses(tables: Vec<(String, SpectrumTable)>, notes: Vec<String>, path: &Path) -> Result<Responses, Box<Problem>> {
+fn responses(
+    tables: Vec<(String, SpectrumTable)>,
+    notes: Vec<String>,
+    path: &Path,
+    wanted: Of,
+) -> Result<Responses, Box<Problem>> {
     let mut named = Vec::new();
     let (mut noisy, mut count, mut worst) = (Vec::new(), 0, 0f64);
     let mut warnings: Vec<String> = notes.into_iter().map(|note| format!("{} {note}", path.display())).collect();
@@ -262,6 +302,15 @@ fn responses(tables: Vec<(String, SpectrumTable)>, notes: Vec<String>, path: &Pa
         let of = format!(" of the channel \"{}\"", name.escape_debug());
         let mut table = ascending(table, path, &of)?;
         warnings.extend(table.notes.drain(..).map(|note| format!("{} {note}{of}", path.display())));
+        if wanted == Of::Light
+            && let Some(i) = table.value.iter().position(|v| *v > 1.01)
+        {
+            let message = format!("the response{of} must be a share of light, in [0, 1], but is {}", table.value[i]);
+            let help =
+                Some("write `(%)` behind the name of what is percent, or divide by the largest value".to_owned());
+            let line = table.line.get(i).copied();
+            return Err(Box::new(Problem { file: path.to_owned(), line, message, help, ..Problem::default() }));
+        }
         match noise::clip(&mut table.value, Range::NotNegative, |v| v) {
             Ok(None) => {}
             Ok(Some(clipped)) => {

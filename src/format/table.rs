@@ -478,7 +478,10 @@ impl Table<'_> {
             let row = &self.rows[self.rows.len().min(2) - 1];
             let cell = shown(row.cells.get(0).unwrap_or(""));
             let message = format!("`{cell}` is not a finite number, and no line begins with one");
+            let is_empty =
+                |row: &Row| row.cells.get(0) == Some("") && row.cells.iter().skip(1).any(|c| self.is_number(c));
             let help = match cell.contains(',') {
+                _ if self.rows.iter().any(is_empty) => "remove the first column, which is empty where the numbers are",
                 true => "write decimal points, and no commas within numbers",
                 false => SPECTRA,
             };

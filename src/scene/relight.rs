@@ -198,7 +198,8 @@ fn decode<'a>(
         let Some(Value::Table(keys)) = of_material(entries, name).map(|entry| &entry.node.value) else { continue };
         let Some(entry) = of_material(keys, "temperature") else { continue };
         let path = format!("materials.{name}.temperature");
-        let Some(value) = (Item { cx, node: &entry.node, path, at: &entry.node.origin }).positive() else { continue };
+        let entry = Item { cx, node: &entry.node, path, at: &entry.node.origin };
+        let Some(value) = super::material::kelvin(&entry) else { continue };
         for term in basis.sources.iter_mut().flat_map(|source| &mut source.terms) {
             if let Term::Planck { material, kelvin } = term
                 && material == name

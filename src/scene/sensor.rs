@@ -203,7 +203,7 @@ fn optics<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> WithSpectrum<Optics
         Some(item) => spectra.resolve(&item, Quantity::Transmittance).map(|handle| Some(spectra.take(handle))),
         None => Some(None),
     };
-    let temperature = positive(&fields, "temperature");
+    let temperature = fields.get("temperature").map_or(Some(None), |item| super::material::kelvin(&item).map(Some));
     let not_below_half = |v: f64| v >= 0.5;
     let range = "0.5 or greater: no lens in air is faster";
     let shield = fields.get("cold_shield").map_or(Some(None), |i| i.number_where(not_below_half, range).map(Some));
@@ -212,6 +212,10 @@ fn optics<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>) -> WithSpectrum<Optics
     let f_number = match (stated?, aperture, focal) {
         (Some(_), Some(_), Some(_)) => {
             fields.error_help("has f_number beside aperture and focal_length", "keep f_number, or the two others");
+            return None;
+        }
+        (Some(_), Some(_), None) => {
+            fields.error_help("has f_number beside aperture", "keep one of the two");
             return None;
         }
         (Some(stated), _, _) => stated,
@@ -382,7 +386,7 @@ fn bands(top: &Fields) -> Option<Option<Vec<(String, Response)>>> {
             item.error_help("stands beside [[bands]]", "keep one of the two");
             return None;
         }
-        let read = response::read_responses(&item.cx.path(item.text()?));
+        let read = response::read_shares(&item.cx.path(item.text()?));
         let read = read.map_err(|problem| report_in_file(&item, *problem)).ok()?;
         read.warnings.into_iter().for_each(|warning| top.warn(warning));
         return Some(Some(read.named));

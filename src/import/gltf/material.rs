@@ -166,6 +166,10 @@ impl Importer<'_, '_> {
                 self.scene.report.left_out(self.place(path), what);
             }
         }
+        if !material.double_sided {
+            let what = "a material that is seen from its front only as one of both sides";
+            self.scene.report.approximated(self.place(path), what);
+        }
         let extensions = material.extensions.as_ref();
         if extensions.is_some_and(|e| e.unlit.is_some()) {
             self.scene.report.approximated(self.place(path), "an unlit material as one that is lit");

@@ -34,6 +34,13 @@ const PATIENCE: Duration = Duration::from_secs(20);
 pub struct Refused(pub StatusCode, pub String);
 
 impl Refused {
+    /// A query that is not understood: what of it, without the parser's own beginning.
+    pub fn query(error: &axum::extract::rejection::QueryRejection) -> Refused {
+        let text = error.body_text();
+        let what = text.strip_prefix("Failed to deserialize query string: ").unwrap_or(&text);
+        Refused::bad(format!("the query is wrong: {what}"))
+    }
+
     pub fn bad(what: impl Into<String>) -> Refused {
         Refused(StatusCode::BAD_REQUEST, what.into())
     }
@@ -208,6 +215,7 @@ async fn channels(State(app): State<Arc<App>>) -> std::result::Result<Response, 
 
 /// A pixel, or the rectangle from it to x1, y1 (not included).
 #[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 struct Where {
     x: u32,
     y: u32,
@@ -229,7 +237,7 @@ async fn spectrum(
     State(app): State<Arc<App>>,
     place: std::result::Result<Query<Where>, axum::extract::rejection::QueryRejection>,
 ) -> std::result::Result<Response, Refused> {
-    let Query(place) = place.map_err(|error| Refused::bad(error.body_text()))?;
+    let Query(place) = place.map_err(|error| Refused::query(&error))?;
     let format = place.format;
     let body = app.read(move |state| read_spectrum(state, &place)).await?;
     let body = body.ok_or_else(|| Refused(StatusCode::NOT_FOUND, "there are no samples here yet".into()))?;

@@ -41,6 +41,7 @@ impl Thermometers {
 }
 
 #[derive(Deserialize, Clone, Copy)]
+#[serde(deny_unknown_fields)]
 pub struct Asked {
     #[serde(default)]
     show: Show,
@@ -85,7 +86,12 @@ pub async fn image(
     State(app): State<Arc<App>>,
     asked: std::result::Result<Query<Asked>, QueryRejection>,
 ) -> std::result::Result<Response, Refused> {
-    let Query(asked) = asked.map_err(|error| Refused::bad(error.body_text()))?;
+    let Query(asked) = asked.map_err(|error| Refused::query(&error))?;
+    for (name, value) in [("ev", asked.ev), ("low", asked.low), ("high", asked.high)] {
+        if value.is_some_and(|value| !value.is_finite()) {
+            return Err(Refused::bad(format!("`{name}` must be a finite number")));
+        }
+    }
     let thermometers = Arc::clone(&app);
     let (window, tone, png) = app
         .read(move |state| {
