@@ -344,7 +344,6 @@ pub fn no_columns(path: &Path, wanted: Wanted) -> Read<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::format::said::Said;
     use crate::format::unit::{Density, Kind, Meaning};
 
     const ECOSTRESS: &str = "Name: Construction Concrete\nType: manmade\nOwner: caf\u{e9}: none\nFirst Column: X\n\
@@ -424,6 +423,29 @@ mod tests {
         assert!(read().is_err(), "none of two names the spectrometer");
         put("wavelengths.txt", " x Record=1: y\n 1\n x\n 3\n");
         assert_eq!(read().unwrap_err().line, Some(3));
+    }
+
+    #[test]
+    fn usgs_records_say_what_they_are_of() {
+        let kind = |title: &str| usgs_kind(&format!("splib07a Record=3: {title}"), Path::new("a.txt"));
+        for (title, said) in [
+            ("Water H2O BECKb Transmittance", Said::Transmittance),
+            ("Olivine GDS70 BECKa TRAN", Said::Transmittance),
+            ("Olivine GDS70 BECKa AREF", Said::Reflectance),
+            ("Quartz", Said::Reflectance),
+        ] {
+            assert_eq!(kind(title).ok(), Some(said), "{title}");
+        }
+        for (title, words) in [
+            ("error to previous reflectance AREF", "the errors of another"),
+            ("Olivine GDS70 BECKa ABSB", "absorbance"),
+            ("Olivine absorbance", "absorbance"),
+            ("Wavelengths in microns", "wavelengths"),
+        ] {
+            let problem = kind(title).unwrap_err();
+            assert!(problem.line == Some(1) && problem.message.contains(words), "{title}: {problem}");
+        }
+        assert!(matches!(usgs_kind("splib07a Record=3: Oak", Path::new("oak_ASD_TRAN.txt")), Ok(Said::Transmittance)));
     }
 
     fn library(names: &str) -> String {

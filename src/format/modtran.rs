@@ -253,4 +253,28 @@ mod tests {
             assert_eq!(problem.line, line, "{text:?}: {problem}");
         }
     }
+
+    #[test]
+    fn columns_are_what_they_are_called() {
+        let text = "FREQ TOT_TRANS PTH_THRML TOTAL_RAD REF_SOL -LOG_TOTAL DEPTH DIR_EM TOA_SUN BBODY_T[K] X\n\
+             500 0.5 1e-8 1e-8 1e-8 0.3 0.7 1 1e-8 300 1\n600 0.5 1e-8 1e-8 1e-8 0.3 0.7 1 1e-8 300 1\n-9999.\n";
+        for (column, said) in [
+            ("TOT_TRANS", Some(Said::Transmittance)),
+            ("PTH_THRML", Some(Said::Radiance)),
+            ("TOTAL_RAD", Some(Said::Radiance)),
+            ("REF_SOL", Some(Said::Irradiance)),
+            ("DEPTH", Some(Said::OpticalDepth)),
+            ("DIR_EM", Some(Said::Emissivity)),
+            ("TOA_SUN", Some(Said::Irradiance)),
+            ("BBODY_T[K]", Some(Said::Temperature)),
+            ("X", None),
+        ] {
+            let table = read(text, Some(column)).unwrap();
+            assert_eq!(table.said.map(|(said, _)| said), said, "{column}");
+        }
+        let logarithm = read(text, Some("-LOG_TOTAL")).unwrap().unit.map(|stated| stated.meaning);
+        assert_eq!(logarithm, Some(Meaning::Logarithm));
+        let problem = read(&format!("{text}{text}"), Some("TOTAL_RAD")).unwrap_err();
+        assert!(problem.line == Some(5) && problem.message.contains("a second run"), "{problem}");
+    }
 }

@@ -395,6 +395,74 @@ mod tests {
     }
 
     #[test]
+    fn shares_of_light_are_at_most_one_and_never_multiplied() {
+        let shares = |text: &str| super::parse(text.as_bytes(), Path::new("s.csv"), Of::Light);
+        for (text, integral) in [
+            ("nm,a\n400,1\n500,1\n", 100.0),
+            ("nm,QE a\n400,0.5\n500,0.5\n", 50.0),
+            ("nm,a (%)\n400,90\n500,90\n", 90.0),
+            ("# QE\nnm,a\n400,0.5\n500,0.5\n", 50.0),
+        ] {
+            let found = shares(text).unwrap_or_else(|problem| panic!("{text}: {problem}"));
+            assert!(
+                (found.named[0].1.integral() - integral).abs() < 1e-9 && found.warnings.is_empty(),
+                "{text}: {found:?}"
+            );
+        }
+        for (text, words) in [
+            ("nm,a\n400,90\n500,90\n", "a share of light, in [0, 1], but is 90"),
+            ("nm,a\n400,0.5\n500,2\n", "but is 2"),
+            ("nm,responsivity (A/W)\n400,0.5\n500,0.5\n", "responsivity"),
+            ("nm,a (A W-1)\n400,0.5\n500,0.5\n", "responsivity"),
+        ] {
+            let problem = shares(text).unwrap_err();
+            assert!(problem.message.contains(words), "{text}: {problem}");
+        }
+    }
+
+    #[test]
+    fn what_is_per_photon_is_seen_in_names_and_comments() {
+        for text in [
+            "nm,PDE\n",
+            "nm,Q.E.\n",
+            "nm,e-/ph\n",
+            "# QE\nnm,a\n",
+            "# response per photon\nnm,a\n",
+            "# photon response\nnm,a\n",
+            "# electrons per photon\nnm,a\n",
+            "# relative quantal sensitivity\nnm,a\n",
+        ] {
+            let found = parse(&format!("{text}400,1\n500,1\n")).unwrap();
+            assert!(found.warnings.iter().any(|w| w.contains("multiplied by the wavelength")), "{text}: {found:?}");
+        }
+        for text in ["# converted from QE\nnm,a\n", "# photon energies\nnm,a\n", "# not per photon\nnm,a\n"] {
+            let found = parse(&format!("{text}400,1\n500,1\n")).unwrap();
+            assert!(found.warnings.is_empty(), "{text}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn axes_and_flags_are_no_channels_and_lost_rows_are_told_of() {
+        for column in ["photon energy (eV)", "freq_THz", "wavenumber (cm-1)", "flag", "reference"] {
+            let found = parse(&format!("nm,a,{column}\n400,1,2\n500,1,3\n")).unwrap();
+            assert_eq!(found.named.len(), 1, "{column}");
+            assert!(found.warnings[0].contains("left out"), "{column}: {found:?}");
+        }
+        assert_eq!(parse("nm,B1 (665 nm),reference panel\n400,1,2\n500,1,3\n").unwrap().named.len(), 2);
+        let lost = parse("band,wavelength_nm,response\n#1,400,1\n#1,500,1\nA,400,1\nA,500,1\n").unwrap();
+        assert!(lost.warnings[0].contains("2 lines that look like rows, the first of them 2"), "{lost:?}");
+        for (text, words) in [
+            ("band,wavelength_nm,response,uncertainty\na,400,1,0\na,500,1,0\n", "not the columns of long responses"),
+            ("band,detector,wavelength_nm,response\na,x,400,1\na,x,500,1\n", "not the columns of long responses"),
+            ("band,response,wavelength_nm\na,0,400\na,1,500\n", "in another order"),
+        ] {
+            let problem = parse(text).unwrap_err();
+            assert!(problem.message.contains(words), "{text}: {problem}");
+            assert!(problem.help.is_some_and(|help| help.contains("band,wavelength_nm,response")), "{text}");
+        }
+    }
+
+    #[test]
     fn axes_of_single_bands_are_refused() {
         for text in [
             "Wavelength (nm),B1,Wavelength (nm),B2\n400,0,500,0\n500,1,600,1\n600,0,700,0\n",

@@ -413,6 +413,15 @@ impl<'a> Spectra<'a> {
         refuse: &dyn Fn(String),
         warnings: &mut Vec<String>,
     ) -> Option<Curve> {
+        if let (Quantity::Absorption, Some(file @ TableFile { said: Some((Said::Extinction, _)), .. })) =
+            (quantity, table.file)
+        {
+            let (nm, value, lines) = absorption_of(table.nm, table.value, &file.lines);
+            let mut file = TableFile { lines, said: None, ..file.clone() };
+            file.notes.push("gives k of an index of refraction: absorption is taken as 4 π k / λ".to_owned());
+            let table = Tabulated { nm: &nm, value: &value, file: Some(&file), ..*table };
+            return self.tabulated(&table, user, quantity, refuse, warnings);
+        }
         let Tabulated { nm, file, source, name, .. } = *table;
         let mut unscaled = table.value.to_vec();
         let mut kept = 0..nm.len();
@@ -509,13 +518,6 @@ impl<'a> Spectra<'a> {
         let Some(file) = table.file else { return Some(()) };
         let path = file.path.display();
         let is_scaled = table.source.is_scaled;
-        if quantity == Quantity::Absorption && matches!(file.said, Some((Said::Extinction, _))) {
-            // Radiance falls as the square of a field that falls by k 2π/λ.
-            let per_metre = |nm: &f64| 4.0 * std::f64::consts::PI / (nm * 1e-9);
-            value.iter_mut().zip(table.nm).for_each(|(value, nm)| *value *= per_metre(nm));
-            warnings.push(format!("{path} gives k of an index of refraction: absorption is taken as 4 π k / λ"));
-            return Some(());
-        }
         if let Some((said, text)) = file.said.as_ref().filter(|(said, _)| !quantity.may_be(*said)) {
             let text = shown(text);
             let (noun, wanted) = (said.noun(), quantity.noun());
@@ -638,6 +640,32 @@ impl<'a> Spectra<'a> {
         let gaps: Vec<String> = [below, above].into_iter().flatten().map(|[a, b]| format!("{a}-{b} nm")).collect();
         (!gaps.is_empty()).then(|| gaps.join(" and "))
     }
+}
+
+/// The absorption per metre of a k that is linear between wavelengths, 4 π k / λ, at these and between them so close that a line is as
+/// good; and the line of each.
+fn absorption_of(nm: &[f64], k: &[f64], lines: &[usize]) -> (Vec<f64>, Vec<f64>, Vec<usize>) {
+    /// Of neighbours: a line between them is off by an eighth of its square at most.
+    const STEP: f64 = 0.002;
+    let per_metre = |nm: f64, k: f64| 4.0 * std::f64::consts::PI * k / (nm * 1e-9);
+    let mut found = (Vec::new(), Vec::new(), Vec::new());
+    for i in 0..nm.len() {
+        let line = lines.get(i).copied();
+        if let Some(before) = i.checked_sub(1) {
+            let pieces = ((nm[i] / nm[before]).ln() / STEP).ceil().min(5000.0);
+            for piece in 1..pieces as usize {
+                let share = piece as f64 / pieces;
+                let (x, k) = (nm[before] + share * (nm[i] - nm[before]), k[before] + share * (k[i] - k[before]));
+                found.0.push(x);
+                found.1.push(per_metre(x, k));
+                found.2.extend(line);
+            }
+        }
+        found.0.push(nm[i]);
+        found.1.push(per_metre(nm[i], k[i]));
+        found.2.extend(line);
+    }
+    found
 }
 
 /// The table of a species at `kelvin` in m⁻¹ atm⁻¹, if it has cross sections; and whether it has.

@@ -9,6 +9,7 @@ mod materials;
 mod media;
 mod meshes;
 mod never_panics;
+mod quantities;
 mod resolved;
 mod sun;
 mod textures;

@@ -112,6 +112,13 @@ fn mistakes_name_their_line() {
             Some(5),
             "`scale factor` is not applied",
         ),
+        ("ENVI\nsamples = 1\nlines = 1\ndata type = 2\noffset = 2\n", Some(5), "`offset` is not applied"),
+        ("ENVI\nsamples = 1\nlines = 1\ndata type = 2\nradiance offset = -1\n", Some(5), "not applied"),
+        ("ENVI\nsamples = 1\nlines = 1\ndata type = 2\nno data = -1\n", Some(5), "not applied"),
+        ("ENVI\nsamples = 1\nlines = 1\ndata type = 2\ndata ignore values = {0, -1}\n", Some(5), "not applied"),
+        ("ENVI\nsamples = 1\nlines = 1\ndata type = 2\nradiance units = mW/m2/sr/nm\n", Some(5), "not applied"),
+        ("ENVI\nsamples = 1\nlines = 1\ndata type = 2\nwavelength medium = air\n", Some(5), "not applied"),
+        ("ENVI\nsamples = 1\nlines = 1\ndata type = 2\ncoefficients = {2}\n", Some(5), "not applied"),
         ("ENVI\nsamples = 1\nlines = 1\nbands = 2\ndata type = 4\n", None, "lacks `interleave`"),
         ("ENVI\nsamples = 9999999999999\nlines = 9999999999999\ndata type = 4\n", None, "counted"),
     ] {
@@ -141,4 +148,15 @@ fn titles_of_plots_say_the_unit_where_data_units_do_not() {
     assert_eq!(both("Radiance"), Ok(radiance));
     let problem = both("W m-2 sr-1 nm-1").unwrap_err();
     assert!(problem.line == Some(7) && problem.message.contains("`z plot titles` says `Radiance (uW"), "{problem}");
+}
+
+/// Keys of others that change nothing are only told of.
+#[test]
+fn neutral_keys_of_others_are_left_out() {
+    for line in ["offset = 0", "gain = 1", "radiance units = W/m2/sr/nm", "wavelength medium = vacuum", "operator = x"]
+    {
+        let header = read(&format!("ENVI\nsamples = 1\nlines = 1\ndata type = 4\n{line}\n"));
+        let header = header.unwrap_or_else(|problem| panic!("{line}: {problem}"));
+        assert!(header.notes.len() == 1 && header.notes[0].contains("not known"), "{line}: {:?}", header.notes);
+    }
 }

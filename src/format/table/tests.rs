@@ -80,6 +80,7 @@ fn what_can_be_read_in_two_ways_is_refused() {
         ("Data\nXAxis mode: Raman Shifts\n>>>>>Begin Spectral Data<<<<<\n400\t1\n500\t1\n", 2, "Raman Shifts"),
         ("Y-axis: % Reflectance\n400\t1\n500\t1\n", 1, "% Reflectance"),
         ("Y-axis: Counts\n400\t1\n500\t1\n", 1, "Counts"),
+        (",Wavelength (nm),R\n,400,10\n,500,20\n", 2, "remove the first column"),
         ("nm,v,w,x\n400,1\n500,1\n", 1, "4 cells where the numbers below have 2"),
     ] {
         let problem = read(text.as_bytes(), Path::new("t.csv")).unwrap_err();
@@ -98,4 +99,85 @@ fn what_can_be_read_in_two_ways_is_refused() {
     let table = read(b"nm,v\n400,0,1,0\n700,0,1,0\n", Path::new("t.csv"));
     let problem = table.and_then(|table| table.check_row(&table.rows[0])).unwrap_err();
     assert!(problem.to_string().contains("2") && problem.line.is_some(), "{problem}");
+}
+
+/// What a line before the numbers says of axis or values is not left out, whatever words it has; what changes nothing is.
+#[test]
+fn statements_before_a_table() {
+    for line in [
+        "X-Axis,Wavenumber (cm-1)",
+        "Abscissa,Wavenumber",
+        "Axis,Wavenumber",
+        "First column: wavenumber in cm-1",
+        "X Units,cm-1",
+        "Wavelength unit: Angstrom",
+        "Wavelength,Angstrom",
+        "Wavelength:,um",
+        "Units,Angstrom",
+        "nombre d'onde",
+        "Unit,%",
+        "values are in percent",
+        "Reflectance in %",
+        "Ordinate,%R",
+        "Mode: %T",
+        "Measurement mode,Absorbance",
+        "Data: -log10(R)",
+        "Scale,0.01",
+        "YFACTOR,0.01",
+        "Y-axis: Counts",
+    ] {
+        for header in ["", "wl,v\n"] {
+            let text = format!("{line}\n{header}4000,0.1\n5000,0.2\n");
+            let problem = read(text.as_bytes(), Path::new("t.csv")).expect_err(line);
+            assert!(problem.line == Some(1) && problem.message.contains("says `"), "{text}: {problem}");
+        }
+    }
+    for text in [
+        "Integration time: 10 ms\nLaser,532 nm\nHumidity (%): 45\nwl,v\n400,1\n500,2\n",
+        "Resolution: 4 cm-1\nwl,v\n400,1\n500,2\n",
+        "Wavelength range: 0.4 - 2.5 um\nwl,v\n400,1\n500,2\n",
+        "Wavelength: 632.8 nm\nwl,v\n400,1\n500,2\n",
+        "X Axis,Wavelength (nm)\nY Axis,Radiance\nwl,v\n400,1\n500,2\n",
+        "X-Axis,Wavelength (um)\nwl (um),v\n0.4,1\n0.5,2\n",
+        "Y-Axis: % Reflectance\nnm,R (%)\n400,1\n500,2\n",
+        "Log file: a.txt\nSample: pine/bark\nwl,v\n400,1\n500,2\n",
+        "Units: nm\n400,1\n500,2\n",
+        "Wavelength: nm\n400 1\n500 2\n",
+    ] {
+        let table = read(text.as_bytes(), Path::new("t.csv")).unwrap_or_else(|problem| panic!("{text}: {problem}"));
+        assert_eq!(table.rows.len(), 2, "{text}");
+    }
+    let said = |text: &str| read(text.as_bytes(), Path::new("t.csv")).unwrap().said.map(|(said, _)| said);
+    assert_eq!(said("Photometric mode: Transmittance\nnm,v\n400,1\n500,2\n"), Some(Said::Transmittance));
+    assert_eq!(said("# emissivity\nnm,v\n400,1\n500,2\n"), Some(Said::Emissivity));
+    assert_eq!(said("# from the emissivity of oak\nnm,v\n400,1\n500,2\n"), None);
+    for unit in ["|Angstrom|W/m2/sr/nm|", "|cm-1|W|"] {
+        let text = format!("\\about\n|wavelength|flux|\n|double|double|\n{unit}\n 4000 0.1\n 5000 0.2\n");
+        let problem = read(text.as_bytes(), Path::new("t.tbl")).unwrap_err();
+        assert!(problem.line == Some(2) && problem.message.contains("a table of IPAC"), "{problem}");
+    }
+}
+
+/// Units by a line of their own count as those in brackets do.
+#[test]
+fn lines_of_units() {
+    let name = |unit: &str| {
+        let text = format!("Wavelength,Sample 1\n{unit}\n400,0.5\n500,0.6\n");
+        let table = read(text.as_bytes(), Path::new("t.csv")).unwrap_or_else(|problem| panic!("{text}: {problem}"));
+        let is_told = table.notes.iter().any(|note| note.contains("not understood"));
+        (Stated::in_name(&table.names[1]).map(|stated| stated.meaning), is_told)
+    };
+    let percent = Stated::of("%").map(|stated| stated.meaning);
+    for unit in ["%", "(%)", "pct", "%R", "%T", "R%", "% R", "% Refl", "%REFL", "Reflectance %", "%reflectance"] {
+        assert_eq!(name(&format!("nm,{unit}")), (percent, false), "{unit}");
+    }
+    for unit in ["Abs", "dB", "log10", "OD"] {
+        assert_eq!(name(&format!("nm,{unit}")), (Some(unit::Meaning::Logarithm), false), "{unit}");
+    }
+    for (unit, is_told) in [("", false), ("-", false), ("v", true), ("wt%", true), ("xyz", true)] {
+        assert_eq!(name(&format!("nm,{unit}")), (None, is_told), "{unit}");
+    }
+    // Names and units on two lines, of which the second is the header.
+    let table = read(b"Mode,%T\nnm,v\n400,50\n500,60\n", Path::new("t.csv")).unwrap();
+    assert_eq!(Stated::in_name(&table.names[1]).map(|stated| stated.meaning), percent);
 }

@@ -211,3 +211,26 @@ fn wavelengths_of_their_own_are_refused() {
         assert_eq!(csv(text, Some("w")).unwrap().value, [3.0, 4.0], "{text}");
     }
 }
+
+/// n and k are those of an index where nothing else can be meant.
+#[test]
+fn columns_of_an_index_are_known() {
+    let said = |text: &str, column: &str| {
+        let table = csv(text, Some(column)).unwrap_or_else(|problem| panic!("{text}: {problem}"));
+        table.said.map(|(said, _)| said)
+    };
+    for (text, column, expected) in [
+        ("nm,n,k\n400,1.5,0\n500,1.5,0\n", "n", Some(Said::Index)),
+        ("nm,n,k\n400,1.5,0\n500,1.5,0\n", "k", Some(Said::Extinction)),
+        ("um,k,n\n0.4,0,1.5\n0.5,0,1.5\n", "k", Some(Said::Extinction)),
+        ("wl,n\n0.4,1.5\n0.5,1.5\n\nwl,k\n0.4,0\n0.5,0\n", "k", Some(Said::Extinction)),
+        ("nm,n\n400,1.5\n500,1.5\n", "n", Some(Said::Index)),
+        ("nm,k\n400,1\n500,1\n", "k", Some(Said::Kay)),
+        ("nm,k (m-1)\n400,1\n500,1\n", "k", None),
+        ("nm,k,m,n\n400,1,1,1\n500,1,1,1\n", "k", None),
+        ("nm,n-butane\n400,1\n500,1\n", "n-butane", None),
+        ("nm,k,leaf\n400,1,1\n500,1,1\n", "k", None),
+    ] {
+        assert_eq!(said(text, column), expected, "{text}: {column}");
+    }
+}

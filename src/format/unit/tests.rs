@@ -357,6 +357,11 @@ fn percent_in_sentences_and_axes_by_their_names() {
         "# values are percent",
         "# transmittance [%]",
         "# reflectance: %",
+        "# % reflectance",
+        "# percent",
+        "# in %",
+        "values are in percent",
+        "# all values are given in percent",
     ] {
         assert!(speaks_of_percent(text), "{text}");
     }
@@ -424,6 +429,9 @@ fn sentences_about_factors_and_air() {
         "# offset: -0.5",
         "# all values were multiplied by 10^4",
         "# multiply radiance by 1000",
+        "# values in units of 10^-3",
+        "# *1e-3",
+        "# multiplied with pi",
     ] {
         assert!(states_a_factor(text), "{text}");
     }
@@ -452,5 +460,112 @@ fn sentences_about_factors_and_air() {
         ("# wavelengths of air-dried soil, in air-tight boxes", false),
     ] {
         assert_eq!(speaks_of_air(text), expected, "{text}");
+    }
+}
+
+#[test]
+fn axes_from_which_no_wavelength_follows() {
+    for name in [
+        "Raman shift (cm-1)",
+        "Raman Shift / cm-1",
+        "Wavenumber shift (cm-1)",
+        "energy loss (eV)",
+        "binding energy (eV)",
+        "linewidth (cm-1)",
+        "Absorption (cm-1)",
+        "spatial frequency (1/cm)",
+        "thickness (nm)",
+        "particle diameter (um)",
+        "bandwidth (nm)",
+        "FWHM (nm)",
+        "wavelength shift (nm)",
+        "retardation (nm)",
+        "OPD (nm)",
+        "pixel",
+        "Band",
+        "2theta",
+        "WN",
+        "wvn",
+        "Frequenz",
+        "fr\u{e9}quence",
+        "\u{5468}\u{6ce2}\u{6570}",
+        "\u{447}\u{430}\u{441}\u{442}\u{43e}\u{442}\u{430}",
+        "Wavelength (\u{81})",
+    ] {
+        assert!(Unit::stated(name).is_err(), "{name}: {:?}", Unit::stated(name));
+    }
+    for name in [
+        "nombre d'onde",
+        "nombre d\u{2019}onde",
+        "n\u{fa}mero de onda",
+        "numero d'onda",
+        "Golfgetal",
+        "Wellenzahl",
+        "\u{6ce2}\u{6570}",
+        "Wavenumbers",
+        "wave number",
+    ] {
+        assert_eq!(Unit::stated(name), Ok(Some(Unit::WAVENUMBER)), "{name}");
+    }
+    for name in [
+        "Wavelength",
+        "Wavelength position (nm)",
+        "Emission wavelength (nm)",
+        "nm",
+        "Wavelength of pixel",
+        "Wave length (nm)",
+        "Longueur d'onde (nm)",
+        "Band center (nm)",
+        "wl",
+        "x",
+        "\u{6ce2}\u{9577}",
+    ] {
+        let unit = Unit::from_header(name);
+        assert_eq!(unit, Ok(Unit::NANOMETRE), "{name}");
+    }
+}
+
+/// What names say was done to values, and names that only look so.
+#[test]
+fn what_was_done_to_values_is_seen_in_their_names() {
+    for (name, meaning) in [
+        ("pi*R", Some(Meaning::Factor)),
+        ("R*pi", Some(Meaning::Factor)),
+        ("reflectance/pi", Some(Meaning::Factor)),
+        ("rho / \u{3c0}", Some(Meaning::Factor)),
+        ("R/2", Some(Meaning::Factor)),
+        ("R+0.5", Some(Meaning::Factor)),
+        ("R (offset for clarity)", Some(Meaning::Factor)),
+        ("R, offset", Some(Meaning::Factor)),
+        ("1/R", Some(Meaning::Logarithm)),
+        ("R^2", Some(Meaning::Logarithm)),
+        ("R\u{b2}", Some(Meaning::Logarithm)),
+        ("1st derivative", Some(Meaning::Logarithm)),
+        ("reflectance, continuum removed", Some(Meaning::Logarithm)),
+        ("R [10log]", Some(Meaning::Logarithm)),
+        ("Sample 1 (Abs)", Some(Meaning::Logarithm)),
+        ("R (rel.)", Some(Meaning::Unknown)),
+        ("R (bp)", Some(Meaning::Unknown)),
+        ("pine/bark", None),
+        ("spinach/2", None),
+        ("pi-meson", None),
+        ("R-1", None),
+        ("R2", None),
+        ("2R", None),
+        ("1/2 oak", None),
+        ("R", None),
+        ("value", None),
+        ("n-butane", None),
+        ("Reflectance (abs.)", None),
+        ("soil (% clay)", None),
+        ("soil (5 % clay)", None),
+        ("catalog", None),
+    ] {
+        let found = Stated::in_name(name).map(|stated| stated.meaning);
+        let is_plain = name.starts_with("Reflectance (abs") && found == Some(Meaning::Unknown);
+        assert!(found == meaning || is_plain, "{name}: {found:?}");
+    }
+    for name in ["Sample 1 (%R)", "Sample 1 (% Refl)", "Sample 1 (R%)", "Sample 1 %T"] {
+        assert!(Stated::in_name(name).is_some_and(|stated| stated.is_percent()), "{name}");
     }
 }
