@@ -483,12 +483,18 @@ impl Header {
                 ([shape[0], shape[1]], [chunk[0], chunk[1]])
             }
             (Some(_), _) => return Err(rewritten(path, "preview")),
+            _ if stored["preview"].is_object() => {
+                return Err(damaged("gives no shape [y, x, rgb] and chunk of `preview`"));
+            }
             _ => {
                 let what = "is a copy of a cube that another program has changed: it has no `preview`";
                 return Err(Error::storage(path, format!("{what}; {COPY}")));
             }
         };
         let Some(&[count]) = shape_of("wavelength").as_deref() else {
+            if stored["wavelength"].is_object() {
+                return Err(damaged("gives no shape [wavelength] of `wavelength`"));
+            }
             let what = "is a copy of a cube that another program has changed: it has no list `wavelength`";
             return Err(Error::storage(path, format!("{what}; {COPY}")));
         };

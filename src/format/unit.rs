@@ -438,7 +438,7 @@ impl Stated {
             if is_logarithm(inner) && !is_absolute {
                 return stated(Meaning::Logarithm, true);
             }
-            if has_arithmetic(before) {
+            if has_arithmetic(before) || words(&inner.to_lowercase()).any(|word| word == "offset") {
                 return stated(Meaning::Factor, true);
             }
             // No factor makes degrees Celsius anything else than a temperature.

@@ -356,7 +356,7 @@ mod tests {
             ("spectra.sky", "1", "lamp, paint"),
             ("objects.0.material", "\"x\"", "needs a new render"),
             ("materials.floor.temperature", "300", "wall"),
-            ("materials.wall.temperature", "-3", "greater than 0"),
+            ("materials.wall.temperature", "-3", "above 0"),
             ("spectra.paint", "1.5", "in [0, 1]"),
             ("spectra.paint.blackbody", "3000", "spectra.paint"),
             ("spectra.lamp", "{ file = \"no-such.csv\" }", "no-such.csv"),

@@ -425,7 +425,13 @@ fn density(path: &Path, array: &Variable, axis: Unit, warnings: &mut Vec<String>
 /// What to say of attributes that may change what the numbers are, and that nothing here knows.
 fn unknown_attributes(array: &Variable) -> Option<String> {
     /// Of CF, xarray, GDAL and Spectile.
-    const KNOWN: [&str; 34] = [
+    const KNOWN: [&str; 40] = [
+        "scale",
+        "gain",
+        "factor",
+        "offset",
+        "slope",
+        "intercept",
         "units",
         "unit",
         "long_name",

@@ -125,10 +125,28 @@ pub fn is_no_header(cells: &[&str]) -> bool {
     let scales = FACTORS.iter().chain(["offset"].iter()).any(|word| lower.starts_with(word));
     // No values are called after a unit of wavelength, but for those of one letter or a Greek one.
     let is_length = |cell: &str| {
-        !matches!(cell, "mu" | "Mu" | "MU") && cell.chars().filter(char::is_ascii).count() != 1 && {
-            matches!(Unit::named(cell), Some(Unit::Wavelength(_)))
-        }
+        !matches!(cell, "mu" | "Mu" | "MU")
+            && cell.chars().filter(char::is_ascii).count() != 1
+            && !cell.contains(|c: char| c.is_ascii_digit())
+            && { matches!(Unit::named(cell), Some(Unit::Wavelength(_))) }
     };
+    // `X-Axis,Wavenumber (cm-1)`; but `X-Axis,Y-Axis` are names.
+    let squeezed = |cell: &str| cell.to_lowercase().chars().filter(|c| c.is_alphanumeric()).collect::<String>();
+    let key = squeezed(first);
+    const OTHER_KEYS: [&str; 9] = [
+        "yaxis",
+        "yunit",
+        "ylabel",
+        "ordinate",
+        "secondcolumn",
+        "photometricmode",
+        "measurementmode",
+        "measurementtype",
+        "datatype",
+    ];
+    let begins = AXIS_KEYS.iter().chain(&OTHER_KEYS).any(|start| key.starts_with(start))
+        || matches!(key.as_str(), "axis" | "mode");
+    let is_key = is_key || (begins && rest.len() == 1 && !squeezed(rest[0]).starts_with("yaxis"));
     let is_unit = rest.len() == 1 && is_length(rest[0]) && Unit::named(first).is_none();
     is_key
         || of_units

@@ -178,6 +178,8 @@ fn lines_of_units() {
         assert_eq!(name(&format!("nm,{unit}")), (None, is_told), "{unit}");
     }
     // Names and units on two lines, of which the second is the header.
-    let table = read(b"Mode,%T\nnm,v\n400,50\n500,60\n", Path::new("t.csv")).unwrap();
-    assert_eq!(Stated::in_name(&table.names[1]).map(|stated| stated.meaning), percent);
+    let problem = read(b"Mode,%T\nnm,v\n400,50\n500,60\n", Path::new("t.csv")).unwrap_err();
+    assert!(problem.line == Some(1) && problem.message.contains("Mode %T"), "{problem}");
+    let table = read(b"Mode,fast\nnm,v\n400,50\n500,60\n", Path::new("t.csv")).unwrap();
+    assert_eq!(table.names, ["nm", "v"]);
 }
