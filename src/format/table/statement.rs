@@ -122,7 +122,11 @@ pub fn is_no_header(cells: &[&str]) -> bool {
     let lower = first.to_lowercase();
     let is_key = first.ends_with(':') && !rest.iter().all(|cell| cell.ends_with(':'));
     let of_units = matches!(lower.trim_end_matches(':'), "unit" | "units" | "x units" | "xunit" | "xunits" | "y units");
-    let scales = FACTORS.iter().chain(["offset"].iter()).any(|word| lower.starts_with(word));
+    let is_number = rest[0].parse::<f64>().is_ok();
+    let scales = FACTORS
+        .iter()
+        .chain(["offset"].iter())
+        .any(|word| lower.starts_with(word) || (is_number && lower.contains(word)));
     // No values are called after a unit of wavelength, but for those of one letter or a Greek one.
     let is_length = |cell: &str| {
         !matches!(cell, "mu" | "Mu" | "MU")
