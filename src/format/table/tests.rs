@@ -141,7 +141,6 @@ fn statements_before_a_table() {
         "X-Axis,Wavelength (um)\nwl (um),v\n0.4,1\n0.5,2\n",
         "Y-Axis: % Reflectance\nnm,R (%)\n400,1\n500,2\n",
         "Log file: a.txt\nSample: pine/bark\nwl,v\n400,1\n500,2\n",
-        "Units: nm\n400,1\n500,2\n",
         "Wavelength: nm\n400 1\n500 2\n",
     ] {
         let table = read(text.as_bytes(), Path::new("t.csv")).unwrap_or_else(|problem| panic!("{text}: {problem}"));
