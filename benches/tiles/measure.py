@@ -29,7 +29,7 @@ GAINS = [
     ("aircraft-infrared", (1500, 5500), "48x32", 8, 4, 0.2, 2048),
 ]
 # Scene, error, samples of the even renders.
-BIASES = [("cornell", 0.1, 512), ("conference", 0.5, 512)]
+BIASES = [("cornell", 0.1, 512), ("conference", 0.8, 256)]
 TILES, TILE, CHANNELS, EPOCH = 4, 8, 8, 4
 
 

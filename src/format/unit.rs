@@ -485,14 +485,16 @@ pub fn is_axis(name: &str) -> bool {
     let first = words(&lower).find(|word| word.chars().any(char::is_alphabetic)).unwrap_or("");
     let begins = ["wavelength", "wavenumber", "wavelen", "wvl", "frequency"].iter().any(|axis| first.starts_with(axis));
     let is_symbol = ["wl", "nu", "lambda", "\u{3bb}", "nm", "um", "cm", "ev", "thz"].contains(&first);
-    // A band over `b nm`.
-    let ends = words(&lower).last().is_some_and(|word| ["nm", "um"].contains(&word));
+    // A band over `b nm`; but `b4 (665 nm)` is where one band is.
+    let all: Vec<&str> = words(&lower).collect();
+    let is_place = all.len() > 1 && all[all.len() - 2].parse::<f64>().is_ok();
+    let ends = all.last().is_some_and(|word| ["nm", "um"].contains(word));
     let is_of_values = Stated::in_name(name).is_some_and(|stated| match stated.meaning {
         Meaning::Unit(measure) => Unit::of(measure).is_none(),
         Meaning::Unknown => false,
         Meaning::Logarithm | Meaning::Factor => true,
     });
-    !is_of_values && (begins || ((is_symbol || ends) && matches!(Unit::stated(name), Ok(Some(_)))))
+    !is_of_values && (begins || ((is_symbol || ends) && !is_place && matches!(Unit::stated(name), Ok(Some(_)))))
 }
 
 /// Whether the name of a column says that its wavelengths are those in air.

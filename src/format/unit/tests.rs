@@ -381,7 +381,9 @@ fn percent_in_sentences_and_axes_by_their_names() {
     {
         assert!(is_axis(name), "{name}");
     }
-    for name in ["B1", "radiance (W/m2/sr/nm)", "Response", "uncertainty", "band 550", "R (%)", ""] {
+    for name in
+        ["B1", "B4 (665 nm)", "665 nm", "radiance (W/m2/sr/nm)", "Response", "uncertainty", "band 550", "R (%)", ""]
+    {
         assert!(!is_axis(name), "{name}");
     }
 }
