@@ -213,7 +213,7 @@ pub fn end(args: &Args) -> Result<()> {
     let work = Work::of(&cube, &samples, Some(job.samples))?;
     let verified = cube.verify()?;
     let mut wanted: BTreeSet<u32> = verified.tiles.iter().copied().collect();
-    wanted.extend(cube.unfinished(job.samples, job.tile_error)?);
+    wanted.extend(cube.unfinished(&samples, job.samples, job.tile_error)?);
     let last = arrays.last().copied();
     let tasks = slurm::array_spec(&job.tasks_of(wanted.iter().copied()));
     let verdict = if wanted.is_empty() && verified.damage.is_empty() {

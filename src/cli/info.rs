@@ -65,9 +65,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         watch(args, output)?;
     }
     // Of counts as they are; of a cube also where others have changed its metadata.
-    if let Ok(counts) = Cube::open_picture(&args.cube)
-        && counts.is_counts()
-    {
+    if let Ok(Some(counts)) = Cube::open_counts(&args.cube) {
         if args.verify {
             let what = "holds counts of a sensor, which have no checksums: make them anew to compare";
             return Err(Error::Usage(format!("{} {what}", args.cube.display())));

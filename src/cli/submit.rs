@@ -303,7 +303,8 @@ fn refuse_while_at_work(cube: &Path) -> Result<()> {
 
 /// Tasks with tiles that lack samples.
 fn lacking(job: &Job, cube: &Path) -> Result<Vec<u32>> {
-    Ok(job.tasks_of(Cube::open(cube)?.unfinished(job.samples, job.tile_error)?))
+    let cube = Cube::open(cube)?;
+    Ok(job.tasks_of(cube.unfinished(&cube.all_samples()?, job.samples, job.tile_error)?))
 }
 
 struct Submission {

@@ -58,15 +58,23 @@ impl Cube {
     /// # Errors
     /// As [`Cube::open_to_read`]; counts in another layout, or whose meaning somebody has changed.
     pub fn open_picture(path: &Path) -> Result<Cube> {
+        Cube::open_counts(path)?.map_or_else(|| Cube::open_to_read(path), Ok)
+    }
+
+    /// Opens the counts of a sensor; `None` of what holds something else.
+    ///
+    /// # Errors
+    /// What is no folder; counts in another layout, or whose meaning somebody has changed.
+    pub fn open_counts(path: &Path) -> Result<Option<Cube>> {
         check_folder(path)?;
         // What has a record is a cube of radiance, whatever others have made of its metadata.
         if !path.join(super::store::RECORD).exists()
             && let Ok(group) = read_group(path)
             && !group["attributes"][SENSOR_FORMAT].is_null()
         {
-            return open_counts(path, &group);
+            return read_counts(path, &group).map(Some);
         }
-        Cube::open_to_read(path)
+        Ok(None)
     }
 
     /// Whether it holds counts of a sensor.
@@ -163,7 +171,7 @@ impl Cube {
     }
 }
 
-fn open_counts(path: &Path, group: &Value) -> Result<Cube> {
+fn read_counts(path: &Path, group: &Value) -> Result<Cube> {
     let attributes = group["attributes"].as_object().cloned().unwrap_or_default();
     let damaged = |what: &str| Error::storage(path, format!("holds damaged counts of a sensor: its zarr.json {what}"));
     if attributes[SENSOR_FORMAT].as_u64() != Some(COUNTS_FORMAT) {

@@ -98,6 +98,14 @@ pub fn next_look(epochs: u32) -> u32 {
     if epochs < FIRST_LOOK { FIRST_LOOK } else { (epochs / between(epochs) + 1).saturating_mul(between(epochs)) }
 }
 
+/// What was seen of a tile before its first look.
+pub(super) const UNSEEN: [f32; 2] = [f32::INFINITY; 2];
+
+/// Whether a tile whose errors at its last two looks are these ends at an error of `error`: both must be that small.
+pub fn is_within(looks: [f32; 2], error: f64) -> bool {
+    looks.iter().all(|look| f64::from(*look) <= error)
+}
+
 impl Floor {
     /// For a picture of this mean radiance, W m⁻² sr⁻¹ nm⁻¹, in each channel.
     pub fn of(mean_radiance: &[f64]) -> Floor {

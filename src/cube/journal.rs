@@ -10,6 +10,7 @@ use std::io::{self, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::PathBuf;
 
 use super::checksums;
+use super::estimate::UNSEEN;
 use super::faults::step;
 use super::store::{Cube, TileArray};
 use crate::{Error, Result, files};
@@ -120,7 +121,7 @@ impl Record {
             samples: word(16),
             epoch: word(20),
             suffix: u64::from_le_bytes(head[24..32].try_into().expect("eight bytes")),
-            looks: if shape.has_looks { [32, 36].map(|at| f32::from_bits(word(at))) } else { [f32::INFINITY; 2] },
+            looks: if shape.has_looks { [32, 36].map(|at| f32::from_bits(word(at))) } else { UNSEEN },
             checksums: std::array::from_fn(|i| if i < shape.files() { sum_at(i) } else { 0 }),
             spread,
             square,
@@ -148,14 +149,10 @@ impl Journal {
         Shape { has_looks: !beginning.starts_with(&MAGIC_WITHOUT_LOOKS), ..self.shape }
     }
 
-    /// The same of the file that is there.
-    fn shape_there(&self) -> io::Result<Shape> {
+    /// The same of an open file, at its beginning.
+    fn shape_in(&self, file: &mut File) -> io::Result<Shape> {
         let mut beginning = Vec::new();
-        match File::open(&self.path) {
-            Ok(file) => file.take(MAGIC.len() as u64).read_to_end(&mut beginning)?,
-            Err(error) if error.kind() == ErrorKind::NotFound => 0,
-            Err(error) => return Err(error),
-        };
+        file.take(MAGIC.len() as u64).read_to_end(&mut beginning)?;
         Ok(self.shape_of(&beginning))
     }
 
@@ -180,25 +177,30 @@ impl Journal {
 
     /// The last valid record: the one with the most samples, since samples never decrease.
     pub fn last(&self) -> Result<Option<Record>> {
-        let shape = self.shape_there().map_err(|error| self.failed(error))?;
-        let size = shape.bytes() as u64;
+        Ok(self.tail()?.1)
+    }
+
+    /// The shape of what is there, and [`Journal::last`].
+    fn tail(&self) -> Result<(Shape, Option<Record>)> {
         let mut file = match File::open(&self.path) {
             Ok(file) => file,
-            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok((self.shape, None)),
             Err(error) => return Err(self.failed(error)),
         };
         // Usually the last slot is it; a writer that is at work, or was killed, may have left a part of another.
-        let mut read = || -> io::Result<Option<Record>> {
+        let mut read = || -> io::Result<(Shape, Option<Record>)> {
+            let shape = self.shape_in(&mut file)?;
+            let size = shape.bytes() as u64;
             let slots = file.metadata()?.len() / size;
             let mut bytes = vec![0; size as usize];
             for slot in (0..slots).rev() {
                 file.seek(SeekFrom::Start(slot * size))?;
                 file.read_exact(&mut bytes)?;
                 if let Some(record) = Record::decode(&bytes, self.tile, shape) {
-                    return Ok(Some(record));
+                    return Ok((shape, Some(record)));
                 }
             }
-            Ok(None)
+            Ok((shape, None))
         };
         read().map_err(|error| self.failed(error))
     }
@@ -206,13 +208,13 @@ impl Journal {
     /// Appends a record after the one with the suffix `previous`, durably. Refuses where that is not the last one: then
     /// somebody else writes this tile.
     pub fn append(&self, record: &Record, previous: Option<u64>) -> Result<()> {
-        self.expect_tail(previous)?;
+        let (shape, last) = self.tail()?;
+        self.expect(last.as_ref(), previous)?;
         let size = self.shape.bytes() as u64;
         let existed = self.path.exists();
         let length = if existed { fs::metadata(&self.path).map_err(|e| self.failed(e))?.len() } else { 0 };
-        let is_older = self.shape_there().map_err(|e| self.failed(e))? != self.shape;
-        if is_older || length >= MAX_RECORDS * size {
-            let last = self.last()?.map(|last| last.encode(self.shape)).unwrap_or_default();
+        if shape != self.shape || length >= MAX_RECORDS * size {
+            let last = last.map(|last| last.encode(self.shape)).unwrap_or_default();
             return self.replace(&[last, record.encode(self.shape)].concat());
         }
         let write = || -> io::Result<()> {
@@ -237,7 +239,11 @@ impl Journal {
 
     /// Refuses where the last valid record is not the one with this suffix.
     pub fn expect_tail(&self, suffix: Option<u64>) -> Result<()> {
-        if self.last()?.map(|record| record.suffix) == suffix {
+        self.expect(self.last()?.as_ref(), suffix)
+    }
+
+    fn expect(&self, last: Option<&Record>, suffix: Option<u64>) -> Result<()> {
+        if last.map(|record| record.suffix) == suffix {
             return Ok(());
         }
         let what =
@@ -254,8 +260,8 @@ impl Journal {
     pub fn cut(&self, records: &[Option<Record>]) -> Result<()> {
         let kept = records.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
         let cut = || -> io::Result<()> {
-            let size = self.shape_there()?.bytes();
-            let file = OpenOptions::new().write(true).open(&self.path)?;
+            let mut file = OpenOptions::new().read(true).write(true).open(&self.path)?;
+            let size = self.shape_in(&mut file)?.bytes();
             file.set_len((kept * size) as u64)?;
             step("journal cut")?;
             file.sync_all()

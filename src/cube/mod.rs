@@ -45,7 +45,7 @@ pub use choices::{Brightness, Choices};
 pub use compare::{ChannelMetrics, Comparison, ZTest, compare};
 pub use create::{Existing, check_target, make};
 pub use epochs::{epoch_samples, epochs_in, samples_before, whole_epochs};
-pub use estimate::next_look;
+pub use estimate::{is_within, next_look};
 pub use grid::{Grid, Rect};
 pub use layer::{Layer, LayerNames, Numbers, TileLayers};
 pub use map::Chunk;

@@ -9,6 +9,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
+use super::estimate::is_within;
 use super::store::{Cube, PRIVATE};
 use crate::{Error, Result, files};
 
@@ -203,9 +204,9 @@ impl Work {
     /// `looks`: the errors of all tiles at their last two looks, where they are needed.
     fn judge(samples: &[u32], looks: &[[f32; 2]], held: &[Range<u32>], runs: Vec<Run>, target: Option<u32>) -> Work {
         let goal = runs.iter().filter_map(|run| run.tile_error).reduce(f64::min);
-        let is_within = |looks: &[f32; 2]| goal.is_some_and(|goal| looks.iter().all(|look| f64::from(*look) <= goal));
-        let is_exact = |tile: usize| looks.get(tile).is_some_and(is_within);
-        let worst = looks.iter().filter(|looks| !is_within(looks)).map(|looks| looks[1]).reduce(f32::max);
+        let is_fine = |looks: &[f32; 2]| goal.is_some_and(|goal| is_within(*looks, goal));
+        let is_exact = |tile: usize| looks.get(tile).is_some_and(is_fine);
+        let worst = looks.iter().filter(|looks| !is_fine(looks)).map(|looks| looks[1]).reduce(f32::max);
         let exact = (0..samples.len()).filter(|tile| is_exact(*tile)).count();
         let target = target.or_else(|| runs.iter().filter_map(|run| run.samples_limit).max());
         // The last run by tile, and the last that merged anything there.

@@ -487,17 +487,18 @@ impl Cube {
 
     /// The errors of all tiles at their last two looks ([`super::Writer::looks`]); infinite before them.
     pub fn all_looks(&self) -> Result<Vec<[f32; 2]>> {
-        let looks = |tile| Ok(Journal::of(self, tile).last()?.map_or([f32::INFINITY; 2], |record| record.looks));
+        let looks = |tile| Ok(Journal::of(self, tile).last()?.map_or(estimate::UNSEEN, |record| record.looks));
         (0..self.grid().count()).map(looks).collect()
     }
 
-    /// Tiles that have fewer than `limit` samples per pixel and are not as exact as `tile_error` either.
-    pub fn unfinished(&self, limit: u32, tile_error: Option<f64>) -> Result<Vec<u32>> {
-        let looks = tile_error.map(|_| self.all_looks()).transpose()?.unwrap_or_default();
-        let is_within = |looks: &[f32; 2]| looks.iter().all(|look| tile_error.is_some_and(|e| f64::from(*look) <= e));
-        let tiles = (0..).zip(self.all_samples()?);
-        let lacks = |&(tile, samples): &(u32, u32)| samples < limit && !looks.get(tile as usize).is_some_and(is_within);
-        Ok(tiles.filter(lacks).map(|(tile, _)| tile).collect())
+    /// Of tiles with these samples per pixel those that have fewer than `limit` and are not as exact as `tile_error` either.
+    pub fn unfinished(&self, samples: &[u32], limit: u32, tile_error: Option<f64>) -> Result<Vec<u32>> {
+        let mut lacking: Vec<u32> = (0..).zip(samples).filter(|(_, n)| **n < limit).map(|(tile, _)| tile).collect();
+        if let Some(error) = tile_error {
+            let looks = self.all_looks()?;
+            lacking.retain(|&tile| !estimate::is_within(looks[tile as usize], error));
+        }
+        Ok(lacking)
     }
 
     /// Whether it was made of another cube's channels.

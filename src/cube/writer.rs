@@ -12,7 +12,7 @@ use super::checksums::{self, Summing};
 use super::choices::Brightness;
 use super::create::{Existing, open_or_create, open_same};
 use super::epochs::epochs_in;
-use super::estimate::{Floor, Totals};
+use super::estimate::{Floor, Totals, UNSEEN};
 use super::faults::step;
 use super::journal::{Journal, Record};
 use super::layer::{Layer, TileLayers};
@@ -141,7 +141,7 @@ impl Writer {
         for record in recover::recover(&cube, tiles.clone(), warn)? {
             let record = record?;
             found.push(record.as_ref().map_or(0, |record| record.samples));
-            looks.push(record.as_ref().map_or([f32::INFINITY; 2], |record| record.looks));
+            looks.push(record.as_ref().map_or(UNSEEN, |record| record.looks));
             if let Some(record) = record {
                 totals.replace(None, &record);
             }
@@ -155,11 +155,8 @@ impl Writer {
             failed: None,
             closed: false,
         };
-        let floor = OnceLock::new();
-        if let Some(brightness) = Brightness::read(cube.path())? {
-            let known = Floor::of(&brightness.checked(&cube)?.mean_radiance);
-            floor.get_or_init(|| known);
-        }
+        let known = Brightness::read(cube.path())?.map(|known| known.checked(&cube)).transpose()?;
+        let floor = known.map_or_else(OnceLock::new, |known| OnceLock::from(Floor::of(&known.mean_radiance)));
         Ok(Writer {
             cube,
             tiles,
@@ -198,8 +195,7 @@ impl Writer {
     /// looked at. Gives what it knows.
     pub fn note_brightness(&self, brightness: Brightness) -> Result<Brightness> {
         let known = brightness.record(&self.cube)?;
-        let floor = Floor::of(&known.mean_radiance);
-        self.floor.get_or_init(|| floor);
+        self.floor.get_or_init(|| Floor::of(&known.mean_radiance));
         Ok(known)
     }
 
@@ -278,7 +274,7 @@ impl Writer {
         let _held = self.merging[tile as usize % self.merging.len()].lock().unwrap_or_else(PoisonError::into_inner);
         let base = self.base(tile)?;
         let n_found = base.as_ref().map_or(0, |base| base.record().samples);
-        let base_looks = base.as_ref().map_or([f32::INFINITY; 2], |base| base.record().looks);
+        let seen = base.as_ref().map_or(UNSEEN, |base| base.record().looks);
         if n_found != n_before {
             let what = format!(
                 "tile {tile} has {n_found} samples per pixel where {n_before} were expected: another process works on it"
@@ -306,11 +302,8 @@ impl Writer {
             Unit::Weights(unit) => (aside.write_weights(base.as_ref(), samples, n_unit, unit)?, Held::Weights),
         };
         record.checksums[TileArray::WITHOUT_LAYERS..].copy_from_slice(&layers);
-        record.looks = base_looks;
-        if let Some(floor) = self.floor.get() {
-            let pixels = cube.grid().rect(tile).pixels();
-            record.looks = floor.looks(record.looks, &record, cube.header().epoch, pixels);
-        }
+        let (epoch, pixels) = (cube.header().epoch, cube.grid().rect(tile).pixels());
+        record.looks = self.floor.get().map_or(seen, |floor| floor.looks(seen, &record, epoch, pixels));
         self.insert(aside, base, record, held);
         Ok(())
     }
@@ -592,7 +585,7 @@ impl<'a> Aside<'a> {
             samples,
             epoch: epochs_in(samples, cube.header().epoch).saturating_sub(1),
             suffix: self.suffix,
-            looks: [f32::INFINITY; 2],
+            looks: UNSEEN,
             checksums: checksums_of([radiance, samples_sum, preview, overview, errors]),
             spread,
             square,
@@ -635,7 +628,7 @@ impl<'a> Aside<'a> {
             samples,
             epoch: epochs_in(samples, epoch).saturating_sub(1),
             suffix: self.suffix,
-            looks: [f32::INFINITY; 2],
+            looks: UNSEEN,
             checksums: checksums_of([weights_sum, samples_sum, preview, overview, products_sum]),
             spread,
             square,

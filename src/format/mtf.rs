@@ -50,11 +50,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Read<MtfTable> {
     let (mut cycles_per_mm, mut values) = (Vec::new(), Vec::new());
     for row in &table.rows {
         table.check_row(row)?;
-        let cell = |column: usize| {
-            let missing =
-                || table.problem(Some(row.line), "has no number in one of its columns".to_owned(), "fill the gap");
-            table.number(row, column)?.ok_or_else(missing)
-        };
+        let cell = |column: usize| table.filled(row, column);
         let (frequency, value) = (cell(0)?, cell(1)?);
         if table.is_percent(row, 1) || !(0.0..=1.0).contains(&value) {
             let message = format!("an MTF is from 0 to 1, but is {} here", row.cells.get(1).unwrap_or_default());

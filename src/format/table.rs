@@ -376,6 +376,12 @@ impl Table<'_> {
         }
     }
 
+    /// The same of a column in which no cell may be empty.
+    pub fn filled(&self, row: &Row, column: usize) -> Read<f64> {
+        let missing = || self.problem(Some(row.line), "has no number in one of its columns".to_owned(), "fill the gap");
+        self.number(row, column)?.ok_or_else(missing)
+    }
+
     /// Whether a cell says by itself that its number is percent.
     pub fn is_percent(&self, row: &Row, column: usize) -> bool {
         row.cells.get(column).is_some_and(|cell| cell.ends_with('%'))
@@ -628,6 +634,14 @@ fn join_names(words: &[&str], width: usize) -> Option<Vec<String>> {
         depth += opens;
     }
     (names.len() == width).then_some(names)
+}
+
+/// Of a table whose columns are known by name: the first that is none of `known`, or that stands for the second time, which is told.
+pub fn stray(names: &[String], known: &[&str]) -> Option<(usize, bool)> {
+    names.iter().enumerate().find_map(|(i, name)| {
+        let is_twice = names[..i].contains(name);
+        (is_twice || !known.contains(&name.as_str())).then_some((i, is_twice))
+    })
 }
 
 /// The beginning of what a file says, fit for a message.

@@ -38,18 +38,14 @@ pub fn parse(bytes: &[u8], path: &Path) -> Read<Vec<Station>> {
     table.check_metres()?;
     let help =
         "begin the file with x,y,z,yaw_degrees,pitch_degrees,roll_degrees, of which the last three may be left out";
-    let column = |name: &str| table.names.iter().position(|found| found.trim().eq_ignore_ascii_case(name));
-    let known = |name: &String| POSITION.iter().chain(&TURNS).any(|known| name.trim().eq_ignore_ascii_case(known));
-    if let Some(name) = table.names.iter().find(|name| !known(name)) {
-        let message = format!("has a column `{}`, which says nothing of a line", table::shown(name));
+    let names: Vec<String> = table.names.iter().map(|name| name.trim().to_lowercase()).collect();
+    if let Some((i, is_twice)) = table::stray(&names, &[POSITION, TURNS].concat()) {
+        let (why, help) =
+            if is_twice { ("twice", "keep one of the two") } else { ("which says nothing of a line", help) };
+        let message = format!("has a column `{}`, {why}", table::shown(&table.names[i]));
         return Err(table.problem(Some(table.line), message, help));
     }
-    let lower = |name: &String| name.trim().to_lowercase();
-    let twice = |i: usize| table.names[..i].iter().any(|other| lower(other) == lower(&table.names[i]));
-    if let Some(i) = (0..table.names.len()).find(|i| twice(*i)) {
-        let message = format!("has a column `{}`, twice", table::shown(&table.names[i]));
-        return Err(table.problem(Some(table.line), message, "keep one of the two"));
-    }
+    let column = |name: &str| names.iter().position(|found| found == name);
     let mut position = [0; 3];
     for (place, name) in position.iter_mut().zip(POSITION) {
         *place =
@@ -59,11 +55,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Read<Vec<Station>> {
     let mut stations = Vec::with_capacity(table.rows.len());
     for row in &table.rows {
         table.check_row(row)?;
-        let cell = |column: usize| {
-            let missing =
-                || table.problem(Some(row.line), "has no number in one of its columns".to_owned(), "fill the gap");
-            table.number(row, column)?.ok_or_else(missing)
-        };
+        let cell = |column: usize| table.filled(row, column);
         let turn = |column: Option<usize>| column.map_or(Ok(0.0), cell);
         stations.push(Station {
             position: [cell(position[0])?, cell(position[1])?, cell(position[2])?],

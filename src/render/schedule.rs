@@ -387,13 +387,18 @@ impl<'a> Render<'a> {
             let whole = f64::from(self.status.units.1) / f64::from((self.status.units.1 - there).max(1));
             let seconds = began.elapsed().saturating_sub(self.rested() - rested).as_secs_f64();
             self.last_epoch = Some((n, seconds * whole));
-            self.update_estimate(cube);
-            if let Some(feed) = &self.job.feed {
-                feed.epoch(&self.status);
-            }
-            observe(Event::Epoch(&self.status))?;
+            self.tell_epoch(cube, observe)?;
         }
         unreachable!("epochs go on until a stop rule ends them")
+    }
+
+    /// Tells that an epoch has ended.
+    fn tell_epoch(&mut self, cube: &Writer, observe: &mut dyn FnMut(Event) -> Result<()>) -> Result<()> {
+        self.update_estimate(cube);
+        if let Some(feed) = &self.job.feed {
+            feed.epoch(&self.status);
+        }
+        observe(Event::Epoch(&self.status))
     }
 
     /// How many epochs may be rendered while `epoch` is the current one. Where only the number of samples decides, all

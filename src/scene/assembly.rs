@@ -155,17 +155,10 @@ impl Columns {
         let all = |wanted: &[&str]| wanted.iter().map(|name| place(name)).collect::<Option<Vec<usize>>>();
         let is_matrix = MATRIX.iter().any(|name| place(name).is_some());
         let known: &[&str] = if is_matrix { &MATRIX } else { &["x", "y", "z", "yaw_degrees", "scale"] };
-        let mut seen = Vec::new();
-        for (name, written) in names.iter().zip(&table.names) {
-            if !known.contains(&name.as_str()) || seen.contains(&name) {
-                let what = if seen.contains(&name) { "twice" } else { "which no placement has" };
-                return Err(table.problem(
-                    Some(table.line),
-                    format!("has a column `{}`, {what}", written.trim()),
-                    HELP,
-                ));
-            }
-            seen.push(name);
+        if let Some((i, is_twice)) = table::stray(&names, known) {
+            let why = if is_twice { "twice" } else { "which no placement has" };
+            let message = format!("has a column `{}`, {why}", table.names[i].trim());
+            return Err(table.problem(Some(table.line), message, HELP));
         }
         let missing = |wanted: &[&str]| {
             let missing = wanted.iter().filter(|name| place(name).is_none());

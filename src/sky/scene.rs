@@ -56,11 +56,11 @@ impl Atmosphere {
 
     fn components(&self) -> impl Iterator<Item = Component> {
         let all = [
-            (true, "molecules", MOLECULES),
-            (self.aerosol_depth > 0.0, "aerosol", AEROSOL),
-            (self.water > 0.0, "water", WATER),
-            (self.ozone > 0.0, "ozone", OZONE),
-            (true, "mixed", MIXED),
+            (true, "molecules", MOLECULES.to_owned()),
+            (self.aerosol_depth > 0.0, "aerosol", AEROSOL.to_owned()),
+            (self.water > 0.0, "water", absorber("water", "water")),
+            (self.ozone > 0.0, "ozone", absorber("ozone", "ozone")),
+            (true, "mixed", absorber("mixed gases", "mixed")),
         ];
         all.into_iter().filter(|(is_there, ..)| *is_there).map(|(_, name, text)| Component { name, text })
     }
@@ -176,7 +176,7 @@ impl Atmosphere {
 /// A kind of matter: its grid is `NAME.zarr`, each layer's share of the column, per kilometre.
 struct Component {
     name: &'static str,
-    text: &'static str,
+    text: String,
 }
 
 const MOLECULES: &str = r#"
@@ -192,21 +192,12 @@ absorption = { file = "particles.csv", column = "aerosol absorption (1/km)" }
 phase = { hg = { file = "particles.csv", column = "asymmetry" } }
 density = { grid = "aerosol.zarr" }
 "#;
-const WATER: &str = r#"
-[[media.air.components]]
-absorption = { file = "gases.csv", column = "water (1/km)" }
-density = { grid = "water.zarr" }
-"#;
-const OZONE: &str = r#"
-[[media.air.components]]
-absorption = { file = "gases.csv", column = "ozone (1/km)" }
-density = { grid = "ozone.zarr" }
-"#;
-const MIXED: &str = r#"
-[[media.air.components]]
-absorption = { file = "gases.csv", column = "mixed gases (1/km)" }
-density = { grid = "mixed.zarr" }
-"#;
+/// Matter that absorbs only: a column of `gases.csv`, and its grid.
+fn absorber(column: &str, name: &str) -> String {
+    format!(
+        "\n[[media.air.components]]\nabsorption = {{ file = \"gases.csv\", column = \"{column} (1/km)\" }}\ndensity = {{ grid = \"{name}.zarr\" }}\n"
+    )
+}
 
 /// A grid [z, 1, 1] of f32, the lowest layer empty: it is below the ground.
 fn write_column(path: &Path, shares: &[f64; LAYERS]) -> std::io::Result<()> {

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use super::{Event, Render};
-use crate::cube::{Writer, epochs_in, next_look, samples_before};
+use crate::cube::{Writer, epochs_in, is_within, next_look, samples_before};
 use crate::preview::TileEnds;
 use crate::render::pool::{Merged, Report};
 use crate::render::queue::Queue;
@@ -81,7 +81,7 @@ impl Tiles {
 
     /// What the errors seen at the last two looks say of a tile with `samples` per pixel.
     fn judge(&self, samples: u32, looks: [f32; 2]) -> Result<Verdict> {
-        if looks.iter().all(|look| f64::from(*look) <= self.error) {
+        if is_within(looks, self.error) {
             return Ok(Verdict::Exact);
         }
         if self.limit.is_some_and(|limit| samples >= limit) {
@@ -121,6 +121,7 @@ impl Render<'_> {
             self.judge(&mut tiles, tile, cube, queue)?;
         }
         self.look_at_all(&tiles, cube);
+        self.update_estimate(cube);
         // An epoch is as many units as there are tiles, whichever.
         let (mut units, mut groups) = (0, 0u32);
         while self.status.units.0 < self.status.units.1 {
@@ -151,10 +152,7 @@ impl Render<'_> {
 
     fn end_epoch(&mut self, tiles: &Tiles, cube: &Writer, observe: &mut dyn FnMut(Event) -> Result<()>) -> Result<()> {
         self.look_at_all(tiles, cube);
-        if let Some(feed) = &self.job.feed {
-            feed.epoch(&self.status);
-        }
-        observe(Event::Epoch(&self.status))
+        self.tell_epoch(cube, observe)
     }
 
     /// Decides whether a tile goes on, and how far.
@@ -196,9 +194,14 @@ impl Render<'_> {
                 self.judge(tiles, tile, cube, queue)?;
             }
         }
+        self.tell_least(tiles);
+        self.note_group(cube, queue, device, merged, observe)
+    }
+
+    /// Puts into the status how many samples every tile has at least; no epoch is under way that all of them are in.
+    fn tell_least(&mut self, tiles: &Tiles) {
         self.status.samples = tiles.least();
         self.status.samples_next = self.status.samples;
-        self.note_group(cube, queue, device, merged, observe)
     }
 
     /// Puts into the status what asks for a look at every tile.
@@ -208,8 +211,7 @@ impl Render<'_> {
         if let Some(ends) = &mut self.status.tiles {
             ends.worst = worst;
         }
-        self.status.samples = tiles.least();
-        self.status.samples_next = self.status.samples;
+        self.tell_least(tiles);
         // Errors fall with the square root of the samples.
         self.paths_needed = worst.map(|_| {
             let left = going_on().map(|(number, tile)| {
@@ -220,7 +222,6 @@ impl Render<'_> {
             });
             self.status.paths as f64 + left.sum::<f64>()
         });
-        self.update_estimate(cube);
     }
 
     /// Whether another group would not fit into the time that is left, by the mean of those that there were.
