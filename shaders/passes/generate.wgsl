@@ -172,6 +172,7 @@ fn generate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroup
     site.from_front = dot(site.surface.normal, path.ray.direction) < 0.0;
     site.face = select(-site.surface.normal, site.surface.normal, site.from_front);
     v = vertex_at(meeting.hit, site.surface, site.from_front, -path.ray.direction);
+#lines VERTEX
 
     // What it emits.
 #lines EMIT

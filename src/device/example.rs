@@ -10,7 +10,8 @@ use crate::device::part::{PARTS, Part};
 use crate::scene::{
     Absorber, Assembly, Attributes, Bsdf, Component, Cone, Distortion, Emission, Environment, EnvironmentMap, Field,
     Grid, Interior, Light, Material, Medium, Mesh, Object, Phase, PhaseTable, Placement, Profile, Projection,
-    Reflectance, Scattering, Scene, Shape, Sides, Spectrum, Temperature, Texels, Texture, TextureKind, Weight,
+    Reflectance, Roughness, Scattering, Scene, Shape, Sides, Spectrum, Temperature, Texels, Texture, TextureKind,
+    Weight,
 };
 use crate::spectral::{Curve, Outside};
 
@@ -137,13 +138,16 @@ impl Exhibit {
 
     fn metal(&mut self, roughness: [f64; 2]) -> Bsdf {
         let (eta, k) = (self.index(), self.spectrum(Curve::Constant(3.0)));
-        Bsdf::Conductor { eta, k, roughness, energy_compensation: true }
+        Bsdf::Conductor { eta, k, roughness: Roughness::Constant(roughness), energy_compensation: true }
     }
 
     /// Varnish, a mirror, rough metal.
     pub fn add_surfaces(&mut self) {
         let (grey, eta) = (self.spectrum(Curve::Constant(0.5)), self.index());
-        self.add_ball(Bsdf::Plastic { reflectance: Reflectance::Spectrum(grey), eta, roughness: 0.0 }, None);
+        self.add_ball(
+            Bsdf::Plastic { reflectance: Reflectance::Spectrum(grey), eta, roughness: Roughness::even(0.0) },
+            None,
+        );
         for roughness in [[0.0; 2], [0.2; 2]] {
             let metal = self.metal(roughness);
             self.add_ball(metal, None);
@@ -169,14 +173,24 @@ impl Exhibit {
         self.add_ball(metal, None);
     }
 
+    /// A metal, glass and varnish.
+    pub fn add_roughness_textures(&mut self) {
+        let roughness = Roughness::Texture(self.texture(TextureKind::Number, &[0.1, 0.2, 0.3, 0.4]));
+        let (grey, eta) = (Reflectance::Spectrum(self.spectrum(Curve::Constant(0.5))), self.index());
+        let k = self.spectrum(Curve::Constant(3.0));
+        self.add_ball(Bsdf::Conductor { eta, k, roughness, energy_compensation: true }, None);
+        self.add_ball(Bsdf::Dielectric { eta, dispersion: true, roughness }, None);
+        self.add_ball(Bsdf::Plastic { reflectance: grey, eta, roughness }, None);
+    }
+
     pub fn add_rough_glass(&mut self) {
         let eta = self.index();
-        self.add_ball(Bsdf::Dielectric { eta, dispersion: true, roughness: 0.2 }, None);
+        self.add_ball(Bsdf::Dielectric { eta, dispersion: true, roughness: Roughness::even(0.2) }, None);
     }
 
     pub fn add_glass(&mut self) {
         let eta = self.index();
-        self.add_ball(Bsdf::Dielectric { eta, dispersion: true, roughness: 0.0 }, None);
+        self.add_ball(Bsdf::Dielectric { eta, dispersion: true, roughness: Roughness::even(0.0) }, None);
     }
 
     /// Colours, a mixture under a rough coat, and a mask.
@@ -186,7 +200,7 @@ impl Exhibit {
         self.scene.textures[weight].placement.scale = DVec2::splat(2.0);
         let (mixture, eta) = (self.mixture(), self.index());
         let a = self.add_ball(Bsdf::Diffuse { reflectance: Reflectance::Texture(colour) }, None);
-        let coated = Bsdf::Plastic { reflectance: Reflectance::Texture(mixture), eta, roughness: 0.2 };
+        let coated = Bsdf::Plastic { reflectance: Reflectance::Texture(mixture), eta, roughness: Roughness::even(0.2) };
         let b = self.add_ball(coated, None);
         self.add_ball(Bsdf::Blend { a, b, weight: Weight::Texture(weight) }, None);
     }
@@ -219,7 +233,7 @@ impl Exhibit {
         let (mixture, eta, metal) = (Reflectance::Texture(self.mixture()), self.index(), self.metal([0.3, 0.1]));
         self.add_ball(metal, cold);
         self.add_ball(Bsdf::Diffuse { reflectance: mixture }, cold);
-        self.add_ball(Bsdf::Plastic { reflectance: mixture, eta, roughness: 0.2 }, cold);
+        self.add_ball(Bsdf::Plastic { reflectance: mixture, eta, roughness: Roughness::even(0.2) }, cold);
         let dark = Reflectance::Spectrum(self.spectrum(Curve::Constant(0.1)));
         self.add_ball(Bsdf::Translucent { reflectance: mixture, transmittance: dark }, cold);
         self.add_picture_lamp();

@@ -5,8 +5,8 @@ use std::ops::Deref;
 
 use crate::device::example::Exhibit;
 use crate::device::parts::{
-    attributes, camera, geometry, heat, instances, layers, lights, media, opacity, paths, scattering, sky, spectra,
-    surfaces, textures,
+    attributes, camera, geometry, heat, instances, layers, lights, media, opacity, paths, roughness, scattering, sky,
+    spectra, surfaces, textures,
 };
 use crate::device::prepared::Prepared;
 use crate::device::text::{Defines, Module};
@@ -68,6 +68,7 @@ pub const PARTS: &[&Part] = &[
     &surfaces::BRUSHED,
     &surfaces::TABLES_IN_EVALUATION,
     &textures::TEXTURES,
+    &roughness::ROUGHNESS,
     &attributes::ATTRIBUTES,
     &attributes::SMOOTH,
     &lights::AIMS,

@@ -114,6 +114,12 @@ constants! {
     LOBE_AGAIN {
         LOBE_BOUNDED = 0x2000;
     }
+    /// And: the roughness is a texture. `rows` says where the words about it stand among those of textures.
+    VARIES {
+        LOBE_VARIES = 0x4000;
+        /// What there is in tables is there at so many even steps of √α from 0 to 1.
+        ROUGHNESS_STEPS = 32;
+    }
     /// And the bits above it.
     LOBE_FLAGS {
         LOBE_OPAQUE = 0x100;

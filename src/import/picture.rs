@@ -260,6 +260,75 @@ pub struct Texture {
     pub file: Option<PathBuf>,
 }
 
+/// GGX's α: along u and along v, or the text of a texture and its mean.
+pub enum Rough {
+    Pair([f64; 2]),
+    Texture(String, f64),
+}
+
+/// A scene has mirrors below this, and no texture says less.
+const LEAST_ROUGH: f64 = 1e-3;
+
+impl Rough {
+    /// As text for what is as rough in all directions, the geometric mean; `None` for what is smooth.
+    pub fn even(&self) -> Option<String> {
+        match self {
+            Rough::Pair(_) => Some(self.mean()).filter(|alpha| *alpha > 0.0).map(text::rounded),
+            Rough::Texture(text, _) => Some(text.clone()),
+        }
+    }
+
+    pub fn is_texture(&self) -> bool {
+        matches!(self, Rough::Texture(..))
+    }
+
+    /// The two of a brushed surface.
+    pub fn brushed(&self) -> Option<[f64; 2]> {
+        match self {
+            Rough::Pair(both @ [u, v]) => Some(*both).filter(|_| u != v && u.min(*v) >= LEAST_ROUGH),
+            Rough::Texture(..) => None,
+        }
+    }
+
+    /// One number for all of it.
+    pub fn mean(&self) -> f64 {
+        match self {
+            Rough::Pair([u, v]) => (u * v).sqrt(),
+            Rough::Texture(_, mean) => *mean,
+        }
+    }
+}
+
+/// The number that a texel is.
+pub fn grey(rgb: [f32; 3]) -> f64 {
+    rgb.into_iter().map(f64::from).sum::<f64>() / 3.0
+}
+
+impl Texture {
+    /// The roughness that the texels say, by `alpha` of each one's number; one number where they are all alike.
+    pub fn rough(
+        &self,
+        scene: &mut Scene,
+        name: &str,
+        number: &dyn Fn([f32; 3]) -> f64,
+        alpha: &dyn Fn(f64) -> f64,
+    ) -> Result<Rough> {
+        let alphas: Vec<f32> =
+            self.picture.linear().into_iter().map(|rgb| alpha(number(rgb)).clamp(LEAST_ROUGH, 1.0) as f32).collect();
+        if let [first, rest @ ..] = &alphas[..]
+            && rest.iter().all(|alpha| alpha == first)
+        {
+            return Ok(Rough::Pair([f64::from(*first); 2]));
+        }
+        let mean = alphas.iter().map(|alpha| f64::from(*alpha)).sum::<f64>() / alphas.len().max(1) as f64;
+        let texels = Texels::Floats(alphas.into_iter().map(|alpha| [alpha; 3]).collect());
+        let picture = Picture { size: self.picture.size, texels };
+        let texture =
+            Texture { picture, name: format!("{name}-roughness.exr"), endmembers: None, file: None, ..self.clone() };
+        Ok(Rough::Texture(texture.toml(scene, "")?, mean))
+    }
+}
+
 impl Colour {
     pub fn grey(value: f64) -> Colour {
         Colour::Spectrum(Curve::Constant(value), None)

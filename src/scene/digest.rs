@@ -9,8 +9,8 @@ use sha2::{Digest, Sha256};
 use super::{
     Absorber, Assembly, Attributes, Bsdf, Camera, Component, Cone, Distortion, Emission, Environment, EnvironmentMap,
     Evaluation, Field, Film, Filter, Grid, Integrator, Interior, Light, Line, Material, Medium, Mesh, Object, Phase,
-    PhaseTable, Placement, Profile, Projection, Reflectance, Sampler, Scattering, Scene, Shape, Sides, Spectrum,
-    Temperature, Texels, Texture, TextureFilter, TextureKind, Wavelengths, Weight,
+    PhaseTable, Placement, Profile, Projection, Reflectance, Roughness, Sampler, Scattering, Scene, Shape, Sides,
+    Spectrum, Temperature, Texels, Texture, TextureFilter, TextureKind, Wavelengths, Weight,
 };
 use crate::spectral::{Channels, Curve, Outside};
 
@@ -270,19 +270,19 @@ impl Hash {
                 self.tag(2);
                 self.count(*eta);
                 self.count(*k);
-                self.numbers(roughness);
+                self.roughness(roughness, 2);
                 self.tag(u8::from(*energy_compensation));
             }
             Bsdf::Dielectric { eta, dispersion, roughness } => {
                 self.tag(3);
                 self.count(*eta);
                 self.tag(u8::from(*dispersion));
-                self.number(*roughness);
+                self.roughness(roughness, 1);
             }
             Bsdf::Plastic { reflectance, eta, roughness } => {
                 self.reflectance([4, 7], reflectance);
                 self.count(*eta);
-                self.number(*roughness);
+                self.roughness(roughness, 1);
             }
             Bsdf::Blend { a, b, weight } => {
                 match weight {
@@ -319,6 +319,18 @@ impl Hash {
             }
             Reflectance::Texture(texture) => {
                 self.tag(of_texture);
+                self.count(*texture);
+            }
+        }
+    }
+
+    /// One number of what has the same in all directions.
+    fn roughness(&mut self, roughness: &Roughness, directions: usize) {
+        match roughness {
+            Roughness::Constant(alpha) if directions == 1 => self.number(alpha[0]),
+            Roughness::Constant(alpha) => self.numbers(alpha),
+            Roughness::Texture(texture) => {
+                self.tag(102);
                 self.count(*texture);
             }
         }

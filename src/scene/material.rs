@@ -7,7 +7,7 @@ use super::spectrum::{Handle, Quantity, Spectra};
 use super::texture::{self, Number, Textures, is_texture};
 use super::translucent;
 use super::tree::Value;
-use super::{Bsdf, Material, MaterialId, Reflectance, SMOOTH, Temperature, Texture, Weight};
+use super::{Bsdf, Material, MaterialId, Reflectance, Roughness, SMOOTH, Temperature, Texture, Weight};
 use crate::format::unit;
 
 /// K. The peak of Planck's radiance there is 4e33 W m⁻² sr⁻¹ nm⁻¹, near the end of f32.
@@ -18,14 +18,16 @@ const ETA: &str = "eta = 1.5, or the name of a spectrum";
 
 /// Why something cannot have a temperature.
 const TRANSPARENT: &str = "absorbs nothing, so it emits nothing and has no temperature";
+const ROUGH_BY_TEXTURE: &str = "has a roughness by texture, with which no temperature is supported yet";
+const ONE_ROUGHNESS: &str = "remove it, or give one number for the roughness";
 
 /// A material as the file defines it.
 pub enum Kind<'a> {
     Diffuse { reflectance: Reflects },
     Translucent { reflectance: Reflects, transmittance: Reflects },
-    Conductor { eta: Handle, k: Handle, roughness: [f64; 2], energy_compensation: bool },
-    Dielectric { eta: Handle, dispersion: bool, roughness: f64 },
-    Plastic { reflectance: Reflects, eta: Handle, roughness: f64 },
+    Conductor { eta: Handle, k: Handle, roughness: Rough, energy_compensation: bool },
+    Dielectric { eta: Handle, dispersion: bool, roughness: Rough },
+    Plastic { reflectance: Reflects, eta: Handle, roughness: Rough },
     Blend { parts: Parts<'a>, weight: Varying },
     Black,
 }
@@ -34,6 +36,13 @@ pub enum Kind<'a> {
 #[derive(Clone, Copy)]
 pub enum Reflects {
     Spectrum(Handle),
+    Texture(texture::Handle),
+}
+
+/// GGX's α: along the tangent and across it, or by place.
+#[derive(Clone, Copy)]
+pub enum Rough {
+    Constant([f64; 2]),
     Texture(texture::Handle),
 }
 
@@ -131,14 +140,17 @@ impl<'a> Materials<'a> {
                 transmittance: self.take_reflectance(transmittance, spectra),
             },
             Kind::Conductor { eta, k, roughness, energy_compensation } => {
-                Bsdf::Conductor { eta: spectra.take(eta), k: spectra.take(k), roughness, energy_compensation }
+                let (eta, k, roughness) = (spectra.take(eta), spectra.take(k), self.take_roughness(roughness, spectra));
+                Bsdf::Conductor { eta, k, roughness, energy_compensation }
             }
             Kind::Dielectric { eta, dispersion, roughness } => {
-                Bsdf::Dielectric { eta: spectra.take(eta), dispersion, roughness }
+                let (eta, roughness) = (spectra.take(eta), self.take_roughness(roughness, spectra));
+                Bsdf::Dielectric { eta, dispersion, roughness }
             }
             Kind::Plastic { reflectance, eta, roughness } => {
                 let reflectance = self.take_reflectance(reflectance, spectra);
-                Bsdf::Plastic { reflectance, eta: spectra.take(eta), roughness }
+                let (eta, roughness) = (spectra.take(eta), self.take_roughness(roughness, spectra));
+                Bsdf::Plastic { reflectance, eta, roughness }
             }
             Kind::Blend { ref parts, weight } => {
                 let [a, b] = parts.indices?;
@@ -166,6 +178,13 @@ impl<'a> Materials<'a> {
         }
     }
 
+    fn take_roughness(&mut self, roughness: Rough, spectra: &mut Spectra) -> Roughness {
+        match roughness {
+            Rough::Constant(alpha) => Roughness::Constant(alpha),
+            Rough::Texture(handle) => Roughness::Texture(self.textures.take(handle, spectra)),
+        }
+    }
+
     /// The textures of the file, which emissions have too.
     pub fn textures(&mut self) -> &mut Textures {
         &mut self.textures
@@ -182,13 +201,20 @@ impl<'a> Materials<'a> {
             |reflectance| Needs { uv: matches!(reflectance, Reflectance::Texture(_)), tangent: false, normal: true };
         let material = &self.scene[id];
         let needs = match material.bsdf {
-            Bsdf::Diffuse { reflectance } | Bsdf::Plastic { reflectance, .. } => textured(reflectance),
+            Bsdf::Diffuse { reflectance } => textured(reflectance),
+            Bsdf::Plastic { reflectance, roughness, .. } => {
+                let needs = textured(reflectance);
+                Needs { uv: needs.uv || matches!(roughness, Roughness::Texture(_)), ..needs }
+            }
             Bsdf::Translucent { reflectance, transmittance } => {
                 let (a, b) = (textured(reflectance), textured(transmittance));
                 Needs { uv: a.uv || b.uv, ..a }
             }
-            Bsdf::Conductor { roughness: [x, y], .. } => Needs { uv: false, tangent: x != y, normal: true },
-            Bsdf::Dielectric { .. } => Needs { uv: false, tangent: false, normal: true },
+            Bsdf::Conductor { roughness, .. } | Bsdf::Dielectric { roughness, .. } => Needs {
+                uv: matches!(roughness, Roughness::Texture(_)),
+                tangent: matches!(roughness, Roughness::Constant([x, y]) if x != y),
+                normal: true,
+            },
             Bsdf::Blend { a, b, weight } => {
                 let (a, b) = (self.needs(a), self.needs(b));
                 Needs {
@@ -208,18 +234,39 @@ impl<'a> Materials<'a> {
         (self.scene, self.textures.finish())
     }
 
-    /// Reports blends with a temperature of which no part can be hot, and leaves `None` in their place.
+    /// Reports blends with a temperature of which no part can be hot, or some part with this temperature cannot, and leaves `None` in their
+    /// place.
     fn check_temperatures(&mut self, item: Option<&Item<'a>>) {
         for i in 0..self.declared.len() {
             let (name, Some(declared)) = &self.declared[i] else { continue };
-            if declared.temperature.is_none() || self.absorbs(i) {
+            if declared.temperature.is_none() {
                 continue;
             }
-            let blend = item.and_then(|item| item.member(name)?.member("blend")?.member("temperature"));
-            if let Some(item) = blend {
-                item.error_help(format!("all that \"{name}\" blends {TRANSPARENT}"), "remove it");
+            let (problem, help) = match (self.absorbs(i), self.rough_by_texture(i)) {
+                (false, _) => (format!("all that \"{name}\" blends {TRANSPARENT}"), "remove it"),
+                (_, Some(part)) => (format!("\"{part}\" {ROUGH_BY_TEXTURE}"), ONE_ROUGHNESS),
+                (true, None) => continue,
+            };
+            let kinds = ["blend", "conductor", "plastic"];
+            let of_kind =
+                |material: &Item<'a>| kinds.iter().find_map(|kind| material.member(kind)?.member("temperature"));
+            if let Some(item) = item.and_then(|item| of_kind(&item.member(name)?)) {
+                item.error_help(problem, help);
             }
             self.declared[i].1 = None;
+        }
+    }
+
+    /// The name of a part that is hot by the temperature of this material, and whose roughness is a texture.
+    fn rough_by_texture(&self, index: usize) -> Option<&'a str> {
+        let (name, declared) = &self.declared[index];
+        match &declared.as_ref()?.kind {
+            Kind::Conductor { roughness: Rough::Texture(_), .. }
+            | Kind::Plastic { roughness: Rough::Texture(_), .. } => Some(name),
+            Kind::Blend { parts: Parts { indices: Some(indices), .. }, .. } => {
+                indices.iter().find_map(|&part| self.rough_by_texture(part))
+            }
+            _ => None,
         }
     }
 
@@ -276,13 +323,13 @@ fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>, textures: &mut Texture
         }
         Some("conductor") => {
             let fields = kind.table(&keys::CONDUCTOR)?;
-            let kind = conductor(&fields, spectra);
+            let kind = conductor(&fields, spectra, textures);
             (fields, kind)
         }
         Some("dielectric") => {
             let fields = kind.table(&keys::DIELECTRIC)?;
             let eta = spectrum(&fields, "eta", ETA, Quantity::Index, spectra);
-            let (dispersion, roughness) = (boolean(&fields, "dispersion", true), roughness(&fields));
+            let (dispersion, roughness) = (boolean(&fields, "dispersion", true), roughness(&fields, textures));
             let opacity = opacity(&fields, textures);
             if let Some(item) = fields.get("temperature") {
                 item.error_help(
@@ -303,7 +350,7 @@ fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>, textures: &mut Texture
             let fields = kind.table(&keys::PLASTIC)?;
             let reflectance = reflects(&fields, spectra, textures);
             let eta = spectrum(&fields, "eta", ETA, Quantity::CoatIndex, spectra);
-            let kind = match (reflectance, eta, roughness(&fields)) {
+            let kind = match (reflectance, eta, roughness(&fields, textures)) {
                 (Some(reflectance), Some(eta), Some(roughness)) => Some(Kind::Plastic { reflectance, eta, roughness }),
                 _ => None,
             };
@@ -322,7 +369,7 @@ fn decode<'a>(item: &Item<'a>, spectra: &mut Spectra<'a>, textures: &mut Texture
     Some(Declared { kind: kind?, two_sided: two_sided?, temperature: temperature?, opacity: opacity?, taken: None })
 }
 
-fn conductor<'a>(fields: &Fields<'a>, spectra: &mut Spectra<'a>) -> Option<Kind<'a>> {
+fn conductor<'a>(fields: &Fields<'a>, spectra: &mut Spectra<'a>, textures: &mut Textures) -> Option<Kind<'a>> {
     let index = match (fields.get("nk"), fields.get("eta").or(fields.get("k"))) {
         (Some(_), Some(other)) => {
             other.error_help("goes without `nk` only", "keep `nk`, or `eta` and `k`");
@@ -340,9 +387,8 @@ fn conductor<'a>(fields: &Fields<'a>, spectra: &mut Spectra<'a>) -> Option<Kind<
         }
     };
     let roughness = match fields.get("roughness") {
-        None => Some([0.0; 2]),
-        Some(item) if matches!(item.node.value, Value::Array(_)) => anisotropic_roughness(&item),
-        Some(item) => alpha(&item).map(|alpha| [alpha; 2]),
+        Some(item) if matches!(item.node.value, Value::Array(_)) => anisotropic_roughness(&item).map(Rough::Constant),
+        _ => roughness(fields, textures),
     };
     let energy_compensation = boolean(fields, "energy_compensation", true);
     let (eta, k) = index?;
@@ -364,18 +410,15 @@ fn anisotropic_roughness(item: &Item) -> Option<[f64; 2]> {
 }
 
 fn alpha(item: &Item) -> Option<f64> {
-    if is_texture(item) {
-        item.error_help(
-            "a roughness by texture is not supported yet",
-            "give one number, or `blend` a rough and a smooth material by the texture",
-        );
-        return None;
-    }
     item.number_where(|alpha| (0.0..=1.0).contains(&alpha), "a GGX roughness in [0, 1]")
 }
 
-fn roughness(fields: &Fields) -> Option<f64> {
-    fields.get("roughness").map_or(Some(0.0), |item| alpha(&item))
+fn roughness(fields: &Fields, textures: &mut Textures) -> Option<Rough> {
+    let Some(item) = fields.get("roughness") else { return Some(Rough::Constant([0.0; 2])) };
+    if matches!(item.node.value, Value::Table(_)) {
+        return textures.number(&item, Number::Roughness).map(Rough::Texture);
+    }
+    alpha(&item).map(|alpha| Rough::Constant([alpha; 2]))
 }
 
 /// The outer `None` is a mistake that has been said.

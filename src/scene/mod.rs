@@ -279,7 +279,7 @@ pub enum Temperature {
     Texture(TextureId),
 }
 
-/// How a surface scatters. Roughness is the α of the GGX distribution in [0, 1]; what is below [`SMOOTH`] is smooth.
+/// How a surface scatters.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Bsdf {
     Diffuse {
@@ -294,8 +294,7 @@ pub enum Bsdf {
     Conductor {
         eta: SpectrumId,
         k: SpectrumId,
-        /// Along the tangent ([`Shape`]) and across it; both smooth or neither.
-        roughness: [f64; 2],
+        roughness: Roughness,
         energy_compensation: bool,
     },
     Dielectric {
@@ -303,13 +302,13 @@ pub enum Bsdf {
         eta: SpectrumId,
         /// Whether directions differ by wavelength where `eta` does.
         dispersion: bool,
-        roughness: f64,
+        roughness: Roughness,
     },
     /// A diffuse base under a dielectric coat.
     Plastic {
         reflectance: Reflectance,
         eta: SpectrumId,
-        roughness: f64,
+        roughness: Roughness,
     },
     /// (1 - weight) a + weight b. Parts come before the blend in [`Scene::materials`].
     Blend {
@@ -399,7 +398,31 @@ impl Texture {
     }
 }
 
-/// Roughness below this is none: a mirror, or ideal refraction.
+/// The α of the GGX distribution, in [0, 1].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Roughness {
+    /// Along the tangent ([`Shape`]) and across it, the same for what has one: both below [`SMOOTH`], which is smooth, or neither.
+    Constant([f64; 2]),
+    /// The same in all directions: a texture of [`TextureKind::Number`], whose numbers are [`SMOOTH`] at least.
+    Texture(TextureId),
+}
+
+impl Roughness {
+    /// The same all over and in all directions.
+    pub const fn even(alpha: f64) -> Roughness {
+        Roughness::Constant([alpha; 2])
+    }
+
+    /// That of a hot surface, which the scene file lets have but one.
+    pub fn of_hot_surface(self) -> [f64; 2] {
+        match self {
+            Roughness::Constant(alpha) => alpha,
+            Roughness::Texture(_) => unreachable!("a hot surface has one roughness all over"),
+        }
+    }
+}
+
+/// Roughness below this is none: a mirror, or ideal refraction. Where a texture says it, it is what is least.
 pub const SMOOTH: f64 = 1e-3;
 
 /// One shape of one material. An OBJ with several materials becomes several objects.

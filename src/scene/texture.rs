@@ -12,7 +12,7 @@ use super::decode::{Fields, Item, list};
 use super::keys;
 use super::spectrum::{self, Quantity, Spectra, report_in_file};
 use super::tree::Value;
-use super::{Placement, Texture, TextureFilter, TextureId, TextureKind};
+use super::{Placement, SMOOTH, Texture, TextureFilter, TextureId, TextureKind};
 use crate::format::image::{self, Format, Image, Plane, Rgb};
 use crate::format::noise::{self, Range};
 use crate::format::primaries::{self, White};
@@ -42,6 +42,8 @@ pub enum Number {
     Weight,
     /// Kelvin, not negative; no PNG holds them.
     Temperature,
+    /// GGX's α, in [0, 1]; below [`SMOOTH`] it counts as that.
+    Roughness,
 }
 
 #[derive(PartialEq)]
@@ -572,6 +574,19 @@ fn numbers(file: &Item, number: Number, image: &Image, name: &str) -> Option<(Ve
     let mut warnings = Vec::new();
     let samples = match number {
         Number::Weight => shares(file, image, name, plane, "a weight must lie in [0, 1]", &mut warnings)?,
+        Number::Roughness => {
+            let mut samples = shares(file, image, name, plane, "a roughness must lie in [0, 1]", &mut warnings)?;
+            let least = SMOOTH as f32;
+            let smoother = samples.iter().filter(|alpha| **alpha < least).count();
+            if smoother > 0 {
+                samples.iter_mut().for_each(|alpha| *alpha = alpha.max(least));
+                warnings.push(format!(
+                    "texture {name} has {smoother} of {} roughnesses below {SMOOTH}, which count as that: a texture has no mirrors",
+                    samples.len()
+                ));
+            }
+            samples
+        }
         Number::Temperature => {
             let samples = match kelvins(plane, image, name, &mut warnings) {
                 Ok(samples) => samples,

@@ -18,7 +18,7 @@ use crate::size;
 use crate::statistics::{Bound, Estimate, assert_agreement};
 use crate::truth;
 
-fn of_device(scene: &Scene, epochs: u32, samples: u32, seed: u64) -> Vec<Estimate> {
+pub fn of_device(scene: &Scene, epochs: u32, samples: u32, seed: u64) -> Vec<Estimate> {
     let ours = render(scene, epochs, samples, Settings { seed, tile: [8, 8], ..Settings::default() });
     ours.assert_clean();
     ours.values()
@@ -246,7 +246,7 @@ const USUAL: [u32; 2] = [256, 6000];
 /// Where every pixel sees much of the light.
 const FEW: [u32; 2] = [64, 1000];
 
-fn against_reference(what: &str, scene: &Scene, samples: [u32; 2], [pixel, image]: [f64; 2]) {
+pub fn against_reference(what: &str, scene: &Scene, samples: [u32; 2], [pixel, image]: [f64; 2]) {
     let channels = scene.channels.len();
     let theirs = of_reference(scene, samples[1], 31);
     let ours = render(scene, 16, samples[0], Settings { seed: 31, tile: [8, 8], ..Settings::default() });
@@ -272,7 +272,7 @@ fn slanted(blue: f64, red: f64) -> Curve {
 }
 
 /// A plate in a room with a lamp.
-fn room_with(add: impl FnOnce(Builder) -> Builder) -> Scene {
+pub fn room_with(add: impl FnOnce(Builder) -> Builder) -> Scene {
     let wide = Projection::Perspective { tan_half: DVec2::splat(0.5) };
     let b = Builder::new()
         .camera(look(DVec3::new(0.1, 0.2, 2.9), DVec3::new(0.0, -0.2, 0.0), DVec3::Y, wide))
@@ -284,7 +284,7 @@ fn room_with(add: impl FnOnce(Builder) -> Builder) -> Scene {
     add(b).build()
 }
 
-fn plate() -> Shape {
+pub fn plate() -> Shape {
     quad(DVec3::new(-0.7, -0.8, 0.1), DVec3::new(1.3, 0.0, -0.3), DVec3::new(0.0, 1.4, -0.4))
 }
 

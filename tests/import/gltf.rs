@@ -1,7 +1,7 @@
 //! Scenes of glTF 2.0.
 
 use glam::DVec3;
-use spectile::scene::{Bsdf, Light, Projection, Weight};
+use spectile::scene::{Bsdf, Light, Projection, Roughness, Weight};
 
 use super::{import, others, written};
 
@@ -44,7 +44,7 @@ fn cameras_lights_and_materials() {
     assert!(found.toml.contains("half_angle = 30.0"), "{}", found.toml);
     let of = |object: usize| &scene.materials[scene.objects[object].material.expect("one")];
     let Bsdf::Plastic { roughness, .. } = of(0).bsdf else { panic!("{:?}", of(0)) };
-    assert_eq!((roughness, of(0).opacity), (0.25, Some(Weight::Constant(0.25))));
+    assert_eq!((roughness, of(0).opacity), (Roughness::even(0.25), Some(Weight::Constant(0.25))));
     let Bsdf::Blend { b, weight: Weight::Constant(0.5), .. } = of(1).bsdf else { panic!("{:?}", of(1)) };
     let Bsdf::Conductor { eta, .. } = scene.materials[b].bsdf else { panic!("a metal") };
     // n = 3 reflects a quarter.

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use serde_json::Value;
-use spectile::scene::{Bsdf, Filter, Light, Projection, Reflectance, Shape, Sides, Weight};
+use spectile::scene::{Bsdf, Filter, Light, Projection, Reflectance, Roughness, Shape, Sides, Weight};
 
 use super::{Imported, import, others, written};
 use crate::binary;
@@ -129,7 +129,7 @@ fn materials_and_their_adapters() {
     let Bsdf::Blend { a, b, weight: Weight::Constant(0.875) } = scene.materials[b].bsdf else { panic!("{b}") };
     assert!(matches!(
         scene.materials[a].bsdf,
-        Bsdf::Conductor { roughness: [0.3, 0.3], energy_compensation: false, .. }
+        Bsdf::Conductor { roughness: Roughness::Constant([0.3, 0.3]), energy_compensation: false, .. }
     ));
     assert_eq!(scene.materials[b].bsdf, Bsdf::Black);
     let Bsdf::Dielectric { eta, .. } = of(3).bsdf else { panic!("{:?}", of(3)) };

@@ -3,6 +3,7 @@
 mod gltf;
 mod mitsuba;
 mod pbrt;
+mod roughness;
 mod spoilt;
 
 use std::path::{Path, PathBuf};

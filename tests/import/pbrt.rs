@@ -1,7 +1,7 @@
 //! Scenes of pbrt-v4.
 
 use glam::DVec3;
-use spectile::scene::{Bsdf, Light, Projection, Reflectance, Shape, Sides, Weight};
+use spectile::scene::{Bsdf, Light, Projection, Reflectance, Roughness, Shape, Sides, Weight};
 
 use super::{Imported, import, others, written};
 
@@ -131,8 +131,10 @@ Material "interface" Shape "sphere""#,
     assert!(matches!(of(1).bsdf, Bsdf::Blend { weight: Weight::Constant(0.75), .. }), "{:?}", of(1));
     // α is the square root.
     let metal = scene.materials.iter().find(|material| material.name == "gold").expect("gold");
-    assert!(matches!(metal.bsdf, Bsdf::Conductor { roughness: [0.2, 0.2], .. }), "{metal:?}");
-    let Bsdf::Dielectric { eta, roughness: 0.1, .. } = of(2).bsdf else { panic!("{:?}", of(2)) };
+    assert!(matches!(metal.bsdf, Bsdf::Conductor { roughness: Roughness::Constant([0.2, 0.2]), .. }), "{metal:?}");
+    let Bsdf::Dielectric { eta, roughness: Roughness::Constant([0.1, 0.1]), .. } = of(2).bsdf else {
+        panic!("{:?}", of(2))
+    };
     assert!((scene.spectra[eta].curve.eval(587.56) - 1.5168).abs() < 1e-4);
     assert!(matches!(of(3).bsdf, Bsdf::Translucent { .. }), "{:?}", of(3));
     let Bsdf::Conductor { eta, k, .. } = of(4).bsdf else { panic!("{:?}", of(4)) };

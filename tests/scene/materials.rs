@@ -1,7 +1,7 @@
 //! Conductors, dielectrics, plastics and blends: what good ones resolve to, and what is said about wrong ones.
 
 use spectile::Error;
-use spectile::scene::{Bsdf, Material, Reflectance, Scene, Shape, Weight};
+use spectile::scene::{Bsdf, Material, Reflectance, Roughness, Scene, Shape, Weight};
 use spectile::spectral::{Curve, Outside};
 
 use super::wrong::check_wrong;
@@ -36,7 +36,7 @@ fn conductors_resolve() {
     let scene = load("[materials.m.conductor]\nnk = \"gold.csv\"");
     let gold = material(&scene, "m");
     let Bsdf::Conductor { eta, k, roughness, energy_compensation } = gold.bsdf else { panic!("{gold:?}") };
-    assert_eq!((roughness, energy_compensation, gold.two_sided), ([0.0; 2], true, true));
+    assert_eq!((roughness, energy_compensation, gold.two_sided), (Roughness::even(0.0), true, true));
     assert_eq!(scene.spectra[eta].curve, linear([1.5, 0.3, 0.15]));
     assert_eq!(scene.spectra[k].curve, linear([1.9, 2.5, 4.5]));
     assert_eq!((scene.spectra[eta].name.as_str(), scene.spectra[k].name.as_str()), ("gold.csv (n)", "gold.csv (k)"));
@@ -46,13 +46,13 @@ fn conductors_resolve() {
     let scene = load(&format!("[materials.m.conductor]\n{text}"));
     let m = material(&scene, "m");
     let Bsdf::Conductor { eta, k, roughness, energy_compensation } = m.bsdf else { panic!("{m:?}") };
-    assert_eq!((roughness, energy_compensation, m.two_sided), ([0.1, 1.0], false, false));
+    assert_eq!((roughness, energy_compensation, m.two_sided), (Roughness::Constant([0.1, 1.0]), false, false));
     assert_eq!(scene.spectra[eta].curve, linear([1.5, 0.3, 0.15]));
     assert_eq!(scene.spectra[k].curve, Curve::Constant(3.0));
     let scene = load("[materials.m.conductor]\nnk = \"glass.yml\"\nroughness = 0.25");
     let m = material(&scene, "m");
     let Bsdf::Conductor { eta, k, roughness, .. } = m.bsdf else { panic!("{m:?}") };
-    assert_eq!(roughness, [0.25; 2]);
+    assert_eq!(roughness, Roughness::even(0.25));
     assert!((scene.spectra[eta].curve.eval(500.0) - 1.54).abs() < 1e-7);
     assert!((scene.spectra[k].curve.eval(550.0) - 1.5e-6).abs() < 1e-18);
 }
@@ -62,18 +62,23 @@ fn dielectrics_and_plastics_resolve() {
     let scene = load("[materials.m.dielectric]\neta = 1.5");
     let m = material(&scene, "m");
     let Bsdf::Dielectric { eta, dispersion, roughness } = m.bsdf else { panic!("{m:?}") };
-    assert_eq!((&scene.spectra[eta].curve, dispersion, roughness), (&Curve::Constant(1.5), true, 0.0));
+    assert_eq!((&scene.spectra[eta].curve, dispersion, roughness), (&Curve::Constant(1.5), true, Roughness::even(0.0)));
     let scene = load("[materials.m.dielectric]\neta = { file = \"glass.yml\" }\ndispersion = false\nroughness = 1");
     let m = material(&scene, "m");
     let Bsdf::Dielectric { eta, dispersion, roughness } = m.bsdf else { panic!("{m:?}") };
-    assert!((scene.spectra[eta].curve.eval(500.0) - 1.54).abs() < 1e-7 && !dispersion && roughness == 1.0);
+    assert!(
+        (scene.spectra[eta].curve.eval(500.0) - 1.54).abs() < 1e-7 && !dispersion && roughness == Roughness::even(1.0)
+    );
     let scene = load("[materials.m.plastic]\nreflectance = \"grey\"\neta = 1.5\nroughness = 0.05");
     let m = material(&scene, "m");
     let Bsdf::Plastic { reflectance: Reflectance::Spectrum(reflectance), eta, roughness } = m.bsdf else {
         panic!("{m:?}")
     };
     assert_eq!(scene.spectra[reflectance].curve, Curve::Constant(0.5));
-    assert_eq!((&scene.spectra[eta].curve, roughness, m.two_sided), (&Curve::Constant(1.5), 0.05, true));
+    assert_eq!(
+        (&scene.spectra[eta].curve, roughness, m.two_sided),
+        (&Curve::Constant(1.5), Roughness::even(0.05), true)
+    );
 }
 
 /// Parts stand before their blend, whatever the order of the file, and once.

@@ -6,7 +6,9 @@ use exr::prelude::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer,
 use glam::{DMat3, DVec2, DVec3};
 use spectile::Error;
 use spectile::error::Problem;
-use spectile::scene::{self, Bsdf, Placement, Reflectance, Scene, Temperature, TextureFilter, TextureKind, Weight};
+use spectile::scene::{
+    self, Bsdf, Placement, Reflectance, Roughness, Scene, Temperature, TextureFilter, TextureKind, Weight,
+};
 use spectile::spectral::upsample;
 
 use super::BASE;
@@ -477,12 +479,74 @@ fn pictures_of_light_resolve() {
     }
 }
 
+/// GGX's α of every kind of material; a mirror is none.
 #[test]
-fn a_textured_roughness_is_refused_by_name() {
-    for material in ["conductor]\neta = 0.2\nk = 3", "dielectric]\neta = 1.5", "plastic]\nreflectance = 0.5\neta = 1.5"]
-    {
-        let text = format!("[materials.soot.{material}\nroughness = {{ texture = \"rough.png\" }}");
-        let problems = load(&BASE.replace("[materials.soot.black]", &text), &[]).expect_err(material);
-        assert!(problems[0].to_string().contains("a roughness by texture is not supported yet"), "{problems:?}");
+fn textured_roughness() {
+    let files = [
+        ("rough.exr", float_exr((2, 1), &[("Y", &[0.25, 0.5])])),
+        ("mirror.png", png([2, 1], png::ColorType::Grayscale, &[0, 255])),
+        ("more.exr", float_exr((1, 1), &[("Y", &[1.5])])),
+    ];
+    let kinds = ["conductor]\neta = 0.2\nk = 3", "dielectric]\neta = 1.5", "plastic]\nreflectance = 0.5\neta = 1.5"];
+    // Of the quad, which has coordinates.
+    let with = |kind: &str, rest: &str| {
+        let white = "[materials.white.diffuse]
+reflectance = \"grey\"
+";
+        assert!(BASE.contains(white));
+        load(
+            &BASE.replace(
+                white,
+                &format!(
+                    "[materials.white.{kind}
+{rest}
+"
+                ),
+            ),
+            &files,
+        )
+    };
+    for kind in kinds {
+        let scene = with(kind, "roughness = { texture = \"rough.exr\", filter = \"nearest\" }").expect(kind);
+        let white = scene.materials.iter().find(|material| material.name == "white").expect("it is in use");
+        let (Bsdf::Conductor { roughness, .. } | Bsdf::Dielectric { roughness, .. } | Bsdf::Plastic { roughness, .. }) =
+            white.bsdf
+        else {
+            panic!("{white:?}")
+        };
+        let Roughness::Texture(texture) = roughness else { panic!("{roughness:?}") };
+        let texture = &scene.textures[texture];
+        assert_eq!((&texture.kind, &texture.texels[..]), (&TextureKind::Number, &[0.25, 0.5][..]));
+        assert_eq!(texture.placement.filter, TextureFilter::Nearest);
+        assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+
+        let scene = with(kind, "roughness = { texture = \"mirror.png\" }").expect(kind);
+        assert!(
+            scene.warnings[0].contains("has 1 of 2 roughnesses below 0.001, which count as that"),
+            "{:?}",
+            scene.warnings
+        );
+        assert_eq!(scene.textures[0].texels[..], [1e-3, 1.0]);
+        let problems = with(kind, "roughness = { texture = \"more.exr\" }").expect_err(kind);
+        assert!(
+            problems[0].to_string().contains("a roughness must lie in [0, 1], but channel Y is 1.5"),
+            "{problems:?}"
+        );
+    }
+    let problems = with(kinds[0], "roughness = [{ texture = \"rough.exr\" }, 0.1]").expect_err("two");
+    assert!(problems[0].to_string().contains("must be a number, but is a table"), "{problems:?}");
+
+    // What is hot has one roughness, by its own temperature or that of a blend.
+    let rough = "roughness = { texture = \"rough.exr\" }";
+    let hot = format!("{rough}\ntemperature = 300.0");
+    let blend =
+        format!("{rough}\n[materials.warm.blend]\na = \"soot\"\nb = \"white\"\nweight = 0.5\ntemperature = 300.0");
+    for (rest, key) in [(hot, "materials.white.plastic.temperature"), (blend, "materials.warm.blend.temperature")] {
+        let problems = with(kinds[2], &rest).expect_err(key);
+        assert_eq!(problems[0].key.as_deref(), Some(key), "{problems:?}");
+        assert!(
+            problems[0].message.contains("\"white\" has a roughness by texture, with which no temperature"),
+            "{problems:?}"
+        );
     }
 }

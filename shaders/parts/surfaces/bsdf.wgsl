@@ -16,6 +16,10 @@ struct Vertex {
     // Makes the probabilities of choosing lobes sum to 1.
     pick_scale: f32,
 #endif
+#if VARIES
+    // Decides between the tables of two roughnesses.
+    chance: f32,
+#endif
 }
 
 // The vertex where `o`, a unit vector, leads away from a surface; `front`: on the side of the geometric normal.
@@ -61,14 +65,24 @@ fn lobe_behind(lobe: Lobe, v: Vertex) -> bool {
     return v.inside && (lobe.kind & LOBE_OPAQUE) == 0u;
 }
 
+// Lobe `p` as it is at a vertex, but for its share.
+fn unshared_lobe(p: u32, v: Vertex) -> Lobe {
+#if VARIES
+    if ((lobes[p].kind & LOBE_VARIES) != 0u) {
+        return lobe_of_place(lobes[p], v);
+    }
+#endif
+    return lobes[p];
+}
+
 // Lobe `p` as it is at a vertex.
 fn lobe_at(p: u32, v: Vertex) -> Lobe {
 #if SHARES
-    var lobe = lobes[p];
+    var lobe = unshared_lobe(p, v);
     lobe.weight *= lobe_share(p, v.uv);
     return lobe;
 #else
-    return lobes[p];
+    return unshared_lobe(p, v);
 #endif
 }
 
@@ -219,7 +233,7 @@ fn bsdf_density(material: SurfaceMaterial, v: Vertex, i: vec3<f32>) -> f32 {
     for (var p = material.first_lobe; p < material.first_lobe + material.lobe_count; p += 1u) {
         let pick = lobe_pick(p, v);
         if (pick > 0.0) {
-            density += pick * lobe_density(lobes[p], v, i);
+            density += pick * lobe_density(unshared_lobe(p, v), v, i);
         }
     }
     return density;

@@ -407,7 +407,10 @@ impl HotLeaf {
             Bsdf::Translucent { reflectance, transmittance } => {
                 [reflectance, transmittance].iter().any(|share| matches!(share, Reflectance::Texture(_)))
             }
-            Bsdf::Conductor { roughness: [x, y], .. } => x != y && *x >= SMOOTH,
+            Bsdf::Conductor { roughness, .. } => {
+                let [x, y] = roughness.of_hot_surface();
+                x != y && x >= SMOOTH
+            }
             Bsdf::Dielectric { .. } | Bsdf::Blend { .. } | Bsdf::Black => false,
         };
         textured || !self.shares.is_empty() || matches!(self.temperature, Temperature::Texture(_))
@@ -429,21 +432,23 @@ impl HotLeaf {
                 (Absorber::Translucent, vec![all_over(reflectance), all_over(transmittance)])
             }
             Bsdf::Conductor { eta, k, roughness, energy_compensation } => {
-                let absorber = match roughness[0] < SMOOTH {
+                let alpha = roughness.of_hot_surface();
+                let absorber = match alpha[0] < SMOOTH {
                     true => Absorber::Mirror,
                     false => Absorber::RoughMetal {
-                        facets: FacetCosines::shared(roughness),
-                        again: energy_compensation.then(|| ReflectionAlbedo::shared(roughness)),
+                        facets: FacetCosines::shared(alpha),
+                        again: energy_compensation.then(|| ReflectionAlbedo::shared(alpha)),
                     },
                 };
                 (absorber, vec![curve(eta), curve(k)])
             }
             Bsdf::Plastic { reflectance, eta, roughness } => {
-                let absorber = match roughness < SMOOTH {
+                let alpha = roughness.of_hot_surface();
+                let absorber = match alpha[0] < SMOOTH {
                     true => Absorber::Varnish,
                     false => Absorber::RoughPlastic {
-                        facets: FacetCosines::shared([roughness; 2]),
-                        coat: DielectricAlbedo::shared(roughness, index_range(&curve(eta), &scene.channels)),
+                        facets: FacetCosines::shared(alpha),
+                        coat: DielectricAlbedo::shared(alpha[0], index_range(&curve(eta), &scene.channels)),
                     },
                 };
                 (absorber, vec![all_over(reflectance), curve(eta)])

@@ -4,11 +4,12 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use crate::device::parts::roughness::ByPlace;
 use crate::device::parts::surfaces::{INTERVALS, Kind, Surfaces, texture_records};
 use crate::device::parts::textures::{self, Share};
 use crate::device::prepared::LEAST_ALBEDO;
 use crate::device::words::{LOBE_BOUNDED, LOBE_DISPERSES, LOBE_NARROW, LOBE_TEXTURED, Lobe};
-use crate::scene::{Reflectance, SMOOTH, Scene, SpectrumId};
+use crate::scene::{Reflectance, Scene, SpectrumId};
 use crate::spectral::Curve;
 use crate::spectral::hemisphere::fresnel::{self, mean_conductor, mean_dielectric};
 use crate::spectral::hemisphere::{DielectricAlbedo, ReflectionAlbedo, ReflectionProbability, index_range};
@@ -27,6 +28,8 @@ pub(super) struct Leaf {
     pub albedo: Albedo,
     /// What blend textures leave of it.
     pub shares: Vec<Share>,
+    /// Where its roughness is a texture.
+    pub by_place: Option<ByPlace>,
     /// Records that one evaluation takes; 0 for the only directions of mirrors and ideal refraction.
     pub records: u32,
 }
@@ -108,13 +111,13 @@ impl Surfaces {
         name: &str,
         eta: SpectrumId,
         dispersion: bool,
-        roughness: f64,
+        roughness: Option<[f64; 2]>,
     ) -> Vec<Leaf> {
         let range = index_range(&scene.spectra[eta].curve, &scene.channels);
         let matched = range.iter().all(|eta| (eta - 1.0).abs() < MATCHED);
-        match roughness >= SMOOTH && !matched {
-            false => self.glass(scene, eta, dispersion),
-            true => self.rough_glass(scene, name, eta, dispersion, roughness),
+        match roughness.filter(|_| !matched) {
+            None => self.glass(scene, eta, dispersion),
+            Some([alpha, _]) => self.rough_glass(scene, name, eta, dispersion, alpha),
         }
     }
 
@@ -208,12 +211,12 @@ impl Surfaces {
         name: &str,
         reflectance: Reflectance,
         eta: SpectrumId,
-        roughness: Option<f64>,
+        roughness: Option<[f64; 2]>,
     ) -> Vec<Leaf> {
         let of_index = &scene.spectra[eta].curve;
         let n = channel_means(scene, eta);
         let id = self.spectrum(eta);
-        let rough = roughness.map(|alpha| DielectricAlbedo::shared(alpha, index_range(of_index, &scene.channels)));
+        let rough = roughness.map(|[alpha, _]| DielectricAlbedo::shared(alpha, index_range(of_index, &scene.channels)));
         let table = rough.clone();
         let mean_reflected = move |eta: f64| match &table {
             None => mean_dielectric(eta),
@@ -245,7 +248,7 @@ impl Surfaces {
                 (back | square << 16, means, lobe, texture_records(&scene.textures[id]) + 4)
             }
         };
-        let alpha = [roughness.unwrap_or(0.0) as f32; 2];
+        let alpha = roughness.unwrap_or_default().map(|alpha| alpha as f32);
         // Seen from outside nothing is totally reflected, whatever the index.
         let coat_kind = if roughness.is_some() { Kind::RoughCoat } else { Kind::Mirror };
         let coat = Lobe { kind: coat_kind as u32 | LOBE_DISPERSES, ab: id, alpha, eta: 1.0, ..Lobe::default() };
@@ -294,7 +297,7 @@ fn lobe_of(kind: Kind) -> Lobe {
 }
 
 fn leaf(lobe: Lobe, records: u32, albedo: impl Fn(bool, f64, usize) -> f64 + 'static) -> Leaf {
-    Leaf { lobe, active: [true; 2], albedo: Box::new(albedo), shares: Vec::new(), records }
+    Leaf { lobe, active: [true; 2], albedo: Box::new(albedo), shares: Vec::new(), by_place: None, records }
 }
 
 /// The mean of `curve` over each channel.

@@ -170,16 +170,17 @@ impl Radiators {
                     (Kind::Open, 2 + texture_records(&scene.textures[other]))
                 }
             },
-            Bsdf::Conductor { eta, k, roughness, .. } if roughness[0] < SMOOTH => {
+            Bsdf::Conductor { eta, k, roughness, .. } if roughness.of_hot_surface()[0] < SMOOTH => {
                 radiator.spectra = surfaces.spectrum(eta) | surfaces.spectrum(k) << 16;
                 self.features.mirrors = true;
                 (Kind::Mirror, 2)
             }
             Bsdf::Conductor { eta, k, roughness, energy_compensation } => {
                 radiator.spectra = surfaces.spectrum(eta) | surfaces.spectrum(k) << 16;
-                radiator.alpha = roughness.map(|alpha| alpha as f32);
+                let alpha = roughness.of_hot_surface();
+                radiator.alpha = alpha.map(|alpha| alpha as f32);
                 // What is scattered more than once comes back as `surfaces` has it, or is lost.
-                let lost = ReflectionAlbedo::shared(roughness).mean_loss();
+                let lost = ReflectionAlbedo::shared(alpha).mean_loss();
                 if energy_compensation {
                     let stays = |v: &[f64]| {
                         let f = mean_conductor(v[0], v[1]);
@@ -193,7 +194,8 @@ impl Radiators {
                 (Kind::Facets, 2 * HOT_FACET_COUNT + 2)
             }
             Bsdf::Plastic { reflectance, eta, roughness } => {
-                (self.plastic(scene, &mut radiator, name, reflectance, (eta, roughness), surfaces), 3)
+                let [alpha, _] = roughness.of_hot_surface();
+                (self.plastic(scene, &mut radiator, name, reflectance, (eta, alpha), surfaces), 3)
             }
             Bsdf::Dielectric { .. } | Bsdf::Blend { .. } => unreachable!("hot parts absorb, and are no blends"),
         };

@@ -4,6 +4,7 @@ use crate::device::part::{Part, Place, Records, SceneBuffer};
 use crate::device::parts::geometry::{FEWER_MATERIALS, MATERIALS};
 use crate::device::parts::lights::STEPS;
 use crate::device::parts::lobes::Leaf;
+use crate::device::parts::roughness;
 use crate::device::parts::textures::{self, Share, Textures};
 use crate::device::text::{Module, module};
 use crate::device::words::{
@@ -12,7 +13,7 @@ use crate::device::words::{
     LOBE_ROUGH_COAT, LOBE_ROUGH_CONDUCTOR, LOBE_TEXTURED, LOBE_TRANSMITTED, LOBE_TWO_SIDED, Lobe, MASK_SHIFT,
     MATERIAL_DIFFUSE, MATERIAL_MASK_IS_TEXTURE, MATERIAL_MASKED, MATERIAL_TRANSMITS, SurfaceMaterial,
 };
-use crate::scene::{Attributes, Bsdf, MaterialId, SMOOTH, Scene, SpectrumId, Texture, TextureKind, Weight};
+use crate::scene::{Attributes, Bsdf, MaterialId, Scene, SpectrumId, Texture, TextureKind, Weight};
 use crate::spectral::hemisphere::DielectricAlbedo;
 use crate::spectral::{Curve, Outside};
 
@@ -72,7 +73,10 @@ pub struct Surfaces {
     /// Where textures are colours: the spectrum that says where in the visible a wavelength is.
     pub visible_place: Option<u32>,
     /// What blend textures leave of each lobe.
-    shares: Vec<Vec<Share>>,
+    pub(super) shares: Vec<Vec<Share>>,
+    /// Of lobes whose roughness is a texture; and how many lobes at roughnesses of their own these have.
+    pub(super) by_place: Vec<roughness::Words>,
+    pub(super) variants: usize,
     /// Some surface carries texture coordinates, normals or axes; some of them shading normals.
     pub attributes: bool,
     pub smooth: bool,
@@ -223,6 +227,7 @@ impl Surfaces {
                 surfaces.visible_place = Some(place);
             }
             surfaces.textures = Some(textures);
+            surfaces.add_roughnesses();
         }
         surfaces
     }
@@ -305,11 +310,19 @@ impl Surfaces {
         });
         let spread: u32 = leaves.iter().map(|leaf| leaf.records).sum();
         self.vertex_records = self.vertex_records.max(spread + spread.max(2));
+        let first = self.lobes.len();
+        let mut by_place = Vec::new();
         for (leaf, picks) in leaves.into_iter().zip(picks) {
             self.kinds |= 1 << (leaf.lobe.kind & 0xff);
             let picks = self.table(&picks);
             self.lobes.push(Lobe { picks, ..leaf.lobe });
             self.shares.push(leaf.shares);
+            by_place.push(leaf.by_place);
+        }
+        for (p, by_place) in by_place.into_iter().enumerate() {
+            if let Some(by_place) = by_place {
+                self.lobes[first + p].rows = self.add_variants(by_place);
+            }
         }
     }
 
@@ -319,6 +332,7 @@ impl Surfaces {
             return;
         }
         let description = &scene.materials[material];
+        let name = &description.name;
         let (opaque, leaves) = match description.bsdf {
             Bsdf::Black => (true, Vec::new()),
             Bsdf::Diffuse { reflectance } => (true, self.diffuse(scene, reflectance)),
@@ -332,15 +346,18 @@ impl Surfaces {
                 (false, leaves)
             }
             Bsdf::Conductor { eta, k, roughness, energy_compensation } => {
-                let rough = (roughness[0] >= SMOOTH).then_some(roughness);
-                (true, self.conductor(scene, &description.name, [eta, k], rough, energy_compensation))
+                let at = |surfaces: &mut Surfaces, alpha| {
+                    surfaces.conductor(scene, name, [eta, k], alpha, energy_compensation)
+                };
+                (true, self.of_roughness(scene, roughness, at))
             }
             Bsdf::Dielectric { eta, dispersion, roughness } => {
-                (false, self.dielectric(scene, &description.name, eta, dispersion, roughness))
+                let at = |surfaces: &mut Surfaces, alpha| surfaces.dielectric(scene, name, eta, dispersion, alpha);
+                (false, self.of_roughness(scene, roughness, at))
             }
             Bsdf::Plastic { reflectance, eta, roughness } => {
-                let rough = (roughness >= SMOOTH).then_some(roughness);
-                (true, self.plastic(scene, &description.name, reflectance, eta, rough))
+                let at = |surfaces: &mut Surfaces, alpha| surfaces.plastic(scene, name, reflectance, eta, alpha);
+                (true, self.of_roughness(scene, roughness, at))
             }
             Bsdf::Blend { a, b, weight: Weight::Constant(of_b) } => {
                 self.collect(scene, a, weight * (1.0 - of_b), shares, out);

@@ -34,7 +34,10 @@ pub const TEXTURES: Part = Part {
         defines.set("TEXTURES", true).set("TEXTURED", surfaces.textured || hot.textured || hot.pictures);
         defines.set("KEPT", surfaces.textured_base || hot.textured);
         defines.set("COLOURS", textures.colours).set("MIXTURES", textures.mixtures).set("SHARES", shares);
-        defines.set("TEXEL_NUMBERS", textures.mixtures || shares || hot.numbers || hot.pictures || surfaces.masks);
+        defines.set(
+            "TEXEL_NUMBERS",
+            textures.mixtures || shares || hot.numbers || hot.pictures || surfaces.masks || surfaces.varies(),
+        );
         defines.set("PRODUCTS", shares || hot.numbers);
         if let Some(first) = textures.first_share {
             defines.constant("FIRST_SHARE", first);

@@ -9,7 +9,7 @@ use crate::Result;
 use crate::format::gltf::json::material::{AlphaMode, Material};
 use crate::format::gltf::json::texture::{Info, MagFilter, WrappingMode};
 use crate::format::gltf::json::validation::Checked;
-use crate::import::picture::{Colour, Picture, Texels, Texture};
+use crate::import::picture::{Colour, Picture, Rough, Texels, Texture};
 use crate::import::scene::Section;
 use crate::import::surfaces;
 use crate::import::text;
@@ -189,12 +189,12 @@ impl Importer<'_, '_> {
         let colour = self.tinted([r, g, b], base.as_ref());
         let opacity = self.opacity(material, alpha, base.as_ref(), name, path)?;
         let metallic = unit(pbr.metallic_factor.0);
-        let mut roughness = unit(pbr.roughness_factor.0);
+        let factor = unit(pbr.roughness_factor.0);
+        let mut rough = Rough::Pair([(factor * factor).max(1e-3); 2]);
         let mut metal_weight = (text::rounded(metallic), metallic);
         if let Some(found) = &shares {
-            let (_, mean) = self.channel(found, 1, roughness, &format!("{name}-roughness"))?;
-            self.scene.report.approximated(self.place(path), "a roughness by a texture as its mean");
-            roughness = mean;
+            let texture = Texture { picture: found.texture.picture.clone().raw(), ..found.texture.clone() };
+            rough = texture.rough(self.scene, name, &|rgb| f64::from(rgb[1]), &|v| (v * factor).powi(2))?;
             if metallic > 0.0 {
                 metal_weight = self.channel(found, 2, metallic, &format!("{name}-metal"))?;
             }
@@ -203,13 +203,22 @@ impl Importer<'_, '_> {
                     normal incidence is the colour";
         self.scene.report.approximated(self.place(path), what);
         let textured = colour.is_texture()
+            || rough.is_texture()
             || metal_weight.0.starts_with('{')
             || opacity.as_ref().is_some_and(|o| o.starts_with('{'));
-        let material_name = self.surface(material, name, path, &colour, roughness, &metal_weight, opacity)?;
+        let material_name = self.surface(material, name, path, &colour, &rough, &metal_weight, opacity)?;
         let plain = if textured {
             let mean = Colour::Spectrum(colour.mean(), None);
             let weight = (text::rounded(metal_weight.1), metal_weight.1);
-            self.surface(material, &format!("{name}-mean"), path, &mean, roughness, &weight, None)?
+            self.surface(
+                material,
+                &format!("{name}-mean"),
+                path,
+                &mean,
+                &Rough::Pair([rough.mean(); 2]),
+                &weight,
+                None,
+            )?
         } else {
             material_name.clone()
         };
@@ -255,7 +264,7 @@ impl Importer<'_, '_> {
         name: &str,
         path: &str,
         colour: &Colour,
-        roughness: f64,
+        rough: &Rough,
         metal: &(String, f64),
         opacity: Option<String>,
     ) -> Result<String> {
@@ -266,7 +275,7 @@ impl Importer<'_, '_> {
             self.scene.report.approximated(self.place(path), format!("an `ior` of {ior} as 1.5"));
         }
         let eta = if is_index { ior } else { 1.5 };
-        let alpha = text::rounded((roughness * roughness).max(1e-3));
+        let alpha = rough.even().unwrap_or_default();
         let transmission = extensions.and_then(|e| e.transmission.as_ref());
         let clear = transmission.map_or(0.0, |t| f64::from(t.transmission_factor.0).clamp(0.0, 1.0));
         let [outside, _] = surfaces::diffuse_fresnel(eta);

@@ -6,7 +6,7 @@ use super::xml::Node;
 use super::{Importer, principled};
 use crate::Result;
 use crate::import::metals;
-use crate::import::picture::Colour;
+use crate::import::picture::{Colour, Rough, grey};
 use crate::import::scene::Section;
 use crate::import::surfaces;
 use crate::import::text;
@@ -208,8 +208,8 @@ impl<'n> Importer<'n, '_> {
         }
     }
 
-    /// GGX's roughness, by one number or two; Beckmann's is taken for it.
-    fn roughness(&mut self, plugin: &Plugin<'n>) -> Result<Option<[f64; 2]>> {
+    /// GGX's roughness, by one number, two, or a texture; Beckmann's is taken for it.
+    fn roughness(&mut self, plugin: &Plugin<'n>, name: &str, flip: bool) -> Result<Option<Rough>> {
         if !plugin.kind().starts_with("rough") {
             return Ok(None);
         }
@@ -218,6 +218,14 @@ impl<'n> Importer<'n, '_> {
             self.scene.report.approximated(plugin.place(), what);
         }
         plugin.boolean("sample_visible", true)?;
+        if let Some(texture) = self.texture_of_numbers(plugin, "alpha", flip)? {
+            if texture.picture.linear().into_iter().any(|rgb| !(0.0..=1.0).contains(&grey(rgb))) {
+                self.scene
+                    .report
+                    .approximated(plugin.place(), "alphas of a texture outside of 0 to 1, which are clipped to that");
+            }
+            return texture.rough(self.scene, name, &grey, &|alpha| alpha).map(Some);
+        }
         let alpha = self.mean_number(plugin, "alpha", 0.1)?;
         let (u, v) = (self.mean_number(plugin, "alpha_u", alpha)?, self.mean_number(plugin, "alpha_v", alpha)?);
         if [u, v].iter().any(|alpha| !(0.0..).contains(alpha)) {
@@ -229,11 +237,11 @@ impl<'n> Importer<'n, '_> {
             }
             alpha.min(1.0)
         });
-        Ok(Some([u, v]))
+        Ok(Some(Rough::Pair([u, v])))
     }
 
     fn conductor(&mut self, plugin: &Plugin<'n>, name: &str, mut around: Around, flip: bool) -> Result<Made> {
-        let roughness = self.roughness(plugin)?;
+        let roughness = self.roughness(plugin, name, flip)?;
         let named = plugin.string("material")?;
         let given = [self.index(plugin, "eta", flip)?, self.index(plugin, "k", flip)?];
         let [eta, k] = match (named, given) {
@@ -261,16 +269,11 @@ impl<'n> Importer<'n, '_> {
         let mut section = Section::default();
         section.set("eta", self.scene.spectrum(&positive(eta), &format!("{name}-eta"))?);
         section.set("k", self.scene.spectrum(&k, &format!("{name}-k"))?);
-        match roughness {
-            Some([u, v]) if u != v && u.min(v) >= 1e-3 => {
-                section.set("roughness", text::list([u, v]));
-                // Which way u runs matters.
-                around.is_textured = true;
-            }
-            Some([u, v]) => section.set("roughness", text::rounded((u * v).sqrt())),
-            None => {}
-        }
-        if roughness.is_some() {
+        if let Some(rough) = roughness {
+            // Which way u runs matters to brushed ones.
+            let brushed = rough.brushed();
+            around.is_textured |= brushed.is_some() || rough.is_texture();
+            section.set("roughness", brushed.map(text::list).or_else(|| rough.even()).unwrap_or_else(|| "0.0".into()));
             section.set("energy_compensation", "false");
         }
         let Some(specular) = self.colour(plugin, "specular_reflectance", Of::Reflectance, flip)? else {
@@ -343,17 +346,18 @@ impl<'n> Importer<'n, '_> {
         }
     }
 
-    fn dielectric(&mut self, plugin: &Plugin<'n>, name: &str, around: Around, flip: bool) -> Result<Made> {
-        let roughness = self.roughness(plugin)?;
+    fn dielectric(&mut self, plugin: &Plugin<'n>, name: &str, mut around: Around, flip: bool) -> Result<Made> {
+        let roughness = self.roughness(plugin, name, flip)?;
         let eta = self.relative_index(plugin, "bk7")?;
         let mut section = Section::default().with("eta", text::rounded(eta));
-        if let Some([u, v]) = roughness {
-            if u != v {
+        if let Some(rough) = roughness {
+            if matches!(rough, Rough::Pair([u, v]) if u != v) {
                 self.scene
                     .report
                     .approximated(plugin.place(), "two roughnesses of a dielectric as their geometric mean");
             }
-            section.set("roughness", text::rounded((u * v).sqrt()));
+            around.is_textured |= rough.is_texture();
+            section.set("roughness", rough.even().unwrap_or_else(|| "0.0".into()));
         }
         for factor in ["specular_reflectance", "specular_transmittance"] {
             if let Some(colour) = self.colour(plugin, factor, Of::Reflectance, flip)?
@@ -378,7 +382,7 @@ impl<'n> Importer<'n, '_> {
     }
 
     fn plastic(&mut self, plugin: &Plugin<'n>, name: &str, mut around: Around, flip: bool) -> Result<Made> {
-        let roughness = self.roughness(plugin)?;
+        let roughness = self.roughness(plugin, name, flip)?;
         let eta = self.relative_index(plugin, "polypropylene")?;
         let colour = self.colour(plugin, "diffuse_reflectance", Of::Reflectance, flip)?.unwrap_or(Colour::grey(0.5));
         around.is_textured |= colour.is_texture();
@@ -396,8 +400,9 @@ impl<'n> Importer<'n, '_> {
         section.set("reflectance", colour.toml(self.scene, name)?);
         let eta = self.scene.report.within(plugin.place(), "the relative index of a plastic", eta, [1.0, f64::MAX]);
         section.set("eta", text::rounded(eta));
-        if let Some([u, v]) = roughness {
-            section.set("roughness", text::rounded((u * v).sqrt()));
+        if let Some(rough) = roughness {
+            around.is_textured |= rough.is_texture();
+            section.set("roughness", rough.even().unwrap_or_else(|| "0.0".into()));
         }
         Ok(self.put(name, "plastic", section, &around, true))
     }

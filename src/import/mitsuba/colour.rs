@@ -242,6 +242,19 @@ impl<'n> Importer<'n, '_> {
         Ok(upward(scale, offset, flip))
     }
 
+    /// The picture of a number that differs over the surface, if it does.
+    pub fn texture_of_numbers(&mut self, plugin: &Plugin<'n>, name: &str, flip: bool) -> Result<Option<Rc<Texture>>> {
+        let Some(node) = plugin.get(name) else { return Ok(None) };
+        let node = self.resolve(node)?;
+        if node.tag == "float" || node.tag == "integer" {
+            return Ok(None);
+        }
+        Ok(match self.colour_of(node, Of::Unbounded, flip)? {
+            Colour::Texture(texture) if texture.endmembers.is_none() => Some(texture),
+            _ => None,
+        })
+    }
+
     /// The mean of a number over the surface, where it has to be one.
     pub fn mean_number(&mut self, plugin: &Plugin<'n>, name: &str, default: f64) -> Result<f64> {
         let Some(node) = plugin.get(name) else { return Ok(default) };

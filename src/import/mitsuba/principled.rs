@@ -5,7 +5,7 @@ use super::bsdf::Made;
 use super::colour::Of;
 use super::values::Plugin;
 use crate::Result;
-use crate::import::picture::Colour;
+use crate::import::picture::{Colour, Rough, grey};
 use crate::import::scene::Section;
 use crate::import::surfaces;
 use crate::import::text;
@@ -47,7 +47,18 @@ pub fn principled<'n>(
         let value = importer.mean_number(plugin, key, default)?;
         Ok(importer.scene.report.within(plugin.place(), &format!("`{key}` of a principled BSDF"), value, [0.0, 1.0]))
     };
-    let (roughness, metallic, glass) = (share("roughness", 0.5)?, share("metallic", 0.0)?, share("spec_trans", 0.0)?);
+    let (metallic, glass) = (share("metallic", 0.0)?, share("spec_trans", 0.0)?);
+    let rough = match importer.texture_of_numbers(plugin, "roughness", flip)? {
+        Some(texture) => texture.rough(importer.scene, name, &grey, &|roughness| roughness.clamp(0.0, 1.0).powi(2))?,
+        None => {
+            let roughness = importer.mean_number(plugin, "roughness", 0.5)?;
+            let place = plugin.place();
+            let roughness =
+                importer.scene.report.within(place, "`roughness` of a principled BSDF", roughness, [0.0, 1.0]);
+            Rough::Pair([(roughness * roughness).max(1e-3); 2])
+        }
+    };
+    let alpha = rough.even().unwrap_or_default();
     let specular = plugin.float("specular")?.unwrap_or(0.5);
     let specular =
         importer.scene.report.within(plugin.place(), "`specular` of a principled BSDF", specular, [0.0, f64::MAX]);
@@ -68,10 +79,9 @@ pub fn principled<'n>(
     }
     let what = "a principled BSDF as a coat over diffuse matter of the same brightness on the whole, and metal and glass by their shares";
     importer.scene.report.approximated(plugin.place(), what);
-    let alpha = (roughness * roughness).max(1e-3);
     let mut parts = Vec::new();
     if metallic < 1.0 && glass < 1.0 {
-        let (base, too_bright) = surfaces::under_coat(&colour, eta, diffuse_factor(roughness));
+        let (base, too_bright) = surfaces::under_coat(&colour, eta, diffuse_factor(rough.mean().sqrt()));
         if too_bright {
             importer
                 .scene
@@ -81,8 +91,8 @@ pub fn principled<'n>(
         let mut section = Section::default();
         section.set("reflectance", base.toml(importer.scene, &format!("{name}-base"))?);
         section.set("eta", text::rounded(eta));
-        section.set("roughness", text::rounded(alpha));
-        parts.push(((1.0 - metallic) * (1.0 - glass), "plastic", section, colour.is_texture()));
+        section.set("roughness", alpha.clone());
+        parts.push(((1.0 - metallic) * (1.0 - glass), "plastic", section, colour.is_texture() || rough.is_texture()));
     }
     if metallic > 0.0 {
         if colour.is_texture() {
@@ -91,13 +101,13 @@ pub fn principled<'n>(
         let metal = surfaces::metal(&colour.mean());
         let mut section = Section::default().with("eta", importer.scene.spectrum(&metal, &format!("{name}-metal"))?);
         section.set("k", "0.0");
-        section.set("roughness", text::rounded(alpha));
+        section.set("roughness", alpha.clone());
         section.set("energy_compensation", "false");
-        parts.push((metallic, "conductor", section, false));
+        parts.push((metallic, "conductor", section, rough.is_texture()));
     }
     if metallic < 1.0 && glass > 0.0 {
-        let section = Section::default().with("eta", text::rounded(eta)).with("roughness", text::rounded(alpha));
-        parts.push(((1.0 - metallic) * glass, "dielectric", section, false));
+        let section = Section::default().with("eta", text::rounded(eta)).with("roughness", alpha);
+        parts.push(((1.0 - metallic) * glass, "dielectric", section, rough.is_texture()));
     }
     let textured = parts.iter().any(|(.., textured)| *textured);
     let count = parts.len();

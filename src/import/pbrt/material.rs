@@ -4,7 +4,7 @@ use super::colour::Of;
 use super::token::{At, Parameters, shown};
 use super::{Importer, Look};
 use crate::Result;
-use crate::import::picture::Colour;
+use crate::import::picture::{Colour, Rough, grey};
 use crate::import::scene::Section;
 use crate::import::{surfaces, text};
 use crate::spectral::Curve;
@@ -52,8 +52,8 @@ impl Importer<'_> {
                 self.scene.report.approximated(at.place(), what);
                 let mut section = Section::default().with("reflectance", colour.toml(self.scene, name)?);
                 section.set("eta", self.scene.spectrum(&eta, &format!("{name}-eta"))?);
-                self.one_roughness(&mut section, "", parameters, at)?;
-                Look::Material { name: self.scene.put(name, "plastic", section), textured: colour.is_texture() }
+                let textured = self.one_roughness(&mut section, name, parameters, at)? || colour.is_texture();
+                Look::Material { name: self.scene.put(name, "plastic", section), textured }
             }
             "conductor" => self.conductor(name, "", parameters, at)?,
             "coatedconductor" => {
@@ -76,8 +76,8 @@ impl Importer<'_> {
             "dielectric" => {
                 let eta = self.index(parameters, "eta", 1.5)?;
                 let mut section = Section::default().with("eta", self.scene.spectrum(&eta, &format!("{name}-eta"))?);
-                self.one_roughness(&mut section, "", parameters, at)?;
-                Look::Material { name: self.scene.put(name, "dielectric", section), textured: false }
+                let textured = self.one_roughness(&mut section, name, parameters, at)?;
+                Look::Material { name: self.scene.put(name, "dielectric", section), textured }
             }
             "thindielectric" => {
                 let eta = self.index(parameters, "eta", 1.5)?.eval(550.0);
@@ -108,29 +108,39 @@ impl Importer<'_> {
         Ok(self.colour(parameters, name, Of::Index)?.map_or(Curve::Constant(default), |colour| colour.mean()))
     }
 
-    /// GGX's alpha along u and v. Unless it is told not to, pbrt takes the square root of what is written.
-    fn roughness(&mut self, prefix: &str, parameters: &Parameters, at: &At) -> Result<[f64; 2]> {
-        let both = self.mean_number(parameters, &format!("{prefix}roughness"))?.unwrap_or(0.0);
-        let mut of =
-            |key: &str| -> Result<f64> { Ok(self.mean_number(parameters, &format!("{prefix}{key}"))?.unwrap_or(both)) };
-        let pair = [of("uroughness")?, of("vroughness")?];
+    /// GGX's alpha along u and v, or by a texture. Unless it is told not to, pbrt takes the square root of what is written.
+    fn roughness(&mut self, name: &str, prefix: &str, parameters: &Parameters, at: &At) -> Result<Rough> {
         let remap = parameters.boolean("remaproughness", true)?;
-        Ok(pair.map(|roughness| {
-            let roughness = self.scene.report.within(at.place(), "a roughness", roughness, [0.0, 1.0]);
-            if remap { roughness.sqrt() } else { roughness }
-        }))
+        let alpha = |roughness: f64| if remap { roughness.max(0.0).sqrt() } else { roughness };
+        let [both, u, v] = ["roughness", "uroughness", "vroughness"].map(|key| format!("{prefix}{key}"));
+        if let (Some(parameter), None, None) = (parameters.get(&both), parameters.get(&u), parameters.get(&v))
+            && let Colour::Texture(texture) = self.colour_of(parameter, Of::Index)?
+            && texture.endmembers.is_none()
+        {
+            if texture.picture.linear().into_iter().any(|rgb| !(0.0..=1.0).contains(&grey(rgb))) {
+                self.scene
+                    .report
+                    .approximated(at.place(), "roughnesses of a texture outside of 0 to 1, which are clipped to that");
+            }
+            return texture.rough(self.scene, name, &grey, &alpha);
+        }
+        let both = self.mean_number(parameters, &both)?.unwrap_or(0.0);
+        let pair =
+            [self.mean_number(parameters, &u)?.unwrap_or(both), self.mean_number(parameters, &v)?.unwrap_or(both)];
+        let within = |roughness| alpha(self.scene.report.within(at.place(), "a roughness", roughness, [0.0, 1.0]));
+        Ok(Rough::Pair(pair.map(within)))
     }
 
-    fn one_roughness(&mut self, section: &mut Section, prefix: &str, parameters: &Parameters, at: &At) -> Result<()> {
-        let [u, v] = self.roughness(prefix, parameters, at)?;
-        if u != v {
+    /// Whether it is a texture.
+    fn one_roughness(&mut self, section: &mut Section, name: &str, parameters: &Parameters, at: &At) -> Result<bool> {
+        let rough = self.roughness(name, "", parameters, at)?;
+        if matches!(rough, Rough::Pair([u, v]) if u != v) {
             self.scene.report.approximated(at.place(), "two roughnesses of a coat or of glass as their geometric mean");
         }
-        let alpha = (u * v).sqrt();
-        if alpha > 0.0 {
-            section.set("roughness", text::rounded(alpha));
+        if let Some(alpha) = rough.even() {
+            section.set("roughness", alpha);
         }
-        Ok(())
+        Ok(rough.is_texture())
     }
 
     fn conductor(&mut self, name: &str, prefix: &str, parameters: &Parameters, at: &At) -> Result<Look> {
@@ -156,18 +166,17 @@ impl Importer<'_> {
         let mut section = Section::default();
         section.set("eta", self.scene.spectrum(&eta, &format!("{name}-eta"))?);
         section.set("k", self.scene.spectrum(&k, &format!("{name}-k"))?);
-        let [u, v] = self.roughness(prefix, parameters, at)?;
+        let rough = self.roughness(name, prefix, parameters, at)?;
         // Brushed metals need a direction on the surface.
-        let brushed = u != v && u.min(v) >= 1e-3;
-        if brushed {
-            section.set("roughness", text::list([u, v]));
-        } else if u.max(v) > 0.0 {
-            section.set("roughness", text::rounded((u * v).sqrt()));
+        let brushed = rough.brushed();
+        if let Some(alpha) = brushed.map(text::list).or_else(|| rough.even()) {
+            section.set("roughness", alpha);
         }
-        if u.max(v) >= 1e-3 {
+        if !matches!(rough, Rough::Pair([u, v]) if u.max(v) < 1e-3) {
             section.set("energy_compensation", "false");
         }
-        Ok(Look::Material { name: self.scene.put(name, "conductor", section), textured: brushed })
+        let textured = brushed.is_some() || rough.is_texture();
+        Ok(Look::Material { name: self.scene.put(name, "conductor", section), textured })
     }
 
     fn mix(&mut self, name: &str, parameters: &Parameters, at: &At) -> Result<Look> {

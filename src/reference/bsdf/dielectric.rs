@@ -9,26 +9,20 @@ use super::ggx::Ggx;
 use super::reflection::{Boundary, Mirror, RoughMirror, reflected};
 use super::{Choice, Lobe, Vertex, cosine_density, cosine_direction, fresnel};
 use crate::scene::{Scene, SpectrumId};
-use crate::spectral::hemisphere::{DielectricAlbedo, ReflectionProbability, index_range};
+use crate::spectral::hemisphere::{DielectricAlbedo, ReflectionProbability};
 
 /// Indices this near to 1 make no visible boundary. The half vector of refraction is lost there: a rough boundary that
 /// is matched in all channels is smooth, and one that is in some bends there by an index this far from 1.
 const MATCHED: f64 = 1e-4;
 
-/// The lobes of a dielectric: reflection and refraction and, where rough, what is scattered more than once.
-pub fn lobes(scene: &Scene, eta: SpectrumId, dispersion: bool, roughness: Option<f64>) -> Vec<Box<dyn Lobe>> {
-    let curve = &scene.spectra[eta].curve;
-    let range = index_range(curve, &scene.channels);
-    let bounds = &scene.channels.bounds;
-    let mean = || bounds.iter().map(|b| curve.mean(b[0], b[1])).sum::<f64>() / bounds.len() as f64;
-    let index = Index { eta, mean: (!dispersion).then(mean) };
-    let surface = Surface { index, decision: Arc::new(ReflectionProbability::new(curve, &scene.channels)) };
+/// The lobes of a dielectric: reflection and refraction and, where rough, what is scattered more than once. `range` bounds its index.
+pub fn lobes(surface: &Surface, range: [f64; 2], roughness: Option<[f64; 2]>) -> Vec<Box<dyn Lobe>> {
     match roughness.filter(|_| range.iter().any(|eta| (eta - 1.0).abs() >= MATCHED)) {
-        None => vec![Box::new(Mirror(surface.clone())), Box::new(Refraction(surface))],
+        None => vec![Box::new(Mirror(surface.clone())), Box::new(Refraction(surface.clone()))],
         Some(alpha) => {
-            let albedo = DielectricAlbedo::shared(alpha, range);
+            let (index, albedo) = (surface.index, DielectricAlbedo::shared(alpha[0], range));
             let again = |transmits| Box::new(Again { index, albedo: Arc::clone(&albedo), transmits });
-            let mirror = RoughMirror { boundary: surface, ggx: Ggx { alpha: [alpha; 2] } };
+            let mirror = RoughMirror { boundary: surface.clone(), ggx: Ggx { alpha } };
             let once = RoughBoundary { mirror, albedo: Arc::clone(&albedo) };
             vec![Box::new(once), again(false), again(true)]
         }
@@ -76,9 +70,19 @@ impl Index {
 
 /// A boundary, and the table that decides between reflection and refraction at the cosine with its normal.
 #[derive(Clone)]
-struct Surface {
+pub struct Surface {
     index: Index,
     decision: Arc<ReflectionProbability>,
+}
+
+impl Surface {
+    pub fn new(scene: &Scene, eta: SpectrumId, dispersion: bool) -> Surface {
+        let curve = &scene.spectra[eta].curve;
+        let bounds = &scene.channels.bounds;
+        let mean = || bounds.iter().map(|b| curve.mean(b[0], b[1])).sum::<f64>() / bounds.len() as f64;
+        let index = Index { eta, mean: (!dispersion).then(mean) };
+        Surface { index, decision: Arc::new(ReflectionProbability::new(curve, &scene.channels)) }
+    }
 }
 
 impl Boundary for Surface {

@@ -21,6 +21,7 @@ mod fresnel;
 mod ggx;
 mod plastic;
 mod reflection;
+mod roughness;
 mod spectra;
 #[cfg(test)]
 mod tests;
@@ -32,8 +33,9 @@ use std::ops::Range;
 use glam::DVec3;
 
 use crate::scene::{
-    Bsdf as Description, MaterialId, Reflectance, SMOOTH, Scene, SpectrumId, Temperature, TextureId, Weight,
+    Bsdf as Description, MaterialId, Reflectance, Roughness, SMOOTH, Scene, SpectrumId, Temperature, TextureId, Weight,
 };
+use crate::spectral::hemisphere::index_range;
 pub use spectra::SpectralValues;
 use thermal::Hot;
 pub use thermal::hemisphere;
@@ -172,7 +174,6 @@ impl Bsdf {
             }
             self.hot.extend(Hot::new(scene, material, weight, shares, temperature));
         }
-        let smooth = |alpha: f64| alpha < SMOOTH;
         let (opaque, lobes): (bool, Vec<Box<dyn Lobe>>) = match material.bsdf {
             Description::Black => (true, Vec::new()),
             Description::Diffuse { reflectance } => {
@@ -187,19 +188,20 @@ impl Bsdf {
             }
             Description::Conductor { eta, k, roughness, energy_compensation } => {
                 self.spectra.extend([eta, k]);
-                let roughness = (!smooth(roughness[0])).then_some(roughness);
-                (true, reflection::conductor(eta, k, roughness, energy_compensation))
+                let at = move |alpha| reflection::conductor(eta, k, alpha, energy_compensation);
+                (true, self.of_roughness(roughness, at))
             }
             Description::Dielectric { eta, dispersion, roughness } => {
                 self.spectra.push(eta);
-                let roughness = (!smooth(roughness)).then_some(roughness);
-                (false, dielectric::lobes(scene, eta, dispersion, roughness))
+                let surface = dielectric::Surface::new(scene, eta, dispersion);
+                let range = index_range(&scene.spectra[eta].curve, &scene.channels);
+                (false, self.of_roughness(roughness, move |alpha| dielectric::lobes(&surface, range, alpha)))
             }
             Description::Plastic { reflectance, eta, roughness } => {
                 self.add_reflectance(reflectance);
                 self.spectra.push(eta);
-                let roughness = (!smooth(roughness)).then_some(roughness);
-                (true, plastic::lobes(scene, reflectance, eta, roughness))
+                let range = index_range(&scene.spectra[eta].curve, &scene.channels);
+                (true, self.of_roughness(roughness, move |alpha| plastic::lobes(reflectance, eta, range, alpha)))
             }
             Description::Blend { a, b, weight: Weight::Constant(of_b) } => {
                 self.add(scene, a, weight * (1.0 - of_b), shares, temperature);
@@ -215,6 +217,21 @@ impl Bsdf {
         let two_sided = material.two_sided;
         let part = |lobe| PlacedLobe { lobe, weight, shares: shares.to_vec(), opaque, two_sided };
         self.parts.extend(lobes.into_iter().map(part));
+    }
+
+    /// The lobes that `at` gives for a roughness along and across, `None` for smooth surfaces; or, by a texture, those of the vertex.
+    fn of_roughness(
+        &mut self,
+        roughness: Roughness,
+        at: impl Fn(Option<[f64; 2]>) -> Vec<Box<dyn Lobe>> + Send + Sync + 'static,
+    ) -> Vec<Box<dyn Lobe>> {
+        match roughness {
+            Roughness::Constant(alpha) => at((alpha[0] >= SMOOTH).then_some(alpha)),
+            Roughness::Texture(texture) => {
+                self.textures.push(texture);
+                roughness::lobes(texture, move |alpha| at(Some([alpha; 2])))
+            }
+        }
     }
 
     /// The material as a path meets it; `None` where nothing is scattered.

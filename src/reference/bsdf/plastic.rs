@@ -8,19 +8,23 @@ use glam::DVec3;
 use super::ggx::Ggx;
 use super::reflection::{Boundary, Mirror, RoughMirror};
 use super::{Choice, Lobe, Vertex, cosine_density, cosine_direction, fresnel};
-use crate::scene::{Reflectance, Scene, SpectrumId};
+use crate::scene::{Reflectance, SpectrumId};
+use crate::spectral::hemisphere::DielectricAlbedo;
 use crate::spectral::hemisphere::fresnel::mean_dielectric;
-use crate::spectral::hemisphere::{DielectricAlbedo, index_range};
 
-/// The coat's reflection, and what comes out of the base.
-pub fn lobes(scene: &Scene, reflectance: Reflectance, eta: SpectrumId, roughness: Option<f64>) -> Vec<Box<dyn Lobe>> {
-    let range = index_range(&scene.spectra[eta].curve, &scene.channels);
-    let rough = roughness.map(|alpha| DielectricAlbedo::shared(alpha, range));
+/// The coat's reflection, and what comes out of the base; `range` bounds the coat's index.
+pub fn lobes(
+    reflectance: Reflectance,
+    eta: SpectrumId,
+    range: [f64; 2],
+    roughness: Option<[f64; 2]>,
+) -> Vec<Box<dyn Lobe>> {
+    let rough = roughness.map(|[alpha, _]| DielectricAlbedo::shared(alpha, range));
     let coat = Coat { eta, rough };
     let base = Box::new(Base { reflectance, coat: coat.clone() });
     match roughness {
         None => vec![Box::new(Mirror(coat)), base],
-        Some(alpha) => vec![Box::new(RoughMirror { boundary: coat, ggx: Ggx { alpha: [alpha; 2] } }), base],
+        Some(alpha) => vec![Box::new(RoughMirror { boundary: coat, ggx: Ggx { alpha } }), base],
     }
 }
 

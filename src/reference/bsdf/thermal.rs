@@ -66,28 +66,29 @@ impl Hot {
         shares: &[(TextureId, bool)],
         temperature: Temperature,
     ) -> Option<Self> {
-        let smooth = |alpha: f64| alpha < SMOOTH;
         let absorber = match material.bsdf {
             Description::Black => Absorber::Black,
             Description::Diffuse { reflectance } => Absorber::Diffuse { reflectance },
             Description::Translucent { reflectance, transmittance } => {
                 Absorber::Translucent { reflectance, transmittance }
             }
-            Description::Conductor { eta, k, roughness, .. } if smooth(roughness[0]) => Absorber::Mirror { eta, k },
-            Description::Conductor { eta, k, roughness, energy_compensation } => Absorber::RoughMetal {
-                eta,
-                k,
-                facets: FacetCosines::shared(roughness),
-                again: energy_compensation.then(|| ReflectionAlbedo::shared(roughness)),
+            Description::Conductor { eta, k, roughness, energy_compensation } => match roughness.of_hot_surface() {
+                [along, _] if along < SMOOTH => Absorber::Mirror { eta, k },
+                alpha => Absorber::RoughMetal {
+                    eta,
+                    k,
+                    facets: FacetCosines::shared(alpha),
+                    again: energy_compensation.then(|| ReflectionAlbedo::shared(alpha)),
+                },
             },
-            Description::Plastic { reflectance, eta, roughness } if smooth(roughness) => {
-                Absorber::Varnish { reflectance, eta }
-            }
-            Description::Plastic { reflectance, eta, roughness } => {
-                let range = index_range(&scene.spectra[eta].curve, &scene.channels);
-                let coat = DielectricAlbedo::shared(roughness, range);
-                Absorber::RoughPlastic { reflectance, eta, facets: FacetCosines::shared([roughness; 2]), coat }
-            }
+            Description::Plastic { reflectance, eta, roughness } => match roughness.of_hot_surface() {
+                [alpha, _] if alpha < SMOOTH => Absorber::Varnish { reflectance, eta },
+                alpha => {
+                    let range = index_range(&scene.spectra[eta].curve, &scene.channels);
+                    let coat = DielectricAlbedo::shared(alpha[0], range);
+                    Absorber::RoughPlastic { reflectance, eta, facets: FacetCosines::shared(alpha), coat }
+                }
+            },
             Description::Dielectric { .. } | Description::Blend { .. } => return None,
         };
         Some(Hot { weight, shares: shares.to_vec(), temperature, two_sided: material.two_sided, absorber })

@@ -73,7 +73,10 @@ const TRANSMITTANCE: Key = Key::optional(
      Both sides are alike, and with `reflectance` it is 1 at most at every wavelength; the rest is absorbed.",
 )
 .tables(COLOURS);
-const ROUGHNESS: Key = Key::default("roughness", Number, "0.0", "GGX's α; 0 is smooth.").range("[0, 1]");
+const ROUGHNESS: Key =
+    Key::default("roughness", Number, "0.0", "GGX's α; 0 is smooth. By a texture it is 0.001 at least.")
+        .range("[0, 1]")
+        .tables(NUMBERS);
 
 const A_DIFFUSE: &str = r#"
 [materials.paint.diffuse]
@@ -116,7 +119,7 @@ const A_PLASTIC: &str = r#"
 [materials.paint.plastic]
 reflectance = { rgb = [0.1, 0.2, 0.6] }
 eta = 1.5
-roughness = 0.05
+roughness = 0.05                       # or { texture = "mask.png" }
 opacity = 0.9
 "#;
 const A_BLEND: &str = r#"
@@ -174,10 +177,11 @@ pub static CONDUCTOR: Section = Section {
             Number,
             "0.0",
             "GGX's α, 0 a mirror; or two, along u and across it ([Textures](#textures) says where u is), both at \
-             least 0.001 or both below.",
+             least 0.001 or both below. By a texture it is the same in all directions, and 0.001 at least.",
         )
         .or("`[alpha_x, alpha_y]`")
-        .range("[0, 1]"),
+        .range("[0, 1]")
+        .tables(NUMBERS),
         Key::default(
             "energy_compensation",
             Boolean,
@@ -368,14 +372,14 @@ reflectance = { texture = "albedo.png", filter = "nearest", scale = [4, 2], offs
 pub static TEXTURE_OF_NUMBERS: Section = Section {
     path: "texture-of-numbers",
     heading: "`{ texture = … }`",
-    summary: "a weight, temperature or opacity that differs from place to place",
-    about: "In the place of the `weight` of a blend or of a surface's `temperature` or `opacity`.",
+    summary: "a weight, temperature, opacity or roughness that differs from place to place",
+    about: "In the place of the `weight` of a blend or of a surface's `temperature`, `opacity` or `roughness`.",
     keys: &[
         Key::required(
             "texture",
             File,
-            "A grey picture, or one whose R, G and B are the same. Of weights and opacities: PNG or OpenEXR, in [0, 1], taken as they \
-             are. Of temperatures: OpenEXR, in K, in [0, 1e9]; what is at 0 emits nothing.",
+            "A grey picture, or one whose R, G and B are the same. Of weights, opacities and roughnesses (GGX's α): PNG or OpenEXR, in \
+             [0, 1], taken as they are. Of temperatures: OpenEXR, in K, in [0, 1e9]; what is at 0 emits nothing.",
         ),
         FILTER,
         SCALE,

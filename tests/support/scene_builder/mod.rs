@@ -7,8 +7,8 @@ pub mod surfaces;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use spectile::scene::{
     Assembly, Attributes, Bsdf, Camera, Cone, Emission, Environment, EnvironmentMap, Evaluation, Evaluator, Film,
-    Filter, Integrator, Light, Material, Mesh, Object, Placement, Projection, Reflectance, Sampler, Scene, Shape,
-    Sides, Spectrum, Texels, Texture, TextureKind, Wavelengths, Weight,
+    Filter, Integrator, Light, Material, Mesh, Object, Placement, Projection, Reflectance, Roughness, Sampler, Scene,
+    Shape, Sides, Spectrum, Texels, Texture, TextureKind, Wavelengths, Weight,
 };
 use spectile::spectral::{Channels, Curve, Outside, upsample};
 
@@ -169,20 +169,34 @@ impl Builder {
     /// A metal, with energy compensation.
     pub fn conductor(mut self, shape: Shape, eta: impl IntoCurve, k: impl IntoCurve, roughness: [f64; 2]) -> Self {
         let (eta, k) = (self.spectrum(eta), self.spectrum(k));
-        self.object(shape, Bsdf::Conductor { eta, k, roughness, energy_compensation: true }, true, None)
+        self.object(
+            shape,
+            Bsdf::Conductor { eta, k, roughness: Roughness::Constant(roughness), energy_compensation: true },
+            true,
+            None,
+        )
     }
 
     /// A dispersive dielectric; the front is outside.
     pub fn dielectric(mut self, shape: Shape, eta: impl IntoCurve, roughness: f64) -> Self {
         let eta = self.spectrum(eta);
-        self.object(shape, Bsdf::Dielectric { eta, dispersion: true, roughness }, true, None)
+        self.object(
+            shape,
+            Bsdf::Dielectric { eta, dispersion: true, roughness: Roughness::even(roughness) },
+            true,
+            None,
+        )
     }
 
     pub fn plastic(mut self, shape: Shape, reflectance: impl IntoCurve, eta: impl IntoCurve, roughness: f64) -> Self {
         let (reflectance, eta) = (self.spectrum(reflectance), self.spectrum(eta));
         self.object(
             shape,
-            Bsdf::Plastic { reflectance: Reflectance::Spectrum(reflectance), eta, roughness },
+            Bsdf::Plastic {
+                reflectance: Reflectance::Spectrum(reflectance),
+                eta,
+                roughness: Roughness::even(roughness),
+            },
             true,
             None,
         )
@@ -216,7 +230,8 @@ impl Builder {
     /// A coat over a textured base.
     pub fn coated(mut self, shape: Shape, texture: usize, eta: impl IntoCurve, roughness: f64) -> Self {
         let eta = self.spectrum(eta);
-        let bsdf = Bsdf::Plastic { reflectance: Reflectance::Texture(texture), eta, roughness };
+        let bsdf =
+            Bsdf::Plastic { reflectance: Reflectance::Texture(texture), eta, roughness: Roughness::even(roughness) };
         self.object(shape, bsdf, true, None)
     }
 
