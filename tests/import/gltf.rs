@@ -106,3 +106,36 @@ fn scenes_of_others_are_read() {
         assert!(!found.scene.objects.is_empty() && found.page.starts_with("# Import of "), "{name}");
     }
 }
+
+/// A mesh at two places of EXT_mesh_gpu_instancing and at a node: an assembly, placed three times.
+#[test]
+fn meshes_of_several_places_are_assemblies() {
+    const PLACED: &str = r#"{"asset": {"version": "2.0"}, "extensionsRequired": ["EXT_mesh_gpu_instancing"],
+        "extensionsUsed": ["EXT_mesh_gpu_instancing"],
+        "nodes": [{"mesh": 0, "name": "tree", "translation": [0, 1, 0], "extensions": {"EXT_mesh_gpu_instancing":
+            {"attributes": {"TRANSLATION": 1}}}}, {"mesh": 0, "translation": [0, 0, 5]}, {"mesh": 1}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}, {"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "accessors": [{"bufferView": 0, "componentType": 5121, "type": "VEC3", "count": 3},
+            {"bufferView": 1, "componentType": 5126, "type": "VEC3", "count": 2}],
+        "bufferViews": [{"buffer": 0, "byteLength": 9}, {"buffer": 1, "byteLength": 24}],
+        "buffers": [{"byteLength": 9, "uri": "data:;base64,AAAAAQAAAAEA"},
+            {"byteLength": 24, "uri": "data:;base64,AAAAAAAAAAAAAAAAAAAAQAAAAAAAAAAA"}]}"#;
+    let (folder, path) = written("scene.gltf", PLACED);
+    let found = import(&path);
+    let [assembly] = &found.scene.assemblies[..] else { panic!("{}", found.toml) };
+    let places: Vec<DVec3> = assembly.instances.iter().map(|place| place.translation).collect();
+    assert_eq!(places, [DVec3::new(0.0, 1.0, 0.0), DVec3::new(2.0, 1.0, 0.0), DVec3::new(0.0, 0.0, 5.0)]);
+    let within: Vec<Option<usize>> = found.scene.objects.iter().map(|object| object.assembly).collect();
+    assert_eq!(within, [None, Some(0)], "{}", found.toml);
+
+    for (from, to, expected) in [
+        ("\"TRANSLATION\": 1", "\"TRANSLATION\": 7", "accessor 7, which does not exist"),
+        ("\"TRANSLATION\": 1", "\"TRANSLATION\": 1, \"SCALE\": 0", "has lists of different lengths"),
+        ("{\"TRANSLATION\": 1}", "{}", "has no place"),
+    ] {
+        assert!(PLACED.contains(from), "{from}");
+        std::fs::write(&path, PLACED.replacen(from, to, 1)).expect("written");
+        let error = spectile::import::import(&path, &folder.path().join("out")).expect_err(from).to_string();
+        assert!(error.contains(expected), "{to}: {error}");
+    }
+}

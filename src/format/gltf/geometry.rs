@@ -15,12 +15,23 @@ use crate::format::mesh::{Labels, Mesh, Part, Place};
 /// Triangles that a file may be made to have by placing its meshes many times.
 const MOST_COPIED: usize = 20_000_000;
 
+/// The extension by which a node's mesh stands in many places.
+const INSTANCING: &str = "EXT_mesh_gpu_instancing";
+
 /// A node where its parents put it.
 #[derive(Debug, Clone, Copy)]
 pub struct Placed {
     /// Index into `nodes`.
     pub node: usize,
     pub to_world: DAffine3,
+}
+
+/// A mesh, and where it stands.
+#[derive(Debug)]
+pub struct Standing {
+    /// A part for each primitive: where the mesh stands once, of the world, else of the mesh itself.
+    pub mesh: Mesh,
+    pub places: Vec<DAffine3>,
 }
 
 impl File {
@@ -110,14 +121,17 @@ impl File {
         let mut mesh = Mesh::default();
         let mut count = 0;
         for placed in self.nodes(node)? {
-            for part in primitives.of_node(&placed, &mut mesh)? {
-                count += part.triangles.len();
-                if count > MOST_COPIED.max(primitives.triangles) {
-                    return Err(format!(
-                        "has more than {MOST_COPIED} triangles once its meshes stand at all their nodes: give it in pieces, by `node`"
-                    ));
+            for to_world in self.places(&placed)? {
+                for part in primitives.of_node(&Placed { to_world, ..placed }, &mut mesh)? {
+                    count += part.triangles.len();
+                    if count > MOST_COPIED.max(primitives.triangles) {
+                        return Err(format!(
+                            "has more than {MOST_COPIED} triangles once its meshes stand at all their places: give it in pieces, by \
+                             `node`, or `spectile import` it"
+                        ));
+                    }
+                    mesh.parts.push(part);
                 }
-                mesh.parts.push(part);
             }
         }
         if mesh.parts.is_empty() {
@@ -125,6 +139,96 @@ impl File {
             return Err(format!("has no triangles{of}"));
         }
         Ok(mesh)
+    }
+
+    /// The meshes of the nodes of the scene that the file shows first, each once, in the order of their first nodes.
+    ///
+    /// # Errors
+    /// A sentence.
+    pub fn standing(&self) -> Result<Vec<Standing>, String> {
+        let mut primitives = Primitives::new(self);
+        let mut places: Vec<(Placed, Vec<DAffine3>)> = Vec::new();
+        let mut known: HashMap<usize, usize> = HashMap::new();
+        for placed in self.nodes(None)? {
+            // Each node may ask for what is not supported.
+            self.check_node(&placed)?;
+            let Some(mesh) = self.root.nodes[placed.node].mesh else { continue };
+            let at = *known.entry(mesh.value()).or_insert(places.len());
+            if at == places.len() {
+                places.push((placed, Vec::new()));
+            }
+            places[at].1.extend(self.places(&placed)?);
+        }
+        let standing = places.into_iter().filter(|(_, places)| !places.is_empty()).map(|(first, places)| {
+            let mut mesh = Mesh::default();
+            let to_world = if let [only] = places[..] { only } else { DAffine3::IDENTITY };
+            mesh.parts = primitives.of_node(&Placed { to_world, ..first }, &mut mesh)?;
+            Ok(Standing { mesh, places })
+        });
+        standing.collect()
+    }
+
+    /// Where a node's mesh stands: at the node, or by EXT_mesh_gpu_instancing at places around it.
+    fn places(&self, placed: &Placed) -> Result<Vec<DAffine3>, String> {
+        let extensions = self.root.nodes[placed.node].extensions.as_ref();
+        let Some(instancing) = extensions.and_then(|e| e.others.get(INSTANCING)) else {
+            return Ok(vec![placed.to_world]);
+        };
+        let path = format!("nodes[{}].extensions.{INSTANCING}.attributes", placed.node);
+        let attributes = instancing["attributes"].as_object().ok_or_else(|| format!("`{path}` is missing"))?;
+        let index = |name: &str| -> Result<Option<usize>, String> {
+            let Some(value) = attributes.get(name) else { return Ok(None) };
+            let index = value.as_u64().and_then(|index| usize::try_from(index).ok());
+            index.map(Some).ok_or_else(|| format!("`{path}.{name}` is no accessor"))
+        };
+        let at = |name: &str| format!("{path}.{name}");
+        let moved = index("TRANSLATION")?.map(|index| self.vectors::<3>(index, &at("TRANSLATION"))).transpose()?;
+        let turned = index("ROTATION")?.map(|index| self.vectors::<4>(index, &at("ROTATION"))).transpose()?;
+        let scaled = index("SCALE")?.map(|index| self.vectors::<3>(index, &at("SCALE"))).transpose()?;
+        let counts = [moved.as_ref().map(Vec::len), turned.as_ref().map(Vec::len), scaled.as_ref().map(Vec::len)];
+        let count = counts.iter().flatten().next().copied().ok_or_else(|| format!("`{path}` has no place"))?;
+        if counts.iter().flatten().any(|other| *other != count) {
+            return Err(format!("`{path}` has lists of different lengths"));
+        }
+        let place = |i: usize| {
+            let rotation = turned.as_ref().map_or(DQuat::IDENTITY, |all| DQuat::from_array(all[i]));
+            if !(rotation.is_finite() && rotation.length_squared() > 1e-12) {
+                return Err(format!("`{path}.ROTATION` has no rotation at place {i}"));
+            }
+            let within = DAffine3::from_scale_rotation_translation(
+                scaled.as_ref().map_or(DVec3::ONE, |all| DVec3::from_array(all[i])),
+                rotation.normalize(),
+                moved.as_ref().map_or(DVec3::ZERO, |all| DVec3::from_array(all[i])),
+            );
+            let to_world = placed.to_world * within;
+            if !to_world.is_finite() {
+                return Err(format!("`{path}` is not finite at place {i}"));
+            }
+            Ok(to_world)
+        };
+        (0..count).map(place).collect()
+    }
+
+    /// Refuses what changes the mesh of a node and is not supported.
+    fn check_node(&self, placed: &Placed) -> Result<(), String> {
+        let node = &self.root.nodes[placed.node];
+        let at = format!("nodes[{}]", placed.node);
+        let hidden = node.extensions.iter().filter_map(|e| e.others.get("KHR_node_visibility"));
+        if hidden.into_iter().any(|visibility| visibility["visible"] == false) {
+            return Err(format!(
+                "`{at}` is hidden by KHR_node_visibility, which is not supported: export without what is hidden"
+            ));
+        }
+        let Some(index) = node.mesh.map(|mesh| mesh.value()) else { return Ok(()) };
+        let of = self.root.meshes.get(index).ok_or_else(|| missing(&format!("{at}.mesh"), "mesh", index))?;
+        if node.skin.is_some() {
+            return Err(format!("`{at}` has a skin, which is not supported: apply its pose before exporting"));
+        }
+        let weights = node.weights.as_ref().or(of.weights.as_ref());
+        if weights.is_some_and(|weights| weights.iter().any(|weight| *weight != 0.0)) {
+            return Err(format!("`{at}` is morphed, which is not supported: apply the shape before exporting"));
+        }
+        Ok(())
     }
 
     /// The name that material `index` goes by: its own, or `material N` where it has none.
@@ -195,28 +299,10 @@ impl<'f> Primitives<'f> {
 
     fn of_node(&mut self, placed: &Placed, mesh: &mut Mesh) -> Result<Vec<Part>, String> {
         let file = self.file;
+        file.check_node(placed)?;
         let node = &file.root.nodes[placed.node];
-        let at = format!("nodes[{}]", placed.node);
-        if let Some(name) =
-            node.extensions.iter().flat_map(|e| e.others.keys()).find(|name| *name == "EXT_mesh_gpu_instancing")
-        {
-            return Err(format!("`{at}` has copies by {name}, which is not supported: export them as nodes"));
-        }
-        let hidden = node.extensions.iter().filter_map(|e| e.others.get("KHR_node_visibility"));
-        if hidden.into_iter().any(|visibility| visibility["visible"] == false) {
-            return Err(format!(
-                "`{at}` is hidden by KHR_node_visibility, which is not supported: export without what is hidden"
-            ));
-        }
         let Some(index) = node.mesh.map(|mesh| mesh.value()) else { return Ok(Vec::new()) };
-        let of = file.root.meshes.get(index).ok_or_else(|| missing(&format!("{at}.mesh"), "mesh", index))?;
-        if node.skin.is_some() {
-            return Err(format!("`{at}` has a skin, which is not supported: apply its pose before exporting"));
-        }
-        let weights = node.weights.as_ref().or(of.weights.as_ref());
-        if weights.is_some_and(|weights| weights.iter().any(|weight| *weight != 0.0)) {
-            return Err(format!("`{at}` is morphed, which is not supported: apply the shape before exporting"));
-        }
+        let of = &file.root.meshes[index];
         let mut parts = Vec::new();
         for (i, primitive) in of.primitives.iter().enumerate() {
             let path = format!("meshes[{index}].primitives[{i}]");

@@ -9,7 +9,7 @@ use std::path::{Component, Path};
 
 use gltf_json::Root;
 
-pub use geometry::Placed;
+pub use geometry::{Placed, Standing};
 pub use gltf_json as json;
 
 use crate::error::Problem;
@@ -25,8 +25,9 @@ pub struct File {
 }
 
 /// Extensions that say nothing of where surfaces are, or that are read: a file may require them.
-const KNOWN: [&str; 6] = [
+const KNOWN: [&str; 7] = [
     "KHR_mesh_quantization",
+    "EXT_mesh_gpu_instancing",
     "KHR_lights_punctual",
     "KHR_texture_transform",
     "KHR_texture_basisu",

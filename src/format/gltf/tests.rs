@@ -55,6 +55,11 @@ fn transforms_of_nodes_are_chained() {
     assert_eq!((part.triangles.len(), part.labels.object.as_deref()), (2, Some("a")));
     assert_eq!(part.place, Place::Json("meshes[0].primitives[0]".to_owned()));
     assert!((0..2).all(|i| normal_of(part, i).z > 3.9));
+    // At places around the node: of what the accessor has, the square's corners.
+    let nodes = r#"{"mesh": 0, "translation": [0, 0, 7], "extensions": {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": 0}}}}"#;
+    let mesh = read(&square(nodes, STRIP)).unwrap();
+    let first: Vec<[f64; 3]> = mesh.parts.iter().map(|part| part.positions[0]).collect();
+    assert_eq!(first, [[0., 0., 7.], [1., 0., 7.], [0., 1., 7.], [1., 1., 7.]]);
     // By columns, mirrored: fronts stay fronts.
     let matrix = r#"{"mesh": 0, "matrix": [-1, 0, 0, 0,  0, 1, 0, 0,  0, 0, 1, 0,  5, 6, 7, 1]}"#;
     let mesh = read(&square(matrix, STRIP)).unwrap();

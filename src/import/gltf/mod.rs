@@ -16,7 +16,7 @@ use crate::format::gltf::json::camera::Type as CameraType;
 use crate::format::gltf::json::extensions::scene::khr_lights_punctual::Type as LightType;
 use crate::format::gltf::json::mesh::Semantic;
 use crate::format::gltf::json::validation::Checked;
-use crate::format::gltf::{File, Placed, json, parse};
+use crate::format::gltf::{File, Placed, Standing, json, parse};
 use crate::format::mesh::{self, Part};
 use crate::{Error, Result};
 
@@ -27,13 +27,15 @@ struct Importer<'f, 's> {
     file: &'f File,
     scene: &'s mut Scene,
     looks: HashMap<Option<usize>, Look>,
+    /// Whether something shines.
+    is_lit: bool,
 }
 
 /// Translates the scene in the file `source`.
 pub fn read(source: &Path, scene: &mut Scene) -> Result<()> {
     let bytes = mesh::content(source)?;
     let file = parse(&bytes, source)?;
-    let mut importer = Importer { file: &file, scene, looks: HashMap::new() };
+    let mut importer = Importer { file: &file, scene, looks: HashMap::new(), is_lit: false };
     importer.all()
 }
 
@@ -50,16 +52,18 @@ impl Importer<'_, '_> {
         let nodes = self.file.nodes(None).map_err(|message| self.error(message))?;
         let mut bounds = [DVec3::INFINITY, DVec3::NEG_INFINITY];
         if nodes.iter().any(|placed| self.file.root.nodes[placed.node].mesh.is_some()) {
-            let read = self.file.mesh(None).map_err(|message| self.error(message))?;
-            if read.without_surface > 0 {
-                let what = format!("{} primitives of points and lines, which have no surface", read.without_surface);
+            let read = self.file.standing().map_err(|message| self.error(message))?;
+            if read.iter().all(|standing| standing.mesh.parts.is_empty()) {
+                return Err(self.error("has no triangles".to_owned()));
+            }
+            let lines: usize = read.iter().map(|standing| standing.mesh.without_surface).sum();
+            if lines > 0 {
+                let what = format!("{lines} primitives of points and lines, which have no surface");
                 self.scene.report.say(Fate::LeftOut, None, what);
             }
-            for part in &read.parts {
-                for p in part.positions.iter().copied().map(DVec3::from_array) {
-                    bounds = [bounds[0].min(p), bounds[1].max(p)];
-                }
-                self.part(part)?;
+            for Standing { mesh, places } in &read {
+                self.standing(mesh, places)?;
+                bounds = around(mesh, places, bounds);
             }
         }
         for placed in &nodes {
@@ -68,9 +72,7 @@ impl Importer<'_, '_> {
         self.cameras(&nodes, bounds)?;
         self.scene.integrator = Some(Section::new("[integrator]").with("max_bounces", "8"));
         self.scene.report.chosen("8 bounces: glTF has no integrators");
-        let is_lit = !self.scene.lights.is_empty()
-            || self.scene.objects.iter().any(|object| object.entries.iter().any(|(key, _)| key == "emission"));
-        if !is_lit {
+        if !self.is_lit && self.scene.lights.is_empty() {
             let section =
                 Section::new("[environment]").comment("chosen: the file has no lights").with("radiance", "1.0");
             self.scene.environment = Some(section);
@@ -82,7 +84,8 @@ impl Importer<'_, '_> {
                 self.scene.report.say(Fate::LeftOut, None, format!("{count} {what}s: everything is where its node is"));
             }
         }
-        const READ: [&str; 7] = [
+        const READ: [&str; 8] = [
+            "EXT_mesh_gpu_instancing",
             "KHR_lights_punctual",
             "KHR_materials_emissive_strength",
             "KHR_materials_ior",
@@ -95,6 +98,29 @@ impl Importer<'_, '_> {
             let shown: String = name.chars().take(60).collect();
             self.scene.report.say(Fate::LeftOut, None, format!("the extension {}", shown.escape_debug()));
         }
+        Ok(())
+    }
+
+    /// A mesh that stands once is objects, one of several places an assembly.
+    fn standing(&mut self, mesh: &mesh::Mesh, places: &[DAffine3]) -> Result<()> {
+        if places.len() == 1 {
+            return mesh.parts.iter().try_for_each(|part| self.part(part));
+        }
+        let before = std::mem::take(&mut self.scene.objects);
+        let added = mesh.parts.iter().try_for_each(|part| self.part(part));
+        let objects = std::mem::replace(&mut self.scene.objects, before);
+        added?;
+        let Some(first) = mesh.parts.first() else { return Ok(()) };
+        let mesh::Place::Json(path) = &first.place else { return Ok(()) };
+        let id = self.scene.assemble(first.labels.object.as_deref().unwrap_or("mesh"), objects);
+        let (flat, solid): (Vec<DAffine3>, Vec<_>) =
+            places.iter().copied().partition(|place| place.matrix3.determinant() == 0.0);
+        if !flat.is_empty() {
+            let what = format!("{} places of a mesh that flatten it", flat.len());
+            self.scene.report.left_out(self.place(path.clone()), what);
+        }
+        solid.into_iter().for_each(|place| self.scene.assemblies[id].place(place));
+        self.scene.report.translated("mesh of several places", self.place(path.clone()));
         Ok(())
     }
 
@@ -129,6 +155,7 @@ impl Importer<'_, '_> {
         object.set("material", text::quoted(&material));
         if let Some(emission) = emission {
             object.set("emission", emission);
+            self.is_lit = true;
         }
         self.scene.objects.push(object);
         self.scene.report.translated("primitive", self.place(path.clone()));
@@ -270,4 +297,23 @@ impl Importer<'_, '_> {
         self.scene.report.chosen("a camera that sees everything, as the file has none");
         self.film(16.0 / 9.0);
     }
+}
+
+/// `bounds` and all of a mesh wherever it stands.
+fn around(mesh: &mesh::Mesh, places: &[DAffine3], mut bounds: [DVec3; 2]) -> [DVec3; 2] {
+    let own = mesh.parts.iter().flat_map(|part| &part.positions).copied().map(DVec3::from_array);
+    let own = own.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], p| [low.min(p), high.max(p)]);
+    if !own[0].cmple(own[1]).all() {
+        return bounds;
+    }
+    // A mesh that stands once is in the world already.
+    let once = [DAffine3::IDENTITY];
+    for place in if places.len() == 1 { &once } else { places } {
+        for corner in 0..8 {
+            let of = |axis: usize| own[corner >> axis & 1][axis];
+            let p = place.transform_point3(DVec3::new(of(0), of(1), of(2)));
+            bounds = [bounds[0].min(p), bounds[1].max(p)];
+        }
+    }
+    bounds
 }
