@@ -89,7 +89,8 @@ fn textured_roughness_is_that_of_the_reference() {
 #[test]
 fn a_white_furnace_at_every_roughness() {
     let texels: Vec<f32> = (0..16).map(|i| (i as f32 / 15.0).powi(2).max(0.002)).collect();
-    let kinds: [(&str, fn(Builder, Shape) -> Builder); 3] = [
+    type Of = fn(Builder, Shape) -> Builder;
+    let kinds: [(&str, Of); 3] = [
         ("metal", |b, s| white_metal(b, s, [0.5; 2])),
         ("glass", |b, s| b.dielectric(s, 1.5, 0.5)),
         ("varnish", |b, s| b.plastic(s, 1.0, 1.5, 0.5)),

@@ -8,11 +8,13 @@ use glam::DVec3;
 use super::{Choice, Lobe, Vertex};
 use crate::scene::{SMOOTH, TextureId};
 
+type Lobes = Vec<Box<dyn Lobe>>;
+
 /// The lobes of each roughness that was met. Each has tables of its own, so this is for textures of few numbers.
 struct Known {
     texture: TextureId,
-    at: Box<dyn Fn(f64) -> Vec<Box<dyn Lobe>> + Send + Sync>,
-    met: Mutex<HashMap<u64, Arc<Vec<Box<dyn Lobe>>>>>,
+    at: Box<dyn Fn(f64) -> Lobes + Send + Sync>,
+    met: Mutex<HashMap<u64, Arc<Lobes>>>,
 }
 
 /// One of the lobes, at the roughness that the texture has at a vertex.
@@ -22,7 +24,7 @@ struct ByPlace {
 }
 
 /// Lobes by what `texture` has at a vertex, of which `at` gives as many for every roughness.
-pub fn lobes(texture: TextureId, at: impl Fn(f64) -> Vec<Box<dyn Lobe>> + Send + Sync + 'static) -> Vec<Box<dyn Lobe>> {
+pub fn lobes(texture: TextureId, at: impl Fn(f64) -> Lobes + Send + Sync + 'static) -> Lobes {
     let count = at(1.0).len();
     let known = Arc::new(Known { texture, at: Box::new(at), met: Mutex::default() });
     (0..count).map(|lobe| Box::new(ByPlace { known: Arc::clone(&known), lobe }) as Box<dyn Lobe>).collect()
