@@ -5,6 +5,7 @@
 mod environment;
 mod geometry;
 mod gltf;
+mod media;
 mod metals;
 mod mitsuba;
 mod pbrt;

@@ -425,6 +425,13 @@ impl Texture {
     }
 }
 
+/// RGB as numbers of any size: a smooth spectrum of half of their size, scaled.
+pub fn unbounded(rgb: [f64; 3]) -> Curve {
+    let scale = 2.0 * rgb[0].max(rgb[1]).max(rgb[2]).max(f64::MIN_POSITIVE);
+    let smooth = crate::spectral::upsample::reflectance(rgb.map(|v| v / scale));
+    sampled(&|nm| scale * smooth.eval(nm))
+}
+
 /// A function of wavelength at every 5 nm of what is visible.
 pub fn sampled(f: &dyn Fn(f64) -> f64) -> Curve {
     let nm: Vec<f64> = (72..=166).map(|i| 5.0 * f64::from(i)).collect();

@@ -86,6 +86,7 @@ pub struct Scene {
     pub film: Option<Section>,
     pub integrator: Option<Section>,
     pub materials: Vec<Section>,
+    pub media: Vec<Section>,
     pub objects: Vec<Section>,
     pub assemblies: Vec<Assembly>,
     pub lights: Vec<Section>,
@@ -104,7 +105,7 @@ impl Scene {
         Scene { folder: folder.to_owned(), ..Scene::default() }
     }
 
-    /// A name that no material has, as near to `wanted` as can be.
+    /// A name that no material and no medium has, as near to `wanted` as can be.
     pub fn material_name(&mut self, wanted: &str) -> String {
         let wanted = if wanted.is_empty() { "material" } else { wanted };
         let name = (1..).map(|i| if i == 1 { wanted.to_owned() } else { format!("{wanted}-{i}") });
@@ -254,6 +255,7 @@ impl Scene {
             .chain(&self.integrator)
             .chain(&self.environment)
             .chain(&self.materials)
+            .chain(&self.media)
             .chain(&self.lights)
             .chain(&self.objects)
             .chain(assemblies);

@@ -1,6 +1,7 @@
 //! `spectile import`: what scenes of other programs become.
 
 mod gltf;
+mod media;
 mod mitsuba;
 mod pbrt;
 mod roughness;

@@ -9,7 +9,7 @@ use super::xml::{Node, inside};
 use super::{Importer, at};
 use crate::Result;
 use crate::format::text as spectra;
-use crate::import::picture::{Colour, Picture, Texels, Texture, sampled};
+use crate::import::picture::{Colour, Picture, Texels, Texture, unbounded};
 use crate::import::report::Fate;
 use crate::import::text;
 use crate::spectral::upsample;
@@ -302,13 +302,6 @@ pub fn upward(scale: DVec2, offset: DVec2, flip: bool) -> ([f64; 2], [f64; 2]) {
     // v there: s v + o of the v that runs down. Upward it is 1 - that, and v down is 1 - v up.
     let (v_scale, v_offset) = if flip { (-scale.y, 1.0 - offset.y) } else { (scale.y, 1.0 - scale.y - offset.y) };
     ([scale.x, v_scale], [offset.x, v_offset])
-}
-
-/// RGB as numbers of any size: a smooth spectrum of half of their size, scaled.
-pub fn unbounded(rgb: [f64; 3]) -> Curve {
-    let scale = 2.0 * rgb[0].max(rgb[1]).max(rgb[2]).max(f64::MIN_POSITIVE);
-    let smooth = upsample::reflectance(rgb.map(|v| v / scale));
-    sampled(&|nm| scale * smooth.eval(nm))
 }
 
 fn check(node: &Node, of: Of, values: impl IntoIterator<Item = f64>) -> Result<()> {

@@ -3,6 +3,7 @@
 mod bsdf;
 mod colour;
 mod emitter;
+mod medium;
 mod principled;
 mod sensor;
 mod serialized;
@@ -33,6 +34,8 @@ struct Importer<'n, 's> {
     objects: HashMap<&'n str, &'n Node>,
     /// Names of BSDFs that are materials already, by their element and whether v runs down.
     materials: HashMap<(*const Node, bool), bsdf::Made>,
+    /// Media that are in the scene already; `None`: those that are left out.
+    media: HashMap<*const Node, Option<String>>,
     /// Groups that are assemblies already; `None`: those that have others in them are not.
     groups: HashMap<*const Node, Option<usize>>,
     /// Copies so far.
@@ -44,7 +47,14 @@ pub fn read(source: &Path, scene: &mut Scene) -> Result<()> {
     let root = xml::Files::default().read(source)?;
     let mut objects = HashMap::new();
     collect(&root, &mut objects)?;
-    let mut importer = Importer { scene, objects, materials: HashMap::new(), groups: HashMap::new(), copies: 0 };
+    let mut importer = Importer {
+        scene,
+        objects,
+        materials: HashMap::new(),
+        media: HashMap::new(),
+        groups: HashMap::new(),
+        copies: 0,
+    };
     importer.scene(&root)
 }
 

@@ -12,6 +12,7 @@ use super::{Importer, MOST_COPIES, at, serialized};
 use crate::Result;
 use crate::format::mesh::{self as meshes, Format};
 use crate::import::geometry::{AROUND, Mesh, similarity};
+use crate::import::media::{self, Boundary};
 use crate::import::picture::Colour;
 use crate::import::scene::Section;
 use crate::import::text;
@@ -92,11 +93,10 @@ impl<'n> Importer<'n, '_> {
         let (material, textured) = match (made, emission.is_some()) {
             (Made::Material { name, is_textured }, _) => (name, is_textured || lit),
             (Made::Nothing, true) => (self.black(), lit),
+            (Made::Nothing, false) if plugin.get("interior").is_some() => (String::new(), false),
             (Made::Nothing, false) => {
-                let filled = plugin.get("interior").or(plugin.get("exterior")).is_some();
-                let what = if filled { ", and the medium that it bounds" } else { "" };
-                let what = format!("a shape of which nothing is seen (BSDF `null`){what}");
-                self.scene.report.left_out(plugin.place(), what);
+                self.scene.report.left_out(plugin.place(), "a shape of which nothing is seen (BSDF `null`)");
+                plugin.get("exterior");
                 plugin.finish(&mut self.scene.report);
                 return Ok(());
             }
@@ -106,7 +106,18 @@ impl<'n> Importer<'n, '_> {
         if let Some(id) = node.attribute("id") {
             object.comments.insert(0, values::shown(id));
         }
-        object.set("material", text::quoted(&material));
+        if material.is_empty() {
+            if !self.fill(&plugin, &mut object, Boundary::Invisible, depth.is_some())? {
+                plugin.finish(&mut self.scene.report);
+                return Ok(());
+            }
+        } else {
+            let header = format!("[materials.{}.dielectric]", text::key(&material));
+            let is_glass = self.scene.materials.iter().any(|section| section.header == header);
+            let boundary = if is_glass { Boundary::Clear } else { Boundary::Opaque };
+            self.fill(&plugin, &mut object, boundary, depth.is_some())?;
+            object.set("material", text::quoted(&material));
+        }
         if let Some(emission) = emission {
             object.set("emission", emission);
         }
@@ -119,6 +130,22 @@ impl<'n> Importer<'n, '_> {
         plugin.finish(&mut self.scene.report);
         self.scene.report.translated(format!("shape `{}`", plugin.kind()), plugin.place());
         Ok(())
+    }
+
+    /// Gives a shape the medium of its `interior`, if it has one; whether it did.
+    fn fill(&mut self, plugin: &Plugin<'n>, object: &mut Section, boundary: Boundary, is_placed: bool) -> Result<bool> {
+        if plugin.get("exterior").is_some() {
+            self.scene.report.left_out(plugin.place(), "the `exterior` medium of a shape");
+        }
+        let Some(node) = plugin.get("interior") else { return Ok(false) };
+        if is_placed {
+            self.scene.report.left_out(plugin.place(), "the `interior` medium of a shape in a group");
+            return Ok(false);
+        }
+        match self.medium(node)? {
+            Some(name) => Ok(media::fill(self.scene, object, &name, boundary, plugin.place())),
+            None => Ok(false),
+        }
     }
 
     fn black(&mut self) -> String {

@@ -7,7 +7,7 @@ use super::token::{Parameter, Parameters, shown};
 use crate::Result;
 use crate::format::text as spectra;
 use crate::import::metals;
-use crate::import::picture::{Colour, Picture, Texels, Texture, sampled};
+use crate::import::picture::{Colour, Picture, Texels, Texture, sampled, unbounded};
 use crate::import::surfaces::luminance;
 use crate::import::text;
 use crate::spectral::upsample;
@@ -89,11 +89,7 @@ impl Importer<'_> {
             }
             Of::Light => Colour::Spectrum(upsample::emission(rgb), written(rgb)),
             Of::Index if is_grey => Colour::grey(rgb[0]),
-            Of::Index => {
-                let scale = 2.0 * rgb[0].max(rgb[1]).max(rgb[2]);
-                let smooth = upsample::reflectance(rgb.map(|v| v / scale));
-                Colour::Spectrum(sampled(&|nm| scale * smooth.eval(nm)), None)
-            }
+            Of::Index => Colour::Spectrum(unbounded(rgb), None),
         }
     }
 

@@ -4,6 +4,7 @@ mod camera;
 mod colour;
 mod light;
 mod material;
+mod medium;
 mod shape;
 mod token;
 
@@ -16,6 +17,7 @@ use self::shape::Form;
 use self::token::{At, Parameters, Token, Tokens, shown};
 use super::MOST_BOUNCES;
 use super::geometry::similarity;
+use super::media::{self, Boundary};
 use super::picture::Colour;
 use super::scene::{Scene, Section};
 use super::text;
@@ -54,6 +56,8 @@ struct State {
     look: Option<Look>,
     area: Option<AreaLight>,
     reversed: bool,
+    /// The medium within shapes now.
+    inside: Option<String>,
     /// Of `Attribute`, by what they are for.
     defaults: HashMap<String, Parameters>,
 }
@@ -65,6 +69,7 @@ struct Kept {
     to_world: DAffine3,
     look: Look,
     emission: Option<(String, bool)>,
+    inside: Option<String>,
     line: usize,
 }
 
@@ -79,6 +84,8 @@ pub struct Importer<'s> {
     pub scene: &'s mut Scene,
     pub textures: HashMap<String, Colour>,
     pub named: HashMap<String, Look>,
+    /// `None` for those that are left out, which has been said.
+    pub media: HashMap<String, Option<String>>,
     state: State,
     saved: Vec<(State, &'static str)>,
     systems: HashMap<String, DAffine3>,
@@ -97,11 +104,19 @@ pub struct Importer<'s> {
 
 /// Translates the scene in the file `source`.
 pub fn read(source: &Path, scene: &mut Scene) -> Result<()> {
-    let state = State { ctm: DAffine3::IDENTITY, look: None, area: None, reversed: false, defaults: HashMap::new() };
+    let state = State {
+        ctm: DAffine3::IDENTITY,
+        look: None,
+        area: None,
+        reversed: false,
+        inside: None,
+        defaults: HashMap::new(),
+    };
     let mut importer = Importer {
         scene,
         textures: HashMap::new(),
         named: HashMap::new(),
+        media: HashMap::new(),
         state,
         saved: Vec::new(),
         systems: HashMap::new(),
@@ -245,15 +260,18 @@ impl Importer<'_> {
                 let parameters = self.with_defaults("shape", parameters);
                 self.shape(&kind, &parameters, at)?;
             }
-            "MediumInterface" | "MakeNamedMedium" => {
-                let name = tokens.text("a name", at)?;
-                if matches!(tokens.peek()?, Some((Token::Text(text), _)) if !text.contains(' ')) {
-                    tokens.next()?;
-                }
-                tokens.parameters()?;
-                if !name.is_empty() {
-                    self.scene.report.left_out(at.place(), format!("the medium \"{}\"", shown(&name)));
-                }
+            "MakeNamedMedium" => {
+                let (name, parameters) = self.plugin(tokens, at)?;
+                let medium = self.medium(&name, &parameters, at)?;
+                self.media.insert(name, medium);
+            }
+            "MediumInterface" => {
+                let inside = tokens.text("a name", at)?;
+                let outside = match tokens.peek()? {
+                    Some((Token::Text(text), _)) if !text.contains(' ') => tokens.text("a name", at)?,
+                    _ => inside.clone(),
+                };
+                self.interface(&inside, &outside, at)?;
             }
             _ => return Err(at.problem(format!("`{}` is no directive of pbrt-v4", shown(word))).into()),
         }
@@ -458,7 +476,10 @@ impl Importer<'_> {
         parameters.finish(&format!("the shape `{kind}`"), &mut self.scene.report);
         self.scene.report.translated(format!("Shape `{kind}`"), at.place());
         let look = self.look();
-        let kept = Kept { form, to_world, look, emission, line: at.line };
+        let mut kept = Kept { form, to_world, look, emission, inside: self.state.inside.clone(), line: at.line };
+        if self.open.is_some() && kept.inside.take().is_some() {
+            self.scene.report.left_out(at.place(), "the medium in a shape of an object");
+        }
         match &mut self.open {
             Some((_, shapes)) => shapes.push(kept),
             None => self.place(kept, at)?,
@@ -509,6 +530,7 @@ impl Importer<'_> {
                 self.named.insert("lamp that is nothing else".to_owned(), look);
                 (name, false)
             }
+            (Look::Nothing, None) if kept.inside.is_some() => (String::new(), false),
             (Look::Nothing, None) => {
                 self.scene.report.left_out(at.place(), "a shape of which nothing is seen (material `interface`)");
                 return Ok(());
@@ -519,7 +541,25 @@ impl Importer<'_> {
             return Ok(());
         };
         object.comments.push(format!("line {}", kept.line));
-        object.set("material", text::quoted(&material));
+        let boundary = match &material {
+            none if none.is_empty() => Boundary::Invisible,
+            name => {
+                let header = format!("[materials.{}.dielectric]", text::key(name));
+                let is_glass = self.scene.materials.iter().any(|section| section.header == header);
+                if is_glass { Boundary::Clear } else { Boundary::Opaque }
+            }
+        };
+        let is_filled = match &kept.inside {
+            Some(medium) => media::fill(self.scene, &mut object, medium, boundary, at.place()),
+            None => false,
+        };
+        if boundary == Boundary::Invisible {
+            if !is_filled {
+                return Ok(());
+            }
+        } else {
+            object.set("material", text::quoted(&material));
+        }
         if let Some((emission, both)) = kept.emission {
             object.set("emission", emission);
             if both {

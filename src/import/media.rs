@@ -1,0 +1,114 @@
+//! What fills shapes: the same matter all over.
+
+use std::collections::HashMap;
+use std::ops::RangeInclusive;
+
+use glam::DVec3;
+
+use super::picture::sampled;
+use super::report::Place;
+use super::scene::{Scene, Section};
+use super::text;
+use crate::Result;
+use crate::format::mesh;
+use crate::spectral::Curve;
+
+/// Coefficients per unit of length, and where scattered light goes.
+pub struct Matter {
+    pub absorption: Curve,
+    pub scattering: Curve,
+    pub phase: Phase,
+}
+
+pub enum Phase {
+    /// Henyey and Greenstein's, by the mean cosine; 0 is the same in all directions.
+    HenyeyGreenstein(f64),
+    Rayleigh,
+}
+
+/// `f` of both at every wavelength.
+pub fn both(a: &Curve, b: &Curve, f: impl Fn(f64, f64) -> f64) -> Curve {
+    match (a, b) {
+        (Curve::Constant(a), Curve::Constant(b)) => Curve::Constant(f(*a, *b)),
+        _ => sampled(&|nm| f(a.eval(nm), b.eval(nm))),
+    }
+}
+
+/// At every 5 nm of the visible.
+pub fn is_within(curve: &Curve, range: RangeInclusive<f64>) -> bool {
+    (72..=166).all(|i| range.contains(&curve.eval(5.0 * f64::from(i))))
+}
+
+/// Adds a medium of the name nearest to `wanted`; gives that.
+pub fn put(scene: &mut Scene, wanted: &str, matter: &Matter) -> Result<String> {
+    let name = scene.material_name(wanted);
+    let mut section = Section::new(format!("[media.{}]", text::key(&name)));
+    let is_none = |curve: &Curve| matches!(curve, Curve::Constant(0.0));
+    if !is_none(&matter.absorption) || is_none(&matter.scattering) {
+        section.set("absorption", scene.spectrum(&matter.absorption, &format!("{name}-absorption"))?);
+    }
+    if !is_none(&matter.scattering) {
+        section.set("scattering", scene.spectrum(&matter.scattering, &format!("{name}-scattering"))?);
+        match matter.phase {
+            Phase::HenyeyGreenstein(0.0) => {}
+            Phase::HenyeyGreenstein(g) => section.set("phase", format!("{{ hg = {} }}", text::rounded(g))),
+            Phase::Rayleigh => section.set("phase", "{ rayleigh = 0.0 }"),
+        }
+    }
+    scene.media.push(section);
+    Ok(name)
+}
+
+/// What a shape's surface has to do with what is in it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Boundary {
+    /// No surface at all.
+    Invisible,
+    /// Glass.
+    Clear,
+    /// Nothing of the inside is seen.
+    Opaque,
+}
+
+/// Gives `object` its `interior`, where what is in it can be seen and it has an inside; else says that it is left out. Whether it has one now.
+pub fn fill(scene: &mut Scene, object: &mut Section, medium: &str, boundary: Boundary, place: Place) -> bool {
+    let why = match boundary {
+        Boundary::Opaque => Some("nothing passes its surface"),
+        Boundary::Invisible | Boundary::Clear if !is_closed(scene, object) => Some("its shape has no inside"),
+        Boundary::Invisible | Boundary::Clear => None,
+    };
+    if let Some(why) = why {
+        scene.report.left_out(place, format!("the medium \"{}\" in a shape: {why}", medium.escape_debug()));
+        return false;
+    }
+    object.set("interior", text::quoted(medium));
+    true
+}
+
+/// Whether a shape has an inside, as scenes ask for it: of a mesh, whether every edge runs as often in one direction as in the other.
+fn is_closed(scene: &Scene, object: &Section) -> bool {
+    let of = |key: &str| object.entries.iter().find(|(name, _)| name == key).map(|(_, value)| value);
+    if of("sphere").or(of("cube")).is_some() {
+        return true;
+    }
+    let Some(written) = of("mesh") else { return false };
+    let path = scene.path_of(written.trim_matches('"'));
+    let read = mesh::content(&path).and_then(|bytes| mesh::parse(mesh::Format::of(&path, &bytes), &bytes, &path));
+    let Ok(read) = read else { return false };
+    let mut balance: HashMap<[[u64; 3]; 2], i32> = HashMap::new();
+    for part in &read.parts {
+        for triangle in &part.triangles {
+            // 0 and -0 are one place.
+            let at = |i: u32| DVec3::from_array(part.positions[i as usize]).to_array().map(|x| (x + 0.0).to_bits());
+            let corners = triangle.map(at);
+            for i in 0..3 {
+                let (a, b) = (corners[i], corners[(i + 1) % 3]);
+                if a != b {
+                    let (key, step) = if a < b { ([a, b], 1) } else { ([b, a], -1) };
+                    *balance.entry(key).or_insert(0) += step;
+                }
+            }
+        }
+    }
+    balance.into_values().all(|times| times == 0)
+}

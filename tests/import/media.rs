@@ -1,0 +1,65 @@
+//! What fills shapes of others.
+
+use super::{import, written};
+
+const MITSUBA: &str = r#"<scene version="3.0.0"><sensor type="perspective"/>
+    <medium type="homogeneous" id="fog"><float name="albedo" value="0.75"/><float name="sigma_t" value="2"/><float name="scale" value="3"/>
+        <phase type="hg"><float name="g" value="0.7"/></phase></medium>
+    <shape type="cube"><bsdf type="null"/><ref name="interior" id="fog"/></shape>
+    <shape type="sphere"><bsdf type="dielectric"/><medium name="interior" type="homogeneous">
+        <volume name="albedo" type="constvolume"><float name="value" value="0"/></volume><phase type="rayleigh"/></medium></shape>
+    <shape type="sphere"><bsdf type="diffuse"/><ref name="interior" id="fog"/></shape>
+    <shape type="rectangle"><bsdf type="null"/><ref name="interior" id="fog"/></shape>
+    <shape type="cube"><bsdf type="null"/><medium name="interior" type="heterogeneous"/></shape></scene>"#;
+
+const PBRT: &str = r#"Camera "perspective" WorldBegin
+MakeNamedMedium "fog" "string type" "homogeneous" "rgb sigma_a" [0.5 0.5 0.5] "rgb sigma_s" [1 1 1] "float scale" 2 "float g" 0.3
+MakeNamedMedium "cloud" "string type" "cloud"
+AttributeBegin
+MediumInterface "fog" ""
+Material "interface" Shape "sphere"
+Material "dielectric" Shape "trianglemesh" "point3 P" [0 0 0  1 0 0  0 1 0  0 0 1] "integer indices" [0 2 1  0 1 3  1 2 3  0 3 2]
+Shape "disk"
+AttributeEnd
+AttributeBegin MediumInterface "cloud" "" Material "interface" Shape "sphere" AttributeEnd
+Material "diffuse" Shape "sphere"
+"#;
+
+/// Six of every unit are met, four and a half scattered.
+#[test]
+fn media_of_mitsuba_fill_what_is_closed() {
+    let (_folder, path) = written("scene.xml", MITSUBA);
+    let found = import(&path);
+    let toml = &found.toml;
+    for expected in ["[media.fog]\nabsorption = 1.5\nscattering = 4.5\nphase = { hg = 0.7 }\n", "absorption = 1.0\n"] {
+        assert!(toml.contains(expected), "{expected}: {toml}");
+    }
+    // The box of fog, the glass, and what is diffuse.
+    let within: Vec<(bool, bool)> =
+        found.scene.objects.iter().map(|object| (object.material.is_some(), object.interior.is_some())).collect();
+    assert_eq!(within, [(false, true), (true, true), (true, false)], "{toml}");
+    for said in [
+        "the medium \"fog\" in a shape: nothing passes its surface",
+        "the medium \"fog\" in a shape: its shape has no inside",
+        "a medium `heterogeneous`",
+    ] {
+        assert!(found.page.contains(said), "{said}: {}", found.page);
+    }
+}
+
+#[test]
+fn media_of_pbrt_fill_what_is_closed() {
+    let (_folder, path) = written("scene.pbrt", PBRT);
+    let found = import(&path);
+    let toml = &found.toml;
+    assert!(toml.contains("[media.fog]\nabsorption = 1.0\nscattering = 2.0\nphase = { hg = 0.3 }\n"), "{toml}");
+    let within: Vec<(bool, bool)> =
+        found.scene.objects.iter().map(|object| (object.material.is_some(), object.interior.is_some())).collect();
+    assert_eq!(within, [(false, true), (true, true), (true, false), (true, false)], "{toml}");
+    for said in ["the medium \"cloud\" (`cloud`): it differs from place to place", "its shape has no inside"] {
+        assert!(found.page.contains(said), "{said}: {}", found.page);
+    }
+    let (folder, path) = written("scene.pbrt", &PBRT.replace("MediumInterface \"fog\"", "MediumInterface \"smoke\""));
+    let error = spectile::import::import(&path, &folder.path().join("out")).expect_err("no such medium").to_string();
+    assert!(error.contains("no medium is named \"smoke\""), "{error}");
+}
