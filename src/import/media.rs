@@ -70,6 +70,16 @@ pub enum Boundary {
     Opaque,
 }
 
+impl Boundary {
+    /// That of a shape with this material of the scene, or with none.
+    pub fn of(scene: &Scene, material: Option<&str>) -> Boundary {
+        let Some(name) = material else { return Boundary::Invisible };
+        let header = format!("[materials.{}.dielectric]", text::key(name));
+        let is_glass = scene.materials.iter().any(|section| section.header == header);
+        if is_glass { Boundary::Clear } else { Boundary::Opaque }
+    }
+}
+
 /// Gives `object` its `interior`, where what is in it can be seen and it has an inside; else says that it is left out. Whether it has one now.
 pub fn fill(scene: &mut Scene, object: &mut Section, medium: &str, boundary: Boundary, place: Place) -> bool {
     let why = match boundary {

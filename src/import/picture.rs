@@ -304,8 +304,43 @@ pub fn grey(rgb: [f32; 3]) -> f64 {
     rgb.into_iter().map(f64::from).sum::<f64>() / 3.0
 }
 
+/// A number over a surface: one where it is the same all over, else the text of a texture and its mean.
+pub enum Numbers {
+    One(f64),
+    Texture(String, f64),
+}
+
 impl Texture {
-    /// The roughness that the texels say, by `alpha` of each one's number; one number where they are all alike.
+    /// `value` of each texel's `number`; where the channels are shares of two spectra, of the number that they are at 550 nm. `name` is for
+    /// the file that it needs.
+    pub fn numbers(
+        &self,
+        scene: &mut Scene,
+        name: &str,
+        number: &dyn Fn([f32; 3]) -> f64,
+        value: &dyn Fn(f64) -> f64,
+    ) -> Result<Numbers> {
+        let ends = self.endmembers.as_ref().map(|two| [two[0].mean().eval(550.0), two[1].mean().eval(550.0)]);
+        let of_texel = |rgb: [f32; 3]| match ends {
+            Some([a, b]) => f64::from(rgb[0]) * a + f64::from(rgb[1]) * b,
+            None => number(rgb),
+        };
+        // Shares are as they are written.
+        let picture = if ends.is_some() { self.picture.clone().raw() } else { self.picture.clone() };
+        let values: Vec<f32> = picture.linear().into_iter().map(|rgb| value(of_texel(rgb)) as f32).collect();
+        if let [first, rest @ ..] = &values[..]
+            && rest.iter().all(|value| value == first)
+        {
+            return Ok(Numbers::One(f64::from(*first)));
+        }
+        let mean = values.iter().map(|value| f64::from(*value)).sum::<f64>() / values.len().max(1) as f64;
+        let texels = Texels::Floats(values.into_iter().map(|value| [value; 3]).collect());
+        let picture = Picture { size: self.picture.size, texels };
+        let texture = Texture { picture, name: format!("{name}.exr"), endmembers: None, file: None, ..self.clone() };
+        Ok(Numbers::Texture(texture.toml(scene, "")?, mean))
+    }
+
+    /// The roughness that the texels say, by `alpha` of each one's `number`.
     pub fn rough(
         &self,
         scene: &mut Scene,
@@ -313,19 +348,12 @@ impl Texture {
         number: &dyn Fn([f32; 3]) -> f64,
         alpha: &dyn Fn(f64) -> f64,
     ) -> Result<Rough> {
-        let alphas: Vec<f32> =
-            self.picture.linear().into_iter().map(|rgb| alpha(number(rgb)).clamp(LEAST_ROUGH, 1.0) as f32).collect();
-        if let [first, rest @ ..] = &alphas[..]
-            && rest.iter().all(|alpha| alpha == first)
-        {
-            return Ok(Rough::Pair([f64::from(*first); 2]));
-        }
-        let mean = alphas.iter().map(|alpha| f64::from(*alpha)).sum::<f64>() / alphas.len().max(1) as f64;
-        let texels = Texels::Floats(alphas.into_iter().map(|alpha| [alpha; 3]).collect());
-        let picture = Picture { size: self.picture.size, texels };
-        let texture =
-            Texture { picture, name: format!("{name}-roughness.exr"), endmembers: None, file: None, ..self.clone() };
-        Ok(Rough::Texture(texture.toml(scene, "")?, mean))
+        let name = format!("{name}-roughness");
+        let found = self.numbers(scene, &name, number, &|v| alpha(v).clamp(LEAST_ROUGH, 1.0))?;
+        Ok(match found {
+            Numbers::One(alpha) => Rough::Pair([alpha; 2]),
+            Numbers::Texture(text, mean) => Rough::Texture(text, mean),
+        })
     }
 }
 

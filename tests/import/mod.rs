@@ -3,8 +3,8 @@
 mod gltf;
 mod media;
 mod mitsuba;
+mod numbers;
 mod pbrt;
-mod roughness;
 mod spoilt;
 
 use std::path::{Path, PathBuf};

@@ -9,7 +9,7 @@ use super::xml::{Node, inside};
 use super::{Importer, at};
 use crate::Result;
 use crate::format::text as spectra;
-use crate::import::picture::{Colour, Picture, Texels, Texture, unbounded};
+use crate::import::picture::{Colour, Numbers, Picture, Texels, Texture, unbounded};
 use crate::import::report::Fate;
 use crate::import::text;
 use crate::spectral::upsample;
@@ -250,8 +250,8 @@ impl<'n> Importer<'n, '_> {
             return Ok(None);
         }
         Ok(match self.colour_of(node, Of::Unbounded, flip)? {
-            Colour::Texture(texture) if texture.endmembers.is_none() => Some(texture),
-            _ => None,
+            Colour::Texture(texture) => Some(texture),
+            Colour::Spectrum(..) => None,
         })
     }
 
@@ -280,18 +280,13 @@ impl<'n> Importer<'n, '_> {
         match self.colour_of(node, Of::Reflectance, flip)? {
             Colour::Spectrum(curve, _) => Ok(text::rounded(curve.eval(550.0))),
             Colour::Texture(texture) => {
-                // Numbers are taken as they are: the luminance of what there is a colour.
-                let grey = |[r, g, b]: &[f32; 3]| [0.2126 * r + 0.7152 * g + 0.0722 * b; 3];
-                let texels = match texture.endmembers.as_ref() {
-                    Some(two) => {
-                        let [a, b] = [&two[0], &two[1]].map(|of| [of.mean().eval(550.0) as f32; 3]);
-                        vec![a, b, b, a]
-                    }
-                    None => texture.picture.linear().iter().map(grey).collect(),
-                };
-                let picture = Picture { size: texture.picture.size, texels: Texels::Floats(texels) };
-                let texture = Texture { picture, endmembers: None, file: None, ..(*texture).clone() };
-                texture.toml(self.scene, "")
+                // The luminance of what is a colour.
+                let luminance = |[r, g, b]: [f32; 3]| f64::from(0.2126 * r + 0.7152 * g + 0.0722 * b);
+                let stem = texture.name.split('.').next().unwrap_or_default();
+                Ok(match texture.numbers(self.scene, stem, &luminance, &|share| share.clamp(0.0, 1.0))? {
+                    Numbers::One(share) => text::rounded(share),
+                    Numbers::Texture(text, _) => text,
+                })
             }
         }
     }

@@ -91,9 +91,9 @@ impl<'n> Importer<'n, '_> {
         let emission = self.emission(&plugin, !is_upward)?;
         let lit = emission.as_ref().is_some_and(|text| text.starts_with("{ texture"));
         let (material, textured) = match (made, emission.is_some()) {
-            (Made::Material { name, is_textured }, _) => (name, is_textured || lit),
-            (Made::Nothing, true) => (self.black(), lit),
-            (Made::Nothing, false) if plugin.get("interior").is_some() => (String::new(), false),
+            (Made::Material { name, is_textured }, _) => (Some(name), is_textured || lit),
+            (Made::Nothing, true) => (Some(self.black()), lit),
+            (Made::Nothing, false) if plugin.get("interior").is_some() => (None, false),
             (Made::Nothing, false) => {
                 self.scene.report.left_out(plugin.place(), "a shape of which nothing is seen (BSDF `null`)");
                 plugin.get("exterior");
@@ -106,17 +106,15 @@ impl<'n> Importer<'n, '_> {
         if let Some(id) = node.attribute("id") {
             object.comments.insert(0, values::shown(id));
         }
-        if material.is_empty() {
-            if !self.fill(&plugin, &mut object, Boundary::Invisible, depth.is_some())? {
+        let boundary = Boundary::of(self.scene, material.as_deref());
+        let is_filled = self.fill(&plugin, &mut object, boundary, depth.is_some())?;
+        match material {
+            Some(material) => object.set("material", text::quoted(&material)),
+            None if is_filled => {}
+            None => {
                 plugin.finish(&mut self.scene.report);
                 return Ok(());
             }
-        } else {
-            let header = format!("[materials.{}.dielectric]", text::key(&material));
-            let is_glass = self.scene.materials.iter().any(|section| section.header == header);
-            let boundary = if is_glass { Boundary::Clear } else { Boundary::Opaque };
-            self.fill(&plugin, &mut object, boundary, depth.is_some())?;
-            object.set("material", text::quoted(&material));
         }
         if let Some(emission) = emission {
             object.set("emission", emission);

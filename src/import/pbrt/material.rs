@@ -1,10 +1,10 @@
 //! Materials of pbrt.
 
 use super::colour::Of;
-use super::token::{At, Parameters, shown};
+use super::token::{At, Parameter, Parameters, shown};
 use super::{Importer, Look};
 use crate::Result;
-use crate::import::picture::{Colour, Rough, grey};
+use crate::import::picture::{Colour, Numbers, Rough, grey};
 use crate::import::scene::Section;
 use crate::import::{surfaces, text};
 use crate::spectral::Curve;
@@ -115,7 +115,6 @@ impl Importer<'_> {
         let [both, u, v] = ["roughness", "uroughness", "vroughness"].map(|key| format!("{prefix}{key}"));
         if let (Some(parameter), None, None) = (parameters.get(&both), parameters.get(&u), parameters.get(&v))
             && let Colour::Texture(texture) = self.colour_of(parameter, Of::Index)?
-            && texture.endmembers.is_none()
         {
             if texture.picture.linear().into_iter().any(|rgb| !(0.0..=1.0).contains(&grey(rgb))) {
                 self.scene
@@ -179,6 +178,35 @@ impl Importer<'_> {
         Ok(Look::Material { name: self.scene.put(name, "conductor", section), textured })
     }
 
+    /// A share in [0, 1], as text of the scene, and whether it is a texture.
+    pub fn share(&mut self, parameter: &Parameter, name: &str) -> Result<(String, bool)> {
+        let share = |value: f64| value.clamp(0.0, 1.0);
+        Ok(match self.colour_of(parameter, Of::Index)? {
+            Colour::Spectrum(curve, _) => (text::rounded(share(curve.eval(550.0))), false),
+            Colour::Texture(texture) => match texture.numbers(self.scene, name, &grey, &share)? {
+                Numbers::One(value) => (text::rounded(value), false),
+                Numbers::Texture(text, _) => (text, true),
+            },
+        })
+    }
+
+    /// A material of which only a share is there.
+    pub fn masked(&mut self, look: Look, opacity: (String, bool), at: &At) -> Look {
+        let (opacity, is_texture) = opacity;
+        match look {
+            Look::Nothing => Look::Nothing,
+            Look::Material { name, textured } => match self.scene.with_opacity(&name, &opacity) {
+                Some(masked) => Look::Material { name: masked, textured: textured || is_texture },
+                None => {
+                    let what =
+                        "the `alpha` of a shape whose material has an opacity of its own: it is there for all rays";
+                    self.scene.report.left_out(at.place(), what);
+                    Look::Material { name, textured }
+                }
+            },
+        }
+    }
+
     fn mix(&mut self, name: &str, parameters: &Parameters, at: &At) -> Result<Look> {
         let names = parameters.get("materials").map(|found| found.texts.clone()).unwrap_or_default();
         let [a, b] = &names[..] else { return Err(at.problem("a `mix` needs two names of `materials`").into()) };
@@ -187,12 +215,10 @@ impl Importer<'_> {
             Ok(found.ok_or_else(|| at.problem(format!("no material is named \"{}\"", shown(name))))?)
         };
         let (a, b) = (look(a)?, look(b)?);
-        let (weight, mut textured) =
-            match parameters.get("amount").map(|amount| self.colour_of(amount, Of::Index)).transpose()? {
-                None => ("0.5".to_owned(), false),
-                Some(Colour::Texture(texture)) if texture.endmembers.is_none() => (texture.toml(self.scene, "")?, true),
-                Some(colour) => (text::rounded(colour.mean().eval(550.0).clamp(0.0, 1.0)), false),
-            };
+        let (weight, mut textured) = match parameters.get("amount") {
+            Some(amount) => self.share(amount, &format!("{name}-amount"))?,
+            None => ("0.5".to_owned(), false),
+        };
         let (Look::Material { name: first, textured: x }, Look::Material { name: second, textured: y }) = (&a, &b)
         else {
             self.scene.report.left_out(at.place(), "a `mix` with an `interface`: only the other material is there");

@@ -463,19 +463,21 @@ impl Importer<'_> {
         let to_world = self.state.ctm;
         let round = similarity(to_world.matrix3).is_some();
         let reversed = self.state.reversed;
-        if let Some(alpha) = parameters.get("alpha")
-            && alpha.numbers.first() != Some(&1.0)
-        {
-            self.scene.report.left_out(alpha.at.place(), "the `alpha` of a shape: it is there for all rays");
-        }
         let Some(form) = self.form(kind, parameters, at, round, reversed)? else { return Ok(()) };
         let emission = match self.state.area.clone() {
             Some(area) => Some(self.emission(&area, &form, &to_world, at)?),
             None => None,
         };
+        let alpha = match parameters.get("alpha") {
+            Some(alpha) => Some(self.share(alpha, &format!("alpha-{}", at.line))?).filter(|(share, _)| share != "1.0"),
+            None => None,
+        };
         parameters.finish(&format!("the shape `{kind}`"), &mut self.scene.report);
         self.scene.report.translated(format!("Shape `{kind}`"), at.place());
-        let look = self.look();
+        let mut look = self.look();
+        if let Some(alpha) = alpha {
+            look = self.masked(look, alpha, at);
+        }
         let mut kept = Kept { form, to_world, look, emission, inside: self.state.inside.clone(), line: at.line };
         if self.open.is_some() && kept.inside.take().is_some() {
             self.scene.report.left_out(at.place(), "the medium in a shape of an object");
@@ -519,7 +521,7 @@ impl Importer<'_> {
 
     fn place(&mut self, kept: Kept, at: &At) -> Result<()> {
         let (material, textured) = match (&kept.look, &kept.emission) {
-            (Look::Material { name, textured }, _) => (name.clone(), *textured),
+            (Look::Material { name, textured }, _) => (Some(name.clone()), *textured),
             (Look::Nothing, Some(_)) => {
                 let known = self.named.get("lamp that is nothing else").cloned();
                 let name = match known {
@@ -528,9 +530,9 @@ impl Importer<'_> {
                 };
                 let look = Look::Material { name: name.clone(), textured: false };
                 self.named.insert("lamp that is nothing else".to_owned(), look);
-                (name, false)
+                (Some(name), false)
             }
-            (Look::Nothing, None) if kept.inside.is_some() => (String::new(), false),
+            (Look::Nothing, None) if kept.inside.is_some() => (None, false),
             (Look::Nothing, None) => {
                 self.scene.report.left_out(at.place(), "a shape of which nothing is seen (material `interface`)");
                 return Ok(());
@@ -541,24 +543,15 @@ impl Importer<'_> {
             return Ok(());
         };
         object.comments.push(format!("line {}", kept.line));
-        let boundary = match &material {
-            none if none.is_empty() => Boundary::Invisible,
-            name => {
-                let header = format!("[materials.{}.dielectric]", text::key(name));
-                let is_glass = self.scene.materials.iter().any(|section| section.header == header);
-                if is_glass { Boundary::Clear } else { Boundary::Opaque }
-            }
-        };
+        let boundary = Boundary::of(self.scene, material.as_deref());
         let is_filled = match &kept.inside {
             Some(medium) => media::fill(self.scene, &mut object, medium, boundary, at.place()),
             None => false,
         };
-        if boundary == Boundary::Invisible {
-            if !is_filled {
-                return Ok(());
-            }
-        } else {
-            object.set("material", text::quoted(&material));
+        match material {
+            Some(material) => object.set("material", text::quoted(&material)),
+            None if is_filled => {}
+            None => return Ok(()),
         }
         if let Some((emission, both)) = kept.emission {
             object.set("emission", emission);
