@@ -13,7 +13,7 @@ from typing import Any
 import numpy
 import xarray
 
-from . import _spectile
+from . import _spectile, _work
 from ._engine import Engine, Temporary
 from ._errors import UsageError
 
@@ -101,6 +101,7 @@ def tone(linear: Any, exposure: float | None = None) -> tuple[numpy.ndarray, flo
     >>> picture.shape, picture.dtype.name, int(picture[0, 0, 0]), ev
     ((1, 2, 3), 'uint8', 255, 1.0)
     """
+    _work.begin()
     linear = numpy.ascontiguousarray(linear, dtype=numpy.float32)
     ev, data = _spectile.tone(linear, exposure)
     return numpy.frombuffer(data, dtype=numpy.uint8).reshape(linear.shape), ev

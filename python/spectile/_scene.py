@@ -14,6 +14,10 @@ from ._errors import SceneError, mistake
 _PAIRS = ("samples", "intervals")
 # Where a file would be named that holds a picture or voxels.
 _NUMBERS = ("texture", "grid")
+# Where a file would be named that holds columns of numbers.
+_COLUMNS = ("placements",)
+# What the columns of an array of matrices [n, 3 or 4, 4] are.
+_MATRIX = tuple(f"m{row}{column}" for row in range(3) for column in range(4))
 # Where the name of a file stands and nothing else does.
 _FILES = ("mesh", "file", "map", "table", "responses", "nk")
 # Tables of items under names of the user's own, which mean nothing by themselves.
@@ -34,7 +38,9 @@ class Scene(dict[str, Any]):
     dimension (wavelengths, values), an xarray.DataArray over `wavelength`, a pandas.Series over its index, or a
     `SpectralDistribution` of colour-science. In the place of a file's name: `mesh` takes a mapping of `vertices` [vertex, 3],
     `faces` [face, 3] counted from 0, and `uv` and `normals` by vertex or by corner [face, 3, …]; `texture` takes an array [y, x] or
-    [y, x, channel], rows from the top, linear numbers; `grid` takes an array [z, y, x].
+    [y, x, channel], rows from the top, linear numbers; `grid` takes an array [z, y, x]; `placements` takes positions [n, 3] in metres,
+    matrices [n, 4, 4] or their first three rows [n, 3, 4], or columns by name, as a mapping, a pandas.DataFrame or a structured array:
+    `x`, `y`, `z`, and `yaw_degrees` and `scale` or not.
 
     >>> scene = Scene({"film": {"width": 64, "height": 48}})
     >>> scene["film"]["width"] = 32
@@ -89,6 +95,7 @@ class Scene(dict[str, Any]):
         >>> facts["size"], facts["bounds_nm"], len(facts["digest"])
         ([4, 2], [[400.0, 500.0], [500.0, 700.0]], 64)
         """
+        _work.begin()
         return self._draft().check(_overrides(overrides))
 
     @property
@@ -170,6 +177,8 @@ class _Reader:
             return value
         _not_too_deep(self.file, path)
         key = "" if len(path) == 2 and path[0] in _NAMED else path[-1]
+        if key in _COLUMNS and value is not None and not isinstance(value, os.PathLike):
+            return self.columns(value, path)
         if isinstance(value, Mapping):
             return self.mesh(value, path) if key == "mesh" else self.mapping(value, path)
         if hasattr(value, "magnitude") and hasattr(value, "units"):
@@ -255,6 +264,42 @@ class _Reader:
                 array = numpy.require(self.array(ordered, path, kinds), numpy.float32, "A")
             shape = " x ".join(str(n) for n in array.shape)
             return _spectile.numbers(f"{_spelt(path)} (array {shape})", array)
+
+        return self.once((value,), make)
+
+    def columns(self, value: Any, path: tuple[str, ...]) -> Any:
+        """Placements: numbers by name, or an array that says by its shape what it holds."""
+        import numpy
+
+        help = "give positions [n, 3], matrices [n, 4, 4] or [n, 3, 4], or columns x, y, z, yaw_degrees, scale by name"
+        names = getattr(getattr(value, "dtype", None), "names", None)
+        if names is None and (isinstance(value, Mapping) or hasattr(value, "columns")):
+            names = [*value]
+
+        def make() -> Any:
+            if names is not None:
+                # Each by its name; `table` below says which have one, and the library what they may be.
+                each = [self.array(value[name], (*path, str(name)), "iuf") for name in names]
+                if len({column.shape for column in each}) > 1 or any(column.ndim != 1 for column in each):
+                    shapes = ", ".join(f"{name} {list(column.shape)}" for name, column in zip(names, each, strict=True))
+                    raise self.mistake(path, f"has columns of different shapes: {shapes}", "give one number each for every instance")
+                columns, rows = [str(name) for name in names], numpy.stack(each, axis=-1) if each else numpy.zeros((0, 0))
+            else:
+                array = self.array(value, path, "iuf")
+                if array.ndim == 2 and array.shape[1] == 3:
+                    columns, rows = ["x", "y", "z"], array
+                elif array.ndim == 3 and array.shape[1:] in ((3, 4), (4, 4)):
+                    if array.shape[1] == 4 and (array[:, 3] != [0, 0, 0, 1]).any():
+                        row = array[(array[:, 3] != [0, 0, 0, 1]).any(axis=1), 3][0]
+                        message = f"has a matrix whose last row is {row.tolist()}, not 0, 0, 0, 1"
+                        raise self.mistake(path, message, "matrices act on column vectors: the translation is the last column")
+                    columns, rows = list(_MATRIX), array[:, :3].reshape(-1, 12)
+                else:
+                    raise self.mistake(path, f"has the shape {list(array.shape)}", help)
+            if not columns:
+                raise self.mistake(path, "has no columns", help)
+            rows = numpy.require(rows, numpy.float64, "A")
+            return _spectile.table(f"{_spelt(path)} ({len(rows)} placements)", columns, rows)
 
         return self.once((value,), make)
 

@@ -10,9 +10,33 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from . import _spectile
-from ._errors import SpectileWarning
+from ._errors import SpectileWarning, UsageError
+
+# Whether anything of the library has run in this process, and whether it had in the one that this was forked from.
+_began = False
+_left_behind = False
 
 Listener = Callable[[dict[str, Any]], None]
+
+
+def begin() -> None:
+    """Before anything of the library that may take threads: those are not copied by a fork, and who waits for them waits for good."""
+    global _began
+    if _left_behind:
+        raise UsageError(
+            "Spectile has worked in the process that this one was forked from, and its threads and devices are not here: "
+            'start processes with multiprocessing.get_context("spawn"), or before Spectile does anything'
+        )
+    _began = True
+
+
+def _forked() -> None:
+    global _left_behind
+    _left_behind = _began
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forked)
 
 
 def run(
@@ -22,6 +46,7 @@ def run(
 
     Warnings become warnings of Python, once the work has ended: one that is made an error must not end a render.
     """
+    begin()
     last: dict[str, Any] = {}
     said: list[str] = []
 

@@ -86,7 +86,7 @@ mod _spectile {
     #[pymodule_export]
     use super::{Draft, program, read_scene, tone};
     #[pymodule_export]
-    use crate::arrays::{Data, mesh, numbers};
+    use crate::arrays::{Data, mesh, numbers, table};
     #[pymodule_export]
     use crate::task::Task;
 

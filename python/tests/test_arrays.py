@@ -141,6 +141,55 @@ def test_axes_by_name_are_put_in_order():
     assert digest(packed["value"]) == digest(picture)
 
 
+POSITIONS = numpy.array([[0.5, 0, 0.25], [-1, 1, 0.1], [1, 1, 0.3]])
+TURNED = {**dict(zip("xyz", POSITIONS.T)), "yaw_degrees": numpy.array([0, 30.5, 200]), "scale": numpy.array([1, 0.5, 2], "f4")}
+
+
+def posts(placements, **more):
+    """A ball among posts, which stand where they are placed."""
+    post = {"objects": [{"cube": {"min": [-0.1, -0.1, 0], "max": [0.1, 0.1, 1]}, "material": "floor"}]}
+    return ball(assemblies={"post": post}, instances=[{"assembly": "post", "placements": placements, **more}])
+
+
+def test_placements_are_those_of_files(tmp_path):
+    pandas = pytest.importorskip("pandas")
+    rows = zip(*(column.tolist() for column in TURNED.values()))
+    (tmp_path / "posts.csv").write_text(",".join(TURNED) + "\n" + "".join(",".join(map(repr, row)) + "\n" for row in rows))
+    digest = posts(tmp_path / "posts.csv", up=[0, 0, 1]).digest
+    records = numpy.rec.fromarrays(list(TURNED.values()), names=list(TURNED))
+    for placements in (TURNED, pandas.DataFrame(TURNED), records, {name: list(column) for name, column in TURNED.items()}):
+        assert posts(placements, up=[0, 0, 1]).digest == digest
+    assert posts(TURNED).digest != digest
+    matrices = numpy.tile(numpy.eye(4), (3, 1, 1))
+    matrices[:, :3, 3] = POSITIONS
+    shifted = posts(POSITIONS, transform={"translate": [0, 0, 0.5]})
+    assert posts(POSITIONS).digest == posts(matrices).digest == posts(matrices[:, :3]).digest == posts(POSITIONS.tolist()).digest
+    assert posts(POSITIONS + [0, 0, 0.5]).digest == shifted.digest != posts(POSITIONS).digest
+
+
+@pytest.mark.parametrize(
+    "placements, words",
+    [
+        (POSITIONS[:, :2], r"shape \[3, 2\]"),
+        (POSITIONS * numpy.nan, "NaN as `x` of row 0"),
+        (numpy.ones((2, 4, 4)), "last row"),
+        ({"x": POSITIONS[:, 0]}, "no column y, z"),
+        ({**TURNED, "x": [1.0]}, "different shapes"),
+        ({**TURNED, "roll": TURNED["scale"]}, "`roll`"),
+        ({**TURNED, "scale": [1, 0, 1]}, "row 1, counted from 0, flattens"),
+        (POSITIONS * 1e20, "row 0, counted from 0, reaches beyond"),
+        (POSITIONS[:0], "places nothing"),
+        ({}, "no columns"),
+        (None, "NoneType"),
+        (3, "must be a string"),
+    ],
+)
+def test_wrong_placements_are_refused(placements, words):
+    with pytest.raises(sp.SceneError, match=words) as caught:
+        posts(placements).check()
+    assert caught.value.key == "instances.0.placements"
+
+
 def test_mixtures_take_channels_in_order(tmp_path):
     shares = numpy.full((2, 2, 2), 0.5, numpy.float32)
     scene = ball()

@@ -149,6 +149,29 @@ def test_two_threads_render_at_once_and_python_goes_on(tmp_path):
     assert counted > 5
 
 
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="forks")
+def test_a_fork_of_a_process_that_has_rendered_is_told_so(tmp_path):
+    code = """
+import os, multiprocessing, sys
+sys.path.insert(0, sys.argv[1])
+from conftest import ball
+import spectile as sp
+def digest(_):
+    return ball().digest
+fork = multiprocessing.get_context("fork")
+with fork.Pool(1) as pool:
+    assert pool.map(digest, [0]) == [digest(0)]
+with fork.Pool(1) as pool:
+    try:
+        pool.map(digest, [0])
+    except sp.UsageError as error:
+        print(error)
+"""
+    folder = str(pathlib.Path(__file__).parent)
+    done = subprocess.run([sys.executable, "-P", "-c", code, folder], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0 and "forked from" in done.stdout and "spawn" in done.stdout, done
+
+
 def test_temporary_cubes_go_when_nobody_reads_them(tmp_path, monkeypatch):
     import gc
     import tempfile
