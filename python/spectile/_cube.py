@@ -48,6 +48,8 @@ def open_cube(path: str | os.PathLike[str]) -> Cube:
 
     Raises `StorageError` where there is none.
     """
+    if not isinstance(path, (str, os.PathLike)):
+        raise TypeError(f"open_cube: a cube is opened by its name, not a {type(path).__name__}")
     return opened(path)
 
 
@@ -113,6 +115,10 @@ def rgb(cube: Any, exposure: float | None = None) -> xarray.DataArray:
 
     `cube` is a Dataset with `preview`, also a part of one, or the name of a cube.
     """
+    if not isinstance(cube, (xarray.Dataset, str, os.PathLike)):
+        raise TypeError(
+            f"rgb: a picture is made of a cube, which holds it as `preview`, or of its name, not of a {type(cube).__name__}"
+        )
     dataset = cube if isinstance(cube, xarray.Dataset) else opened(cube)
     if "preview" not in dataset:
         raise UsageError("rgb: there is no `preview` in this Dataset, as in counts by a sensor model")

@@ -1,18 +1,21 @@
 from collections.abc import Callable, Sequence
 from os import PathLike
-from typing import Any
+from typing import Any, Self, final
 
 __version__: str
 D65: list[tuple[float, float]]
 
+@final
 class Draft:
-    def __init__(self, file: str | PathLike[str], text: str, mapping: Any) -> None: ...
+    def __new__(cls, file: str | PathLike[str], text: str, mapping: Any) -> Self: ...
     def check(self, overrides: Sequence[tuple[str, str]]) -> dict[str, Any]: ...
 
+@final
 class Data: ...
 
+@final
 class Task:
-    def __init__(self) -> None: ...
+    def __new__(cls) -> Self: ...
     def run(
         self,
         arguments: Sequence[str],

@@ -33,9 +33,10 @@ def plan(
     `predicted_s` and others; docs/json.md says what each means. Arguments are those of `render`; `pilot` decides by samples which paths are
     worth evaluating, as `render` does."""
     scene = taken(scene)
-    arguments = ["plan", f"--spp={spp}", f"--devices={_work.chosen(devices)}"]
-    for name, value in {"size": _work.pair(size), "tile": tile, "memory": memory, "pilot": bool(pilot)}.items():
-        arguments += _work.option(name, value)
+    arguments = ["plan", f"--spp={_work.whole('spp', spp)}", f"--devices={_work.chosen(devices)}"]
+    arguments += _work.option("size", _work.pair(size)) + _work.option("pilot", bool(pilot))
+    for name, value in {"tile": tile, "memory": memory}.items():
+        arguments += _work.option(name, _work.whole(name, value))
     arguments += [f"--set={key}={value}" for key, value in _overrides(overrides)]
     facts = _work.run([*arguments, "--json", "--", scene.file], draft=scene._draft())
     return {key: value for key, value in facts.items() if key not in ("event", "time_s")}
@@ -155,6 +156,8 @@ def sensor(
         raise UsageError("sensor: give `responses` or `model`, and not both")
     if responses is not None and (seed or not noise or electrons or partial):
         raise UsageError("sensor: `seed`, `noise`, `electrons` and `partial` go with `model` only")
+    if model is not None and not isinstance(model, (str, os.PathLike)):
+        raise TypeError(f"sensor: `model` is the name of a file (docs/SENSORS.md), not a {type(model).__name__}")
     folder = tempfile.mkdtemp(prefix="spectile-")
     path = os.path.join(folder, "sensor.zarr") if out is None else os.fspath(out)
     try:
@@ -239,9 +242,7 @@ def _write_responses(file: str, responses: Any) -> None:
     elif isinstance(responses, Mapping):
         bands = dict(responses)
     else:
-        raise TypeError(
-            f"responses are a file, a mapping of names to spectra, or colour-science's, not {type(responses).__name__}"
-        )
+        raise TypeError(f"responses are a file, a mapping of names to spectra, or colour-science's, not {type(responses).__name__}")
     reader = _Reader("responses")
     with open(file, "w", newline="", encoding="utf-8") as text:
         rows = csv.writer(text)
@@ -316,6 +317,9 @@ def to_colour(spectra: xarray.DataArray) -> Any:
     import colour
     import numpy
 
+    if not (hasattr(spectra, "dims") and hasattr(spectra, "ndim")):
+        kind = type(spectra).__name__
+        raise TypeError(f"to_colour: spectra are an xarray.DataArray over `wavelength`, such as cube.radiance, not a {kind}")
     if "wavelength" not in spectra.dims:
         raise UsageError("to_colour: the array has no dimension `wavelength`")
     ordered = spectra.transpose("wavelength", ...).sortby("wavelength")

@@ -88,6 +88,19 @@ def _give_back() -> None:
             trim(0)
 
 
+def whole(name: str, value: Any) -> Any:
+    """A whole number, which 1e3 is too; what is none is left to whoever knows what it may be."""
+    if value is None or isinstance(value, str):
+        return value
+    try:
+        exact = int(value)
+    except (TypeError, ValueError, OverflowError):
+        exact = None
+    if exact is None or isinstance(value, bool) or exact != value:
+        raise UsageError(f"`{name}` is a whole number, not {value!r}")
+    return exact
+
+
 def option(name: str, value: Any) -> list[str]:
     """`--name=value`, or nothing where there is no value."""
     if value is None or value is False:
@@ -106,15 +119,29 @@ def chosen(devices: Any) -> str:
     """ "all", a number of devices, or their positions."""
     if isinstance(devices, (str, int)) and not isinstance(devices, bool):
         return str(devices)
-    return ",".join(str(int(position)) for position in devices) + ","
+    try:
+        positions = [int(position) for position in devices]
+    except (TypeError, ValueError):
+        positions = []
+    if not positions:
+        raise UsageError(f'`devices` is "all", a number of devices, or a list of positions, not {devices!r}')
+    return ",".join(map(str, positions)) + ","
 
 
 def pair(size: Any) -> str | None:
     """(width, height) or text such as "640x480"."""
     if size is None or isinstance(size, str):
         return size
-    width, height = size
-    return f"{int(width)}x{int(height)}"
+    return "x".join(str(whole("size", side)) for side in two("size", size, '(width, height) in pixels, or text such as "640x480"'))
+
+
+def two(name: str, value: Any, what: str) -> tuple[Any, Any]:
+    """Both of a pair."""
+    try:
+        first, second = value
+    except (TypeError, ValueError):
+        raise UsageError(f"`{name}` is {what}, not {value!r}") from None
+    return first, second
 
 
 def toml(value: Any) -> str:

@@ -16,21 +16,27 @@ PAINT = numpy.array([[380, 0.05], [500, 0.1], [600, 0.7], [780, 0.8]])
         PAINT,
         PAINT.astype(object).astype(float)[::1].copy(order="F"),
         (PAINT[:, 0], PAINT[:, 1]),
+        (PAINT[:, 0].tolist(), PAINT[:, 1].tolist()),
+        (PAINT[:, 0], PAINT[:, 1].tolist()),
+        dict(PAINT.tolist()),
         {"samples": PAINT},
         {"samples": [tuple(row) for row in PAINT]},
         xarray.DataArray(PAINT[:, 1], coords={"wavelength": PAINT[:, 0]}, dims="wavelength"),
         xarray.DataArray(
+            PAINT[:, 1], coords={"wavelength": ("wavelength", PAINT[:, 0], {"units": "Nanometres"})}, dims="wavelength"
+        ),
+        xarray.DataArray(
             PAINT[:, 1], coords={"wavelength": ("wavelength", PAINT[:, 0] / 1000, {"units": "um"})}, dims="wavelength"
         ),
     ],
-    ids=["array", "fortran", "pair", "samples", "tuples", "xarray", "micrometres"],
+    ids="array fortran pair lists mixed mapping samples tuples xarray nanometres micrometres".split(),
 )
 def test_spectra_in_every_way_are_one_scene(paint):
     scene = ball()
     scene["spectra"]["paint"] = paint
     in_place = ball()
     in_place["materials"]["ball"]["diffuse"]["reflectance"] = paint
-    if isinstance(paint, xarray.DataArray) and "units" in paint.wavelength.attrs:
+    if isinstance(paint, xarray.DataArray) and paint.wavelength.attrs.get("units") == "um":
         # 0.38 um is 380 nm but for the last bit.
         assert scene.check() | {"digest": ""} == ball().check() | {"digest": ""}
     else:
@@ -302,7 +308,18 @@ def test_what_is_masked_infinite_or_has_a_unit_is_refused():
     class Quantity:
         magnitude, units, ndim = PAINT, "um", 2
 
-    for paint, words in ((masked, "masked"), (Quantity(), "unit of its own")):
+    nm, values = PAINT.T
+    percent = xarray.DataArray(values, coords={"wavelength": nm}, dims="wavelength", attrs={"units": "%"})
+    bare = xarray.DataArray(values, dims="wavelength")
+    cases = [(masked, "masked"), (Quantity(), "unit of its own"), (percent, "per cent"), (bare, "no coordinate `wavelength`")]
+    try:
+        import pint
+    except ImportError:
+        pass
+    else:
+        of_pint = (nm / 1000 * pint.UnitRegistry().um, values)
+        cases += [(of_pint, "unit of its own, micrometer"), (bare.assign_coords(wavelength=nm).copy(data=values * pint.UnitRegistry().W), "unit of its own")]
+    for paint, words in cases:
         scene = ball()
         scene["spectra"]["paint"] = paint
         with pytest.raises(sp.SceneError, match=words):

@@ -72,7 +72,11 @@ def grows(before, after):
 @pytest.mark.parametrize("heaps", ["as they come", "one"])
 def test_a_hundred_renders_leak_nothing(heaps):
     # In a process that holds nothing else. With one heap there is no chance in it: resident memory is all.
-    environment = dict(os.environ, MALLOC_ARENA_MAX="1") if heaps == "one" else {k: v for k, v in os.environ.items() if k != "MALLOC_ARENA_MAX"}
+    environment = (
+        dict(os.environ, MALLOC_ARENA_MAX="1")
+        if heaps == "one"
+        else {k: v for k, v in os.environ.items() if k != "MALLOC_ARENA_MAX"}
+    )
     code = f"import sys; sys.path.insert(0, {str(pathlib.Path(__file__).parent)!r}); import test_long; test_long.measure()"
     done = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True, env=environment)
     assert done.returncode == 0, done.stderr

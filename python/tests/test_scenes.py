@@ -147,6 +147,11 @@ def test_overrides_are_values_and_replace_siblings():
         "digest": (scene | {"channels": {"intervals": [[400, 500]]}, "film": {"width": 8, "height": 16}}).digest,
     }
     assert scene.check({"spectra.paint": {"constant": 0.25}, "materials.ball.diffuse.two_sided": True})
+    import numpy
+
+    nm = numpy.array([380.0, 500, 600, 780])
+    assert scene.check({"spectra.paint": (nm, [0.05, 0.1, 0.7, 0.8])})["digest"] == scene.digest
+    assert scene.check({"channels.intervals": numpy.array([[400, 500], [500, 700]])})["bounds_nm"][1] == [500.0, 700.0]
     with pytest.raises(sp.SceneError, match="--set film.width"):
         scene.check({"film.width": 'a "quoted" \\ word\n'})
     with pytest.raises(TypeError):
