@@ -186,11 +186,13 @@ def relight(
     channels: Mapping[str, Any] | None = None,
     responses: Any = None,
     overwrite: bool = False,
+    **named: Any,
 ) -> Cube:
     """A factored cube (`render(…, factored=True)`) under other spectra, temperatures or channels; no path is traced.
 
     spectra: by their names in the scene, each as a scene takes it: a number, a mapping such as {"blackbody": 2700}, wavelengths and
-        values in any form of which `Scene` makes spectra.
+        values in any form of which `Scene` makes spectra. Those whose names are words may be arguments of their own:
+        `relight(cube, lamp=illuminant("A"))`.
     temperatures: of materials by name, K. channels: as in a scene, such as {"equal": {"from": 400, "to": 700, "count": 30}}.
     responses: channels that are bands of a sensor, as `sensor` takes them.
     out: the cube to make; None for a temporary one.
@@ -206,7 +208,10 @@ def relight(
     path = os.path.join(folder, "relit.zarr") if out is None else os.fspath(out)
     try:
         arguments = ["relight", f"--output={path}", *_work.option("overwrite", bool(overwrite))]
-        for name, spectrum in (spectra or {}).items():
+        twice = sorted(set(named) & set(spectra or {}))
+        if twice:
+            raise UsageError(f"relight: `{twice[0]}` is given twice, by itself and in `spectra`")
+        for name, spectrum in {**(spectra or {}), **named}.items():
             samples = reader.samples(spectrum, (str(name),))
             value = spectrum if samples is None else {"samples": samples}
             arguments.append(f"--set=spectra.{_work.toml(str(name))}={_work.toml(value)}")
