@@ -1,8 +1,8 @@
 //! Threads that outlive their work, and wait for the next of their name.
 //!
-//! glibc gives every new thread one of up to eight heaps for each core, whichever is free, and a heap keeps as its own what it once had at its end.
-//! A software device takes its memory from there, tens of MiB at a time: in a process that renders many times, as Python does, threads
-//! that live for one render would leave a piece of that in one heap after the other. Those that do the large work are kept.
+//! glibc gives every new thread one of up to eight heaps for each core, whichever is free, and a heap keeps what it once had at its
+//! end. A software device takes its memory from there, tens of MiB at a time: in a process that renders many times, as Python does,
+//! threads that live for one render would leave a piece of that in one heap after the other. Those that do the large work are kept.
 
 use std::any::Any;
 use std::collections::BTreeMap;

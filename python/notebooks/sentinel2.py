@@ -1,8 +1,8 @@
 # %% [markdown]
 # # A Sentinel-2 view of the grove
 #
-# The gallery's `grove` (scenes/grove), from above, in pixels of 10 m: trees of 24,000 leaves, of which one is in memory, over litter, under sun and
-# sky. Reflectances and NDVI as Sentinel-2A's instrument (MSI) sees them, and how they change where every other tree has been felled.
+# The gallery's `grove` (scenes/grove), from above, in pixels of 10 m: trees of 24,000 leaves, of which one is in memory, over litter, under
+# sun and sky. Reflectances and NDVI as Sentinel-2A's instrument (MSI) sees them, and how they change where every other tree is felled.
 #
 # Leaves are PROSPECT-D's, bark and litter measured, the bands ESA's measured responses; the radiance of the sky is a choice.
 # `scenes/render grove` makes the meshes that the scene names, and has to have run once. This notebook is in `python/notebooks` of the
@@ -24,8 +24,8 @@ scene["film"] = {"width": 12, "height": 12}
 scene["channels"]["equal"]["count"] = 820  # of 2.5 nm, fine enough for B5
 
 # %% [markdown]
-# Where trees stand is a table: x, y, z in metres, yaw and scale. Those that neither are seen nor shade what is seen are left out, and to the right of
-# the middle every other one.
+# Where trees stand is a table: x, y, z in metres, yaw and scale. Those that neither are seen nor shade what is seen are left out, and to
+# the right of the middle every other one.
 
 # %%
 trees = pd.read_csv(grove / "generated/trees.csv")
@@ -43,8 +43,8 @@ def bands(cube):
 
 
 # %% [markdown]
-# Radiance becomes reflectance by a white panel, here a plane of it in the same light. A plane of litter beside it says whether that works: its
-# reflectance is known.
+# Radiance becomes reflectance by a white panel, here a plane of it in the same light. A plane of litter beside it says whether that
+# works: its reflectance is known.
 
 
 # %%

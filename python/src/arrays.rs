@@ -1,5 +1,5 @@
-//! Arrays of numpy, and of whoever else offers buffers, as numbers of a scene. Each is copied once, into what the scene keeps: it is read, checked
-//! and taken into the digest while other threads go on, which may change an array of theirs at any time.
+//! Arrays of numpy, and of whoever else offers buffers, as numbers of a scene. Each is copied once, into what the scene keeps: it is
+//! read, checked and taken into the digest while other threads go on, which may change an array of theirs at any time.
 
 use std::sync::Arc;
 

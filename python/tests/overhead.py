@@ -3,8 +3,8 @@
 
     PYTHONPATH=FOLDER python -P python/tests/overhead.py SPECTILE [SCENE] [--spp N] [--rounds N] [--csv FILE]
 
-SPECTILE is the program of the same build as the package in FOLDER. Whole processes are measured: processor time of all cores, wall time, the most
-memory that they held; and how long `import spectile` takes. Over the program is what is left of the package when what a Python that has
+SPECTILE is the program of the same build as the package in FOLDER. Whole processes are measured: processor time of all cores, wall time,
+the most memory that they held; and how long `import spectile` takes. Over the program is what is left of the package when what a Python that has
 imported numpy, xarray and zarr takes has been taken away, by rounds, which are three processes one after the other: medians, and how far
 those are known (the standard deviation of the median of rounds drawn again). On a machine that does other things too processor time is the
 one to look at.

@@ -318,7 +318,10 @@ def test_what_is_masked_infinite_or_has_a_unit_is_refused():
         pass
     else:
         of_pint = (nm / 1000 * pint.UnitRegistry().um, values)
-        cases += [(of_pint, "unit of its own, micrometer"), (bare.assign_coords(wavelength=nm).copy(data=values * pint.UnitRegistry().W), "unit of its own")]
+        cases += [
+            (of_pint, "unit of its own, micrometer"),
+            (bare.assign_coords(wavelength=nm).copy(data=values * pint.UnitRegistry().W), "unit of its own"),
+        ]
     for paint, words in cases:
         scene = ball()
         scene["spectra"]["paint"] = paint

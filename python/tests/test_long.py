@@ -23,9 +23,11 @@ class Mallinfo(ctypes.Structure):
 
 
 def held():
-    """What this process holds, in KiB: `resident`; `used` and `free`, what malloc has given away and what it keeps; and how many `threads` and
-    open `files`."""
+    """What this process holds, in KiB: `resident`; `used` and `free`, what malloc has given away and what it keeps; and how many
+    `threads` and open `files`."""
     gc.collect()
+    # What was freed after the last render's end is free, too.
+    ctypes.CDLL(None).malloc_trim(0)
     with open("/proc/self/status") as status:
         facts = dict(line.split(":", 1) for line in status)
     mallinfo = ctypes.CDLL(None).mallinfo2
