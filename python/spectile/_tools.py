@@ -147,6 +147,18 @@ def sensor(
     model: the name of a file with optics and detector (docs/SENSORS.md): counts, with noise by `seed` unless `noise` is False, and
         `electrons` beside them; `partial` takes a cube of which tiles are missing.
     out: the store to make; None for a temporary one.
+
+    >>> from spectile import render
+    >>> cube = render({
+    ...     "camera": {"orthographic": {"position": [0, 0, 1], "look_at": [0, 0, 0], "up": [0, 1, 0], "width": 2}},
+    ...     "film": {"width": 4, "height": 2},
+    ...     "channels": {"equal": {"from": 400, "to": 700, "count": 3}},  # nm
+    ...     "spectra": {"light": 0.25},  # W m-2 sr-1 nm-1
+    ...     "environment": {"radiance": "light"},
+    ... }, spp=1)
+    >>> bands = sensor(cube, responses={"blue": ([400, 500], [1, 1]), "all": ([400, 700], [1, 1])})  # nm, response
+    >>> bands.attrs["channel_names"], bands.radiance.dims, bands.radiance.shape, float(bands.radiance.max())
+    (['blue', 'all'], ('wavelength', 'y', 'x'), (2, 2, 4), 0.25)
     """
     import shutil
 
@@ -196,6 +208,18 @@ def relight(
     temperatures: of materials by name, K. channels: as in a scene, such as {"equal": {"from": 400, "to": 700, "count": 30}}.
     responses: channels that are bands of a sensor, as `sensor` takes them.
     out: the cube to make; None for a temporary one.
+
+    >>> from spectile import render
+    >>> cube = render({
+    ...     "camera": {"orthographic": {"position": [0, 0, 1], "look_at": [0, 0, 0], "up": [0, 1, 0], "width": 2}},
+    ...     "film": {"width": 4, "height": 2},
+    ...     "channels": {"equal": {"from": 400, "to": 700, "count": 3}},  # nm
+    ...     "spectra": {"light": 0.25},  # W m-2 sr-1 nm-1
+    ...     "environment": {"radiance": "light"},
+    ... }, spp=1, factored=True)
+    >>> relit = relight(cube, light=0.5)
+    >>> relit.radiance.dims, relit.radiance.shape, float(relit.radiance.max())
+    (('wavelength', 'y', 'x'), (3, 2, 4), 0.5)
     """
     import shutil
 
