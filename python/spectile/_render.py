@@ -132,9 +132,9 @@ def _render(task: _spectile.Task, scene: Any, out: str | os.PathLike[str] | None
     scene = taken(scene)
     folder = tempfile.mkdtemp(prefix="spectile-") if out is None else None
     path = os.path.join(folder, "cube.zarr") if folder is not None else os.fspath(out or "")
-    arguments = _arguments(path, settings)
     callback = settings["callback"]
     try:
+        arguments = _arguments(path, settings)
         draft = scene._draft()
         with _Bar(settings["progress"], settings["spp"]) as bar:
 

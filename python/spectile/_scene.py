@@ -21,7 +21,7 @@ _MATRIX = tuple(f"m{row}{column}" for row in range(3) for column in range(4))
 # Where the name of a file stands and nothing else does.
 _FILES = ("mesh", "file", "map", "table", "responses", "nk")
 # Tables of items under names of the user's own, which mean nothing by themselves.
-_NAMED = ("materials", "spectra", "media")
+_NAMED = ("materials", "spectra", "media", "assemblies")
 # Far beyond any scene.
 _DEEPEST = 60
 # Nanometres in one unit of a wavelength; words also in the plural, and as the British spell them.
@@ -311,7 +311,7 @@ class _Reader:
 
         def make() -> Any:
             if names is not None:
-                # Each by its name; `table` below says which have one, and the library what they may be.
+                # The library says which there may be.
                 each = [self.array(value[name], (*path, str(name)), "iuf") for name in names]
                 if len({column.shape for column in each}) > 1 or any(column.ndim != 1 for column in each):
                     shapes = ", ".join(f"{name} {list(column.shape)}" for name, column in zip(names, each, strict=True))

@@ -189,8 +189,9 @@ def test_temporary_cubes_go_when_nobody_reads_them(tmp_path, monkeypatch):
     gc.collect()
     assert not path.parent.exists()
     # Nothing is left of one that failed.
-    with pytest.raises(sp.UsageError, match="tiles"):
-        sp.render(ball(), spp=1, tiles=(5, 9))
+    for tiles in ((5, 9), 3):
+        with pytest.raises(sp.UsageError, match="tiles"):
+            sp.render(ball(), spp=1, tiles=tiles)
     assert path.is_relative_to(tmp_path) and not list(tmp_path.iterdir())
 
 

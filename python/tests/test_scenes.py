@@ -103,6 +103,9 @@ def test_names_of_the_users_own_mean_nothing():
         scene["objects"][1]["material"] = name
         digests.add(scene.digest)
     assert len(digests) == 1
+    post = {"objects": [{"cube": {"min": [-0.1, -0.1, 0], "max": [0.1, 0.1, 1]}, "material": "floor"}]}
+    placed = {ball(assemblies={n: post}, instances=[{"assembly": n}]).digest for n in ("post", "placements", "mesh", "grid")}
+    assert len(placed) == 1
     scene["spectra"]["a.grid"] = -paint
     assert problem(scene).key.startswith('spectra."a.grid"')
 
