@@ -22,6 +22,7 @@ pub mod sky;
 pub mod slurm;
 pub mod spectral;
 pub mod stress;
+pub mod threads;
 
 // The unit tests that need a scene build it as the integration tests do, and compare cubes as they do.
 #[cfg(test)]

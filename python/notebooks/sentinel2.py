@@ -1,82 +1,77 @@
 # %% [markdown]
-# # A field as Sentinel-2 sees it
+# # A Sentinel-2 view of the grove
 #
-# Soil with stripes of vegetation under the sun, seen from above in channels of 5 nm, and then in bands of Sentinel-2's instrument (MSI).
-# Spectra of soil and leaves here are invented curves of the right kind: a red edge at 715 nm, absorption by chlorophyll and by water.
-# The bands are Gaussians of the centres and widths that ESA states for Sentinel-2A, not its measured responses: for a study give
-# those, as a CSV file.
+# The gallery's `grove` (scenes/grove), from above, in pixels of 10 m: trees of 24,000 leaves, of which one is in memory, over litter, under
+# sun and sky. Reflectances and NDVI as Sentinel-2A's instrument (MSI) sees them, and how they change where every other tree is felled.
+#
+# Leaves are PROSPECT-D's, bark and litter measured, the bands ESA's measured responses; the radiance of the sky is a choice.
+# `scenes/render grove` makes the meshes that the scene names, and has to have run once. This notebook is in `python/notebooks` of the
+# repository; paths begin there.
 
 # %%
+from pathlib import Path
+
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 
 import spectile as sp
 
-nm = np.arange(400.0, 2501.0, 10.0)
-
-
-def bump(centre, width):
-    return np.exp(-(((nm - centre) / width) ** 2))
-
-
-soil = 0.08 + 0.25 * (1 - np.exp(-(nm - 380) / 700)) - 0.04 * bump(1930, 60)
-leaf = 0.04 + 0.04 * bump(550, 35) + 0.42 / (1 + np.exp((715 - nm) / 12))
-leaf *= 1 - 0.55 * bump(1450, 80) - 0.75 * bump(1940, 110) - 0.25 / (1 + np.exp((1900 - nm) / 100))
+grove = Path("../../scenes/grove")
+scene = sp.load(grove / "grove.toml")
+scene["camera"] = {"orthographic": {"position": [0, 300, 0], "look_at": [0, 0, 0], "up": [0, 0, -1], "width": 120}}
+scene["film"] = {"width": 12, "height": 12}
+scene["channels"]["equal"]["count"] = 820  # of 2.5 nm, fine enough for B5
 
 # %% [markdown]
-# How much of each texel is covered: rows of plants, denser to the right. The rest is soil.
+# Where trees stand is a table: x, y, z in metres, yaw and scale. Those that neither are seen nor shade what is seen are left out, and to
+# the right of the middle every other one.
 
 # %%
-size = 64
-column, row = np.meshgrid(np.arange(size), np.arange(size))
-cover = np.clip(column / size, 0, 1) * (row // 8 % 2)
-shares = np.stack([1 - cover, cover], axis=-1)
+trees = pd.read_csv(grove / "generated/trees.csv")
+near = (abs(trees.x) < 90) & (abs(trees.z) < 90)
+kept = (trees.x < 0) | (trees.index % 2 == 0)
+scene["instances"] = [{"assembly": "tree", "placements": trees[near & kept]}]
+cube = sp.render(scene, spp=32)
 
-scene = {
-    "camera": {"orthographic": {"position": [0, 0, 500], "look_at": [0, 0, 0], "up": [0, 1, 0], "width": 100}},
-    "film": {"width": 48, "height": 48},
-    "channels": {"equal": {"from": 420, "to": 2500, "count": 416}},
-    "materials": {
-        "field": {"diffuse": {"reflectance": {"texture": shares, "endmembers": ["soil", "leaf"], "filter": "nearest"}}},
-    },
-    "spectra": {"soil": (nm, soil), "leaf": (nm, leaf)},
-    "objects": [{"quad": {"corner": [-50, -50, 0], "edge_u": [100, 0, 0], "edge_v": [0, 100, 0]}, "material": "field"}],
-    "lights": [{"sun": {"azimuth": 150, "elevation": 50, "up": [0, 0, 1], "north": [0, 1, 0], "irradiance": "am1.5"}}],
-}
-cube = sp.render(scene, spp=16)
+
+# %%
+def bands(cube):
+    """Mean radiance in Sentinel-2A's bands, by their names."""
+    image = sp.sensor(cube, responses="../../docs/examples/sentinel2a.csv")
+    return image.radiance.assign_coords(wavelength=image.attrs["channel_names"]).rename(wavelength="band")
+
 
 # %% [markdown]
-# Centre and full width at half maximum in nm (ESA, Sentinel-2 MSI user guide).
+# Radiance becomes reflectance by a white panel, here a plane of it in the same light. A plane of litter beside it says whether that
+# works: its reflectance is known.
+
 
 # %%
-msi = {"B2": (492.4, 66), "B3": (559.8, 36), "B4": (664.6, 31), "B8A": (864.7, 21), "B11": (1613.7, 91), "B12": (2202.4, 175)}
+def plane(material):
+    """A plane of one material in the light of the grove, as seen from above."""
+    flat = scene.copy()
+    del flat["assemblies"], flat["instances"]
+    flat["materials"]["white"] = {"diffuse": {"reflectance": 1.0}}
+    ground = {"corner": [-200, 0, 200], "edge_u": [400, 0, 0], "edge_v": [0, 0, -400]}
+    flat["objects"] = [{"quad": ground, "material": material}]
+    return bands(sp.render(flat, size=(4, 4), spp=16)).mean(("x", "y"))
 
 
-def response(centre, width):
-    x = np.linspace(centre - 1.5 * width, centre + 1.5 * width, 121)
-    return x, np.exp(-4 * np.log(2) * ((x - centre) / width) ** 2)
-
-
-image = sp.sensor(cube, responses={name: response(*band) for name, band in msi.items()})
-bands = dict(zip(image.attrs["channel_names"], image.radiance, strict=True))
-
-# %% [markdown]
-# Reflectances are radiances over those of a white panel: the same scene with a white field.
+white = plane("white")
+of_litter = plane("litter") / white
+reflectance = (bands(cube) / white).assign_attrs(long_name="reflectance factor", units="1")
 
 # %%
-white_scene = {**scene, "materials": {"field": {"diffuse": {"reflectance": 1.0}}}}
-white = sp.sensor(sp.render(white_scene, spp=16), responses={name: response(*band) for name, band in msi.items()})
-reflectance = image.radiance / white.radiance
-reflectance = reflectance.assign_coords(wavelength=list(msi))
-ndvi = (reflectance.sel(wavelength="B8A") - reflectance.sel(wavelength="B4")) / (
-    reflectance.sel(wavelength="B8A") + reflectance.sel(wavelength="B4")
-)
+red, infrared = reflectance.sel(band="B4"), reflectance.sel(band="B8A")
+ndvi = ((infrared - red) / (infrared + red)).assign_attrs(long_name="NDVI", units="1")
+dense, thinned = (float(ndvi.isel(x=half).mean()) for half in (slice(0, 6), slice(6, 12)))
+print(f"NDVI {dense:.3f} where all trees stand, {thinned:.3f} where every other one does")
 
 # %%
 figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4))
-false_colour = reflectance.sel(wavelength=["B8A", "B4", "B3"]).transpose("y", "x", "wavelength")
-left.imshow(np.clip(false_colour / 0.5, 0, 1))
+false_colour = reflectance.sel(band=["B8A", "B4", "B3"]).transpose("y", "x", "band")
+left.imshow(np.clip(false_colour / 0.3, 0, 1))
 left.set_title("B8A, B4, B3")
 ndvi.plot(ax=right, yincrease=False)
-right.set_title("NDVI")
-print(f"NDVI from {float(ndvi.min()):.2f} to {float(ndvi.max()):.2f}")
+right.set_title("every other tree felled to the right")

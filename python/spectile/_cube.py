@@ -13,7 +13,7 @@ from typing import Any
 import numpy
 import xarray
 
-from . import _spectile
+from . import _spectile, _work
 from ._engine import Engine, Temporary
 from ._errors import UsageError
 
@@ -48,6 +48,8 @@ def open_cube(path: str | os.PathLike[str]) -> Cube:
 
     Raises `StorageError` where there is none.
     """
+    if not isinstance(path, (str, os.PathLike)):
+        raise TypeError(f"open_cube: a cube is opened by its name, not a {type(path).__name__}")
     return opened(path)
 
 
@@ -101,6 +103,7 @@ def tone(linear: Any, exposure: float | None = None) -> tuple[numpy.ndarray, flo
     >>> picture.shape, picture.dtype.name, int(picture[0, 0, 0]), ev
     ((1, 2, 3), 'uint8', 255, 1.0)
     """
+    _work.begin()
     linear = numpy.ascontiguousarray(linear, dtype=numpy.float32)
     ev, data = _spectile.tone(linear, exposure)
     return numpy.frombuffer(data, dtype=numpy.uint8).reshape(linear.shape), ev
@@ -112,6 +115,10 @@ def rgb(cube: Any, exposure: float | None = None) -> xarray.DataArray:
 
     `cube` is a Dataset with `preview`, also a part of one, or the name of a cube.
     """
+    if not isinstance(cube, (xarray.Dataset, str, os.PathLike)):
+        raise TypeError(
+            f"rgb: a picture is made of a cube, which holds it as `preview`, or of its name, not of a {type(cube).__name__}"
+        )
     dataset = cube if isinstance(cube, xarray.Dataset) else opened(cube)
     if "preview" not in dataset:
         raise UsageError("rgb: there is no `preview` in this Dataset, as in counts by a sensor model")

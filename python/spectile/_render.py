@@ -12,6 +12,7 @@ from collections.abc import AsyncIterator, Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from . import _spectile, _work
+from ._errors import UsageError
 from ._scene import Scene, _overrides, taken
 
 if TYPE_CHECKING:
@@ -131,9 +132,9 @@ def _render(task: _spectile.Task, scene: Any, out: str | os.PathLike[str] | None
     scene = taken(scene)
     folder = tempfile.mkdtemp(prefix="spectile-") if out is None else None
     path = os.path.join(folder, "cube.zarr") if folder is not None else os.fspath(out or "")
-    arguments = _arguments(path, settings)
     callback = settings["callback"]
     try:
+        arguments = _arguments(path, settings)
         draft = scene._draft()
         with _Bar(settings["progress"], settings["spp"]) as bar:
 
@@ -156,9 +157,15 @@ def _arguments(path: str, settings: Mapping[str, Any]) -> list[str]:
     """The command line of a render."""
     tiles, preview = settings["tiles"], settings["preview"]
     if tiles is not None:
-        first, end = (tiles.start, tiles.stop) if isinstance(tiles, range) else tiles
-        tiles = f"{int(first)}..{int(end)}"
-    arguments = ["render", f"--output={path}", f"--seed={settings['seed']}", f"--devices={_work.chosen(settings['devices'])}"]
+        if isinstance(tiles, range) and tiles.step != 1:
+            raise UsageError(f"`tiles` are a to b - 1 without a gap, not {tiles}: a render each for others, with `resume`")
+        ends = (tiles.start, tiles.stop) if isinstance(tiles, range) else tiles
+        first, end = _work.two("tiles", ends, "(a, b), the tiles a to b - 1")
+        tiles = f"{_work.whole('tiles', first)}..{_work.whole('tiles', end)}"
+    if settings["callback"] is not None and not callable(settings["callback"]):
+        raise TypeError(f"`callback` is called with an Epoch, which {settings['callback']!r} cannot be")
+    seed = _work.whole("seed", settings["seed"])
+    arguments = ["render", f"--output={path}", f"--seed={seed}", f"--devices={_work.chosen(settings['devices'])}"]
     options = {
         "time": _work.seconds(settings["time"]),
         "size": _work.pair(settings["size"]),
@@ -166,7 +173,8 @@ def _arguments(path: str, settings: Mapping[str, Any]) -> list[str]:
         "layers": ",".join([settings["layers"]] if isinstance(settings["layers"], str) else settings["layers"]) or None,
         "preview": None if preview is None else os.fspath(preview),
         **{name: bool(settings[name]) for name in ("uncertainty", "factored", "resume", "overwrite")},
-        **{name: settings[name] for name in ("spp", "error", "tile", "memory", "exposure")},
+        **{name: _work.whole(name, settings[name]) for name in ("spp", "tile", "memory")},
+        **{name: settings[name] for name in ("error", "exposure")},
         # The program's own default goes without `error`.
         "error-per": None if settings["error_per"] == "image" else settings["error_per"],
     }

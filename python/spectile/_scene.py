@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, TypeGuard
 
 from . import _spectile, _work
 from ._errors import SceneError, mistake
@@ -14,14 +14,19 @@ from ._errors import SceneError, mistake
 _PAIRS = ("samples", "intervals")
 # Where a file would be named that holds a picture or voxels.
 _NUMBERS = ("texture", "grid")
+# Where a file would be named that holds columns of numbers.
+_COLUMNS = ("placements",)
+# What the columns of an array of matrices [n, 3 or 4, 4] are.
+_MATRIX = tuple(f"m{row}{column}" for row in range(3) for column in range(4))
 # Where the name of a file stands and nothing else does.
 _FILES = ("mesh", "file", "map", "table", "responses", "nk")
 # Tables of items under names of the user's own, which mean nothing by themselves.
-_NAMED = ("materials", "spectra", "media")
+_NAMED = ("materials", "spectra", "media", "assemblies")
 # Far beyond any scene.
 _DEEPEST = 60
-# Nanometres in one unit of a wavelength.
-_NM = {"nm": 1.0, "nanometer": 1.0, "um": 1e3, "µm": 1e3, "μm": 1e3, "micrometer": 1e3, "micron": 1e3, "m": 1e9, "angstrom": 0.1}
+# Nanometres in one unit of a wavelength; words also in the plural, and as the British spell them.
+_NM = {"nm": 1.0, "nanometer": 1.0, "um": 1e3, "µm": 1e3, "μm": 1e3, "micrometer": 1e3, "micron": 1e3, "m": 1e9, "meter": 1e9}
+_NM |= {"angstrom": 0.1, "Å": 0.1}
 
 
 class Scene(dict[str, Any]):
@@ -30,11 +35,13 @@ class Scene(dict[str, Any]):
     `Scene(mapping, folder=…)` makes one; `load` reads one from a file. Paths in it are relative to `folder`, that of the file or else
     the working directory at the time. Mappings and lists are copied, arrays are not.
 
-    Wherever the scene has a spectrum, these may stand too: an array [n, 2] of wavelength in nm and value, a pair of arrays of one
-    dimension (wavelengths, values), an xarray.DataArray over `wavelength`, a pandas.Series over its index, or a
-    `SpectralDistribution` of colour-science. In the place of a file's name: `mesh` takes a mapping of `vertices` [vertex, 3],
+    Wherever the scene has a spectrum, these may stand too: an array [n, 2] of wavelength in nm and value, a pair (wavelengths, values) of
+    arrays of one dimension or lists, a mapping of wavelengths to values, an xarray.DataArray over `wavelength`, a pandas.Series over its
+    index, or a `SpectralDistribution` of colour-science. In the place of a file's name: `mesh` takes a mapping of `vertices` [vertex, 3],
     `faces` [face, 3] counted from 0, and `uv` and `normals` by vertex or by corner [face, 3, …]; `texture` takes an array [y, x] or
-    [y, x, channel], rows from the top, linear numbers; `grid` takes an array [z, y, x].
+    [y, x, channel], rows from the top, linear numbers; `grid` takes an array [z, y, x]; `placements` takes positions [n, 3] in metres,
+    matrices [n, 4, 4] or their first three rows [n, 3, 4], or columns by name, as a mapping, a pandas.DataFrame or a structured array:
+    `x`, `y`, `z`, and `yaw_degrees` and `scale` or not.
 
     >>> scene = Scene({"film": {"width": 64, "height": 48}})
     >>> scene["film"]["width"] = 32
@@ -43,6 +50,8 @@ class Scene(dict[str, Any]):
     """
 
     def __init__(self, mapping: Mapping[str, Any] = {}, *, folder: str | os.PathLike[str] | None = None) -> None:
+        if not isinstance(mapping, Mapping):
+            raise TypeError(f"a Scene is made of a mapping, not a {type(mapping).__name__}; spectile.load reads one from a file")
         super().__init__({key: _copied(value, (str(key),)) for key, value in mapping.items()})
         # Nothing is read from there: it says where relative paths begin, and what messages call the scene.
         self.file: str = os.path.join(os.path.abspath("." if folder is None else os.fspath(folder)), "<scene>")
@@ -89,6 +98,7 @@ class Scene(dict[str, Any]):
         >>> facts["size"], facts["bounds_nm"], len(facts["digest"])
         ([4, 2], [[400.0, 500.0], [500.0, 700.0]], 64)
         """
+        _work.begin()
         return self._draft().check(_overrides(overrides))
 
     @property
@@ -120,11 +130,22 @@ def taken(scene: Scene | Mapping[str, Any] | str | os.PathLike[str]) -> Scene:
     """The scene that a mapping is, or a file holds."""
     if isinstance(scene, Scene):
         return scene
-    return Scene(scene) if isinstance(scene, Mapping) else load(scene)
+    if isinstance(scene, Mapping):
+        return Scene(scene)
+    if not isinstance(scene, (str, os.PathLike)):
+        raise TypeError(f"a scene is a Scene or another mapping, or the name of a file, not a {type(scene).__name__}")
+    return load(scene)
 
 
 def _overrides(overrides: Mapping[str, Any] | None) -> list[tuple[str, str]]:
-    return [(key, _work.toml(value)) for key, value in (overrides or {}).items()]
+    reader = _Reader("overrides")
+    found = []
+    for key, value in (overrides or {}).items():
+        path = tuple(str(key).split("."))
+        # Spectra in all forms that scenes take.
+        pairs = None if path[-1] in _PAIRS else reader.samples(value, path)
+        found.append((key, _work.toml(value if pairs is None else {"samples": pairs})))
+    return found
 
 
 def _copied(value: Any, path: tuple[str, ...]) -> Any:
@@ -146,7 +167,12 @@ def _spelt(path: tuple[str, ...]) -> str:
     return ".".join(part if re.fullmatch(r"[A-Za-z0-9_-]+", part) else _work.toml(part) for part in path)
 
 
-def is_array(value: Any) -> bool:
+def _of_numbers(mapping: Mapping[Any, Any]) -> bool:
+    """Whether it is a spectrum as colour-science takes them: values by wavelengths."""
+    return len(mapping) > 1 and all(hasattr(key, "__float__") for key in mapping)
+
+
+def is_array(value: Any) -> TypeGuard[Any]:
     """Whether it is one of numpy, or can become one, and has dimensions."""
     return getattr(value, "ndim", 0) > 0 and hasattr(value, "__array__")
 
@@ -170,12 +196,14 @@ class _Reader:
             return value
         _not_too_deep(self.file, path)
         key = "" if len(path) == 2 and path[0] in _NAMED else path[-1]
-        if isinstance(value, Mapping):
+        if key in _COLUMNS and value is not None and not isinstance(value, os.PathLike):
+            return self.columns(value, path)
+        if isinstance(value, Mapping) and not _of_numbers(value):
             return self.mesh(value, path) if key == "mesh" else self.mapping(value, path)
         if hasattr(value, "magnitude") and hasattr(value, "units"):
             message = f"has a unit of its own, {value.units}, which is not converted here"
             raise self.mistake(path, message, "give `.magnitude` in the unit that docs/scene.md names")
-        if key in _NUMBERS and is_array(value):
+        if key in _NUMBERS and (is_array(value) or isinstance(value, (list, tuple))):
             return self.numbers(value, path)
         if key in _FILES and is_array(value):
             help = "a mesh is a mapping of vertices and faces" if key == "mesh" else "give the name of a file"
@@ -195,6 +223,11 @@ class _Reader:
         """As numpy's, of one of some kinds of number."""
         import numpy
 
+        for holder in (value, getattr(value, "data", None)):
+            unit = getattr(holder, "units", None) if hasattr(holder, "magnitude") else None
+            if unit is not None:
+                message = f"has a unit of its own, {unit}, which is not converted here"
+                raise self.mistake(path, message, "give `.magnitude` in the unit that is meant: nm, and what docs/scene.md names")
         if numpy.ma.is_masked(value):
             raise self.mistake(path, "has masked values, of which nothing is known", "fill them, as with .filled(…)")
         array = numpy.asarray(value)
@@ -205,22 +238,31 @@ class _Reader:
 
     def samples(self, value: Any, path: tuple[str, ...]) -> list[list[float]] | None:
         """[nm, value] of what is a spectrum by itself; None where nothing says that it is."""
-        if hasattr(value, "wavelengths") and hasattr(value, "values"):
+        if isinstance(value, Mapping):
+            if not _of_numbers(value):
+                return None
+            nm, values = [*value], [*value.values()]
+        elif hasattr(value, "wavelengths") and hasattr(value, "values"):
             nm, values = value.wavelengths, value.values  # colour-science
         elif "wavelength" in getattr(value, "coords", ()):
-            unit = str(value.coords["wavelength"].attrs.get("units", "nm")).strip()
+            written = str(value.coords["wavelength"].attrs.get("units", "nm")).strip()
+            unit = written if len(written) < 3 else written.lower().removesuffix("s").replace("metre", "meter")
             if unit not in _NM:
-                raise self.mistake(path, f"has wavelengths in `{unit}`", f"convert them to one of {', '.join(_NM)}")
+                raise self.mistake(path, f"has wavelengths in `{written}`", f"convert them to one of {', '.join(_NM)}")
+            if str(value.attrs.get("units", "")).strip().lower() in ("%", "percent"):
+                raise self.mistake(path, "has values in per cent", "divide them by 100, and remove their `units`")
             if value.dims != ("wavelength",):
                 message = f"has the dimensions {', '.join(map(str, value.dims)) or 'none'}, but a spectrum has `wavelength` alone"
                 raise self.mistake(path, message, "choose one, as with .isel(x=0, y=0)")
-            nm, values = value.coords["wavelength"].values * _NM[unit], value.values
+            nm, values = self.array(value.coords["wavelength"].data, path, "iuf") * _NM[unit], value.data
         elif hasattr(value, "index") and hasattr(value, "to_numpy") and not callable(value.index):
             if value.ndim != 1:
                 raise self.mistake(path, "must not be a table", "choose one column of it")
             nm, values = value.index.to_numpy(), value.to_numpy()  # pandas
-        elif isinstance(value, tuple) and len(value) == 2 and all(is_array(part) for part in value):
+        elif isinstance(value, tuple) and len(value) == 2 and all(is_array(part) or isinstance(part, list) for part in value):
             nm, values = value
+        elif "wavelength" in getattr(value, "dims", ()):
+            raise self.mistake(path, "has no coordinate `wavelength`", "add the wavelengths, as with .assign_coords(wavelength=nm)")
         elif is_array(value) and value.ndim == 2 and value.shape[1] == 2:
             pairs = self.array(value, path, "iuf")
             nm, values = pairs[:, 0], pairs[:, 1]
@@ -244,7 +286,7 @@ class _Reader:
 
         def make() -> Any:
             ordered, kinds = value, "iuf" if path[-1] == "grid" else "f"
-            if kinds == "f" and getattr(value.dtype, "kind", "") in "iub":
+            if kinds == "f" and getattr(getattr(value, "dtype", None), "kind", "f") in "iub":
                 message = f"holds whole numbers ({value.dtype}), which does not say what 1 is"
                 raise self.mistake(path, message, "give linear floating-point numbers, as with array / 255 where they are shares")
             axes = ("z", "y", "x") if path[-1] == "grid" else ("y", "x")
@@ -255,6 +297,44 @@ class _Reader:
                 array = numpy.require(self.array(ordered, path, kinds), numpy.float32, "A")
             shape = " x ".join(str(n) for n in array.shape)
             return _spectile.numbers(f"{_spelt(path)} (array {shape})", array)
+
+        return self.once((value,), make)
+
+    def columns(self, value: Any, path: tuple[str, ...]) -> Any:
+        """Placements: numbers by name, or an array that says by its shape what it holds."""
+        import numpy
+
+        help = "give positions [n, 3], matrices [n, 4, 4] or [n, 3, 4], or columns x, y, z, yaw_degrees, scale by name"
+        names = getattr(getattr(value, "dtype", None), "names", None)
+        if names is None and (isinstance(value, Mapping) or hasattr(value, "columns")):
+            names = [*value]
+
+        def make() -> Any:
+            if names is not None:
+                # The library says which there may be.
+                each = [self.array(value[name], (*path, str(name)), "iuf") for name in names]
+                if len({column.shape for column in each}) > 1 or any(column.ndim != 1 for column in each):
+                    shapes = ", ".join(f"{name} {list(column.shape)}" for name, column in zip(names, each, strict=True))
+                    raise self.mistake(
+                        path, f"has columns of different shapes: {shapes}", "give one number each for every instance"
+                    )
+                columns, rows = [str(name) for name in names], numpy.stack(each, axis=-1) if each else numpy.zeros((0, 0))
+            else:
+                array = self.array(value, path, "iuf")
+                if array.ndim == 2 and array.shape[1] == 3:
+                    columns, rows = ["x", "y", "z"], array
+                elif array.ndim == 3 and array.shape[1:] in ((3, 4), (4, 4)):
+                    if array.shape[1] == 4 and (array[:, 3] != [0, 0, 0, 1]).any():
+                        row = array[(array[:, 3] != [0, 0, 0, 1]).any(axis=1), 3][0]
+                        message = f"has a matrix whose last row is {row.tolist()}, not 0, 0, 0, 1"
+                        raise self.mistake(path, message, "matrices act on column vectors: the translation is the last column")
+                    columns, rows = list(_MATRIX), array[:, :3].reshape(-1, 12)
+                else:
+                    raise self.mistake(path, f"has the shape {list(array.shape)}", help)
+            if not columns:
+                raise self.mistake(path, "has no columns", help)
+            rows = numpy.require(rows, numpy.float64, "A")
+            return _spectile.table(f"{_spelt(path)} ({len(rows)} placements)", columns, rows)
 
         return self.once((value,), make)
 

@@ -33,9 +33,10 @@ def plan(
     `predicted_s` and others; docs/json.md says what each means. Arguments are those of `render`; `pilot` decides by samples which paths are
     worth evaluating, as `render` does."""
     scene = taken(scene)
-    arguments = ["plan", f"--spp={spp}", f"--devices={_work.chosen(devices)}"]
-    for name, value in {"size": _work.pair(size), "tile": tile, "memory": memory, "pilot": bool(pilot)}.items():
-        arguments += _work.option(name, value)
+    arguments = ["plan", f"--spp={_work.whole('spp', spp)}", f"--devices={_work.chosen(devices)}"]
+    arguments += _work.option("size", _work.pair(size)) + _work.option("pilot", bool(pilot))
+    for name, value in {"tile": tile, "memory": memory}.items():
+        arguments += _work.option(name, _work.whole(name, value))
     arguments += [f"--set={key}={value}" for key, value in _overrides(overrides)]
     facts = _work.run([*arguments, "--json", "--", scene.file], draft=scene._draft())
     return {key: value for key, value in facts.items() if key not in ("event", "time_s")}
@@ -146,6 +147,18 @@ def sensor(
     model: the name of a file with optics and detector (docs/SENSORS.md): counts, with noise by `seed` unless `noise` is False, and
         `electrons` beside them; `partial` takes a cube of which tiles are missing.
     out: the store to make; None for a temporary one.
+
+    >>> from spectile import render
+    >>> cube = render({
+    ...     "camera": {"orthographic": {"position": [0, 0, 1], "look_at": [0, 0, 0], "up": [0, 1, 0], "width": 2}},
+    ...     "film": {"width": 4, "height": 2},
+    ...     "channels": {"equal": {"from": 400, "to": 700, "count": 3}},  # nm
+    ...     "spectra": {"light": 0.25},  # W m-2 sr-1 nm-1
+    ...     "environment": {"radiance": "light"},
+    ... }, spp=1)
+    >>> bands = sensor(cube, responses={"blue": ([400, 500], [1, 1]), "all": ([400, 700], [1, 1])})  # nm, response
+    >>> bands.attrs["channel_names"], bands.radiance.dims, bands.radiance.shape, float(bands.radiance.max())
+    (['blue', 'all'], ('wavelength', 'y', 'x'), (2, 2, 4), 0.25)
     """
     import shutil
 
@@ -155,6 +168,8 @@ def sensor(
         raise UsageError("sensor: give `responses` or `model`, and not both")
     if responses is not None and (seed or not noise or electrons or partial):
         raise UsageError("sensor: `seed`, `noise`, `electrons` and `partial` go with `model` only")
+    if model is not None and not isinstance(model, (str, os.PathLike)):
+        raise TypeError(f"sensor: `model` is the name of a file (docs/SENSORS.md), not a {type(model).__name__}")
     folder = tempfile.mkdtemp(prefix="spectile-")
     path = os.path.join(folder, "sensor.zarr") if out is None else os.fspath(out)
     try:
@@ -183,14 +198,28 @@ def relight(
     channels: Mapping[str, Any] | None = None,
     responses: Any = None,
     overwrite: bool = False,
+    **named: Any,
 ) -> Cube:
     """A factored cube (`render(…, factored=True)`) under other spectra, temperatures or channels; no path is traced.
 
     spectra: by their names in the scene, each as a scene takes it: a number, a mapping such as {"blackbody": 2700}, wavelengths and
-        values in any form of which `Scene` makes spectra.
+        values in any form of which `Scene` makes spectra. Those whose names are words may be arguments of their own:
+        `relight(cube, lamp=illuminant("A"))`.
     temperatures: of materials by name, K. channels: as in a scene, such as {"equal": {"from": 400, "to": 700, "count": 30}}.
     responses: channels that are bands of a sensor, as `sensor` takes them.
     out: the cube to make; None for a temporary one.
+
+    >>> from spectile import render
+    >>> cube = render({
+    ...     "camera": {"orthographic": {"position": [0, 0, 1], "look_at": [0, 0, 0], "up": [0, 1, 0], "width": 2}},
+    ...     "film": {"width": 4, "height": 2},
+    ...     "channels": {"equal": {"from": 400, "to": 700, "count": 3}},  # nm
+    ...     "spectra": {"light": 0.25},  # W m-2 sr-1 nm-1
+    ...     "environment": {"radiance": "light"},
+    ... }, spp=1, factored=True)
+    >>> relit = relight(cube, light=0.5)
+    >>> relit.radiance.dims, relit.radiance.shape, float(relit.radiance.max())
+    (('wavelength', 'y', 'x'), (3, 2, 4), 0.5)
     """
     import shutil
 
@@ -203,7 +232,10 @@ def relight(
     path = os.path.join(folder, "relit.zarr") if out is None else os.fspath(out)
     try:
         arguments = ["relight", f"--output={path}", *_work.option("overwrite", bool(overwrite))]
-        for name, spectrum in (spectra or {}).items():
+        twice = sorted(set(named) & set(spectra or {}))
+        if twice:
+            raise UsageError(f"relight: `{twice[0]}` is given twice, by itself and in `spectra`")
+        for name, spectrum in {**(spectra or {}), **named}.items():
             samples = reader.samples(spectrum, (str(name),))
             value = spectrum if samples is None else {"samples": samples}
             arguments.append(f"--set=spectra.{_work.toml(str(name))}={_work.toml(value)}")
@@ -239,9 +271,7 @@ def _write_responses(file: str, responses: Any) -> None:
     elif isinstance(responses, Mapping):
         bands = dict(responses)
     else:
-        raise TypeError(
-            f"responses are a file, a mapping of names to spectra, or colour-science's, not {type(responses).__name__}"
-        )
+        raise TypeError(f"responses are a file, a mapping of names to spectra, or colour-science's, not {type(responses).__name__}")
     reader = _Reader("responses")
     with open(file, "w", newline="", encoding="utf-8") as text:
         rows = csv.writer(text)
@@ -316,6 +346,9 @@ def to_colour(spectra: xarray.DataArray) -> Any:
     import colour
     import numpy
 
+    if not (hasattr(spectra, "dims") and hasattr(spectra, "ndim")):
+        kind = type(spectra).__name__
+        raise TypeError(f"to_colour: spectra are an xarray.DataArray over `wavelength`, such as cube.radiance, not a {kind}")
     if "wavelength" not in spectra.dims:
         raise UsageError("to_colour: the array has no dimension `wavelength`")
     ordered = spectra.transpose("wavelength", ...).sortby("wavelength")

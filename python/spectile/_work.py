@@ -10,9 +10,33 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from . import _spectile
-from ._errors import SpectileWarning
+from ._errors import SpectileWarning, UsageError
+
+# Whether anything of the library has run in this process, and whether it had in the one that this was forked from.
+_began = False
+_left_behind = False
 
 Listener = Callable[[dict[str, Any]], None]
+
+
+def begin() -> None:
+    """Before anything of the library that may take threads: those are not copied by a fork, and who waits for them waits for good."""
+    global _began
+    if _left_behind:
+        raise UsageError(
+            "Spectile has worked in the process that this one was forked from, and its threads and devices are not here: "
+            'start processes with multiprocessing.get_context("spawn"), or before Spectile does anything'
+        )
+    _began = True
+
+
+def _forked() -> None:
+    global _left_behind
+    _left_behind = _began
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forked)
 
 
 def run(
@@ -22,6 +46,7 @@ def run(
 
     Warnings become warnings of Python, once the work has ended: one that is made an error must not end a render.
     """
+    begin()
     last: dict[str, Any] = {}
     said: list[str] = []
 
@@ -63,6 +88,19 @@ def _give_back() -> None:
             trim(0)
 
 
+def whole(name: str, value: Any) -> Any:
+    """A whole number, which 1e3 is too; what is none is left to whoever knows what it may be."""
+    if value is None or isinstance(value, str):
+        return value
+    try:
+        exact = int(value)
+    except (TypeError, ValueError, OverflowError):
+        exact = None
+    if exact is None or isinstance(value, bool) or exact != value:
+        raise UsageError(f"`{name}` is a whole number, not {value!r}")
+    return exact
+
+
 def option(name: str, value: Any) -> list[str]:
     """`--name=value`, or nothing where there is no value."""
     if value is None or value is False:
@@ -81,15 +119,29 @@ def chosen(devices: Any) -> str:
     """ "all", a number of devices, or their positions."""
     if isinstance(devices, (str, int)) and not isinstance(devices, bool):
         return str(devices)
-    return ",".join(str(int(position)) for position in devices) + ","
+    try:
+        positions = [int(position) for position in devices]
+    except (TypeError, ValueError):
+        positions = []
+    if not positions:
+        raise UsageError(f'`devices` is "all", a number of devices, or a list of positions, not {devices!r}')
+    return ",".join(map(str, positions)) + ","
 
 
 def pair(size: Any) -> str | None:
     """(width, height) or text such as "640x480"."""
     if size is None or isinstance(size, str):
         return size
-    width, height = size
-    return f"{int(width)}x{int(height)}"
+    return "x".join(str(whole("size", side)) for side in two("size", size, '(width, height) in pixels, or text such as "640x480"'))
+
+
+def two(name: str, value: Any, what: str) -> tuple[Any, Any]:
+    """Both of a pair."""
+    try:
+        first, second = value
+    except (TypeError, ValueError):
+        raise UsageError(f"`{name}` is {what}, not {value!r}") from None
+    return first, second
 
 
 def toml(value: Any) -> str:

@@ -1,4 +1,5 @@
-//! Arrays of numpy, and of whoever else offers buffers, as numbers of a scene. Each is copied once, into what the scene keeps.
+//! Arrays of numpy, and of whoever else offers buffers, as numbers of a scene. Each is copied once, into what the scene keeps: it is
+//! read, checked and taken into the digest while other threads go on, which may change an array of theirs at any time.
 
 use std::sync::Arc;
 
@@ -6,7 +7,7 @@ use pyo3::buffer::{Element, PyBuffer};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyAny;
-use spectile::scene::arrays::{self as scene, Corners, Mesh};
+use spectile::scene::arrays::{self as scene, Corners, Mesh, Table};
 
 /// Numbers that stand in a scene where a file would be named.
 #[pyclass(frozen)]
@@ -23,7 +24,19 @@ impl Data {
 #[pyfunction]
 pub fn numbers(name: String, array: &Bound<'_, PyAny>) -> PyResult<Data> {
     let (shape, values) = floats(array, &name)?;
-    Ok(Data(Arc::new(scene::Data::Numbers { name, shape, values })))
+    Ok(Data(Arc::new(scene::Data::Numbers { name, shape, values: Arc::new(values) })))
+}
+
+/// Numbers by name: float64 [row, column].
+#[pyfunction]
+pub fn table(name: String, columns: Vec<String>, array: &Bound<'_, PyAny>) -> PyResult<Data> {
+    let buffer = buffer::<f64>(array, &name)?;
+    match buffer.shape() {
+        [_, n] if *n == columns.len() && *n > 0 => {}
+        shape => return Err(PyValueError::new_err(format!("must be [row, {}], not {shape:?}", columns.len()))),
+    }
+    let values = buffer.to_vec(array.py())?;
+    Ok(Data(Arc::new(scene::Data::Table(Table { name, columns, values }))))
 }
 
 /// A mesh: float64 vertices [vertex, 3], uint32 faces [face, 3], and float64 uv and normals [vertex, 2 or 3] or [face, 3, 2 or 3].
@@ -43,37 +56,53 @@ pub fn mesh(
         normals: normals.map(|normals| corners::<3>(normals, "normals")).transpose()?,
         name,
     };
-    Ok(Data(Arc::new(scene::Data::Mesh(mesh))))
+    Ok(Data(Arc::new(vertices.py().detach(|| mesh.into()))))
 }
 
 /// Shape and numbers of a float32 array, whatever its strides.
 pub fn floats(array: &Bound<'_, PyAny>, what: &str) -> PyResult<(Vec<usize>, Vec<f32>)> {
-    read::<f32>(array, what)
-}
-
-fn read<T: Element>(array: &Bound<'_, PyAny>, what: &str) -> PyResult<(Vec<usize>, Vec<T>)> {
-    let buffer = PyBuffer::<T>::get(array).map_err(|error| {
-        PyValueError::new_err(format!("{what}: not an array of {}: {error}", std::any::type_name::<T>()))
-    })?;
+    let buffer = buffer::<f32>(array, what)?;
     Ok((buffer.shape().to_vec(), buffer.to_vec(array.py())?))
 }
 
-fn rows<T: Element, const N: usize>(array: &Bound<'_, PyAny>, what: &str, wanted: &str) -> PyResult<Vec<[T; N]>> {
-    let (shape, values) = read::<T>(array, what)?;
-    match shape[..] {
-        [_, n] if n == N => Ok(values.as_chunks::<N>().0.to_vec()),
-        _ => Err(PyValueError::new_err(format!("`{what}` must be {wanted}, but has the shape {shape:?}"))),
+fn buffer<T: Element>(array: &Bound<'_, PyAny>, what: &str) -> PyResult<PyBuffer<T>> {
+    PyBuffer::<T>::get(array).map_err(|error| {
+        PyValueError::new_err(format!("{what}: not an array of {}: {error}", std::any::type_name::<T>()))
+    })
+}
+
+fn rows<T: Element + Default, const N: usize>(
+    array: &Bound<'_, PyAny>,
+    what: &str,
+    wanted: &str,
+) -> PyResult<Vec<[T; N]>> {
+    let buffer = buffer::<T>(array, what)?;
+    match *buffer.shape() {
+        [count, n] if n == N => {
+            let mut rows = vec![[T::default(); N]; count];
+            buffer.copy_to_slice(array.py(), rows.as_flattened_mut())?;
+            Ok(rows)
+        }
+        _ => Err(PyValueError::new_err(format!("`{what}` must be {wanted}, but has the shape {:?}", buffer.shape()))),
     }
 }
 
 fn corners<const N: usize>(array: &Bound<'_, PyAny>, what: &str) -> PyResult<Corners<N>> {
-    let (shape, values) = read::<f64>(array, what)?;
-    let rows = values.as_chunks::<N>().0;
-    match shape[..] {
-        [_, n] if n == N => Ok(Corners::OfVertices(rows.to_vec())),
-        [_, 3, n] if n == N => Ok(Corners::OfFaces(rows.as_chunks::<3>().0.to_vec())),
+    let buffer = buffer::<f64>(array, what)?;
+    match *buffer.shape() {
+        [count, n] if n == N => {
+            let mut rows = vec![[0.0; N]; count];
+            buffer.copy_to_slice(array.py(), rows.as_flattened_mut())?;
+            Ok(Corners::OfVertices(rows))
+        }
+        [count, 3, n] if n == N => {
+            let mut faces = vec![[[0.0; N]; 3]; count];
+            buffer.copy_to_slice(array.py(), faces.as_flattened_mut().as_flattened_mut())?;
+            Ok(Corners::OfFaces(faces))
+        }
         _ => Err(PyValueError::new_err(format!(
-            "`{what}` must be [vertex, {N}] or [face, 3, {N}], but has the shape {shape:?}"
+            "`{what}` must be [vertex, {N}] or [face, 3, {N}], but has the shape {:?}",
+            buffer.shape()
         ))),
     }
 }

@@ -51,6 +51,7 @@ fn read_scene(py: Python<'_>, file: PathBuf) -> PyResult<(String, Bound<'_, PyDi
 /// 8-bit sRGB of linear sRGB [y, x, rgb], float32, as pictures of `spectile export` are made: the exposure in EV, the one asked for
 /// or that which brings the 99th percentile of lit pixels to white, and bytes [y, x, rgb].
 #[pyfunction]
+#[pyo3(signature = (linear, exposure=None))]
 fn tone<'py>(
     py: Python<'py>,
     linear: &Bound<'py, PyAny>,
@@ -86,7 +87,7 @@ mod _spectile {
     #[pymodule_export]
     use super::{Draft, program, read_scene, tone};
     #[pymodule_export]
-    use crate::arrays::{Data, mesh, numbers};
+    use crate::arrays::{Data, mesh, numbers, table};
     #[pymodule_export]
     use crate::task::Task;
 

@@ -3,7 +3,6 @@
 
 use std::ffi::OsString;
 use std::sync::Arc;
-use std::thread;
 use std::time::Duration;
 
 use crossbeam_channel::{Receiver, RecvTimeoutError, unbounded};
@@ -15,7 +14,7 @@ use spectile::cli::{Host, call};
 use spectile::cube::reduction;
 use spectile::preview::Feed;
 use spectile::render::interrupt::Interrupt;
-use spectile::{Error, Result};
+use spectile::{Error, Result, threads};
 
 use crate::Draft;
 use crate::errors::raise;
@@ -63,8 +62,8 @@ impl Task {
         let host = Host { event, interrupt: Arc::clone(&self.interrupt), feed: Arc::clone(&self.feed) };
         let draft = draft.map(|draft| Arc::clone(&draft.0));
         let work = move || call(&arguments, draft, host);
-        let worker = thread::Builder::new().name("spectile".into()).spawn(work);
-        let worker = worker.map_err(|error| PyRuntimeError::new_err(format!("no thread can be started: {error}")))?;
+        let worker = threads::run("spectile", work)
+            .map_err(|error| PyRuntimeError::new_err(format!("no thread can be started: {error}")))?;
         let raised = self.listen(py, &events, listener.as_ref());
         let raised = match raised {
             Heard::End(raised) => raised,

@@ -91,7 +91,10 @@ impl Reader<'_> {
 }
 
 fn kind(value: &Bound<'_, PyAny>) -> String {
-    value.get_type().name().map_or_else(|_| "an object".to_owned(), |name| format!("a {name}"))
+    let Ok(name) = value.get_type().name() else { return "an object".to_owned() };
+    let name = name.to_string();
+    let article = if name.starts_with(['a', 'e', 'i', 'o', 'u', 'A', 'E', 'I', 'O', 'U']) { "an" } else { "a" };
+    format!("{article} {name}")
 }
 
 /// The tree of a scene file as nested dicts and lists.

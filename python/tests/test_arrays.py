@@ -16,21 +16,27 @@ PAINT = numpy.array([[380, 0.05], [500, 0.1], [600, 0.7], [780, 0.8]])
         PAINT,
         PAINT.astype(object).astype(float)[::1].copy(order="F"),
         (PAINT[:, 0], PAINT[:, 1]),
+        (PAINT[:, 0].tolist(), PAINT[:, 1].tolist()),
+        (PAINT[:, 0], PAINT[:, 1].tolist()),
+        dict(PAINT.tolist()),
         {"samples": PAINT},
         {"samples": [tuple(row) for row in PAINT]},
         xarray.DataArray(PAINT[:, 1], coords={"wavelength": PAINT[:, 0]}, dims="wavelength"),
         xarray.DataArray(
+            PAINT[:, 1], coords={"wavelength": ("wavelength", PAINT[:, 0], {"units": "Nanometres"})}, dims="wavelength"
+        ),
+        xarray.DataArray(
             PAINT[:, 1], coords={"wavelength": ("wavelength", PAINT[:, 0] / 1000, {"units": "um"})}, dims="wavelength"
         ),
     ],
-    ids=["array", "fortran", "pair", "samples", "tuples", "xarray", "micrometres"],
+    ids="array fortran pair lists mixed mapping samples tuples xarray nanometres micrometres".split(),
 )
 def test_spectra_in_every_way_are_one_scene(paint):
     scene = ball()
     scene["spectra"]["paint"] = paint
     in_place = ball()
     in_place["materials"]["ball"]["diffuse"]["reflectance"] = paint
-    if isinstance(paint, xarray.DataArray) and "units" in paint.wavelength.attrs:
+    if isinstance(paint, xarray.DataArray) and paint.wavelength.attrs.get("units") == "um":
         # 0.38 um is 380 nm but for the last bit.
         assert scene.check() | {"digest": ""} == ball().check() | {"digest": ""}
     else:
@@ -139,6 +145,55 @@ def test_axes_by_name_are_put_in_order():
     packed = numpy.zeros((2, 4, 3), numpy.dtype([("pad", "u1"), ("value", "f4")]))
     packed["value"] = picture
     assert digest(packed["value"]) == digest(picture)
+
+
+POSITIONS = numpy.array([[0.5, 0, 0.25], [-1, 1, 0.1], [1, 1, 0.3]])
+TURNED = {**dict(zip("xyz", POSITIONS.T)), "yaw_degrees": numpy.array([0, 30.5, 200]), "scale": numpy.array([1, 0.5, 2], "f4")}
+
+
+def posts(placements, **more):
+    """A ball among posts, which stand where they are placed."""
+    post = {"objects": [{"cube": {"min": [-0.1, -0.1, 0], "max": [0.1, 0.1, 1]}, "material": "floor"}]}
+    return ball(assemblies={"post": post}, instances=[{"assembly": "post", "placements": placements, **more}])
+
+
+def test_placements_are_those_of_files(tmp_path):
+    pandas = pytest.importorskip("pandas")
+    rows = zip(*(column.tolist() for column in TURNED.values()))
+    (tmp_path / "posts.csv").write_text(",".join(TURNED) + "\n" + "".join(",".join(map(repr, row)) + "\n" for row in rows))
+    digest = posts(tmp_path / "posts.csv", up=[0, 0, 1]).digest
+    records = numpy.rec.fromarrays(list(TURNED.values()), names=list(TURNED))
+    for placements in (TURNED, pandas.DataFrame(TURNED), records, {name: list(column) for name, column in TURNED.items()}):
+        assert posts(placements, up=[0, 0, 1]).digest == digest
+    assert posts(TURNED).digest != digest
+    matrices = numpy.tile(numpy.eye(4), (3, 1, 1))
+    matrices[:, :3, 3] = POSITIONS
+    shifted = posts(POSITIONS, transform={"translate": [0, 0, 0.5]})
+    assert posts(POSITIONS).digest == posts(matrices).digest == posts(matrices[:, :3]).digest == posts(POSITIONS.tolist()).digest
+    assert posts(POSITIONS + [0, 0, 0.5]).digest == shifted.digest != posts(POSITIONS).digest
+
+
+@pytest.mark.parametrize(
+    "placements, words",
+    [
+        (POSITIONS[:, :2], r"shape \[3, 2\]"),
+        (POSITIONS * numpy.nan, "NaN as `x` of row 0"),
+        (numpy.ones((2, 4, 4)), "last row"),
+        ({"x": POSITIONS[:, 0]}, "no column y, z"),
+        ({**TURNED, "x": [1.0]}, "different shapes"),
+        ({**TURNED, "roll": TURNED["scale"]}, "`roll`"),
+        ({**TURNED, "scale": [1, 0, 1]}, "row 1, counted from 0, flattens"),
+        (POSITIONS * 1e20, "row 0, counted from 0, reaches beyond"),
+        (POSITIONS[:0], "places nothing"),
+        ({}, "no columns"),
+        (None, "NoneType"),
+        (3, "must be a string"),
+    ],
+)
+def test_wrong_placements_are_refused(placements, words):
+    with pytest.raises(sp.SceneError, match=words) as caught:
+        posts(placements).check()
+    assert caught.value.key == "instances.0.placements"
 
 
 def test_mixtures_take_channels_in_order(tmp_path):
@@ -253,7 +308,21 @@ def test_what_is_masked_infinite_or_has_a_unit_is_refused():
     class Quantity:
         magnitude, units, ndim = PAINT, "um", 2
 
-    for paint, words in ((masked, "masked"), (Quantity(), "unit of its own")):
+    nm, values = PAINT.T
+    percent = xarray.DataArray(values, coords={"wavelength": nm}, dims="wavelength", attrs={"units": "%"})
+    bare = xarray.DataArray(values, dims="wavelength")
+    cases = [(masked, "masked"), (Quantity(), "unit of its own"), (percent, "per cent"), (bare, "no coordinate `wavelength`")]
+    try:
+        import pint
+    except ImportError:
+        pass
+    else:
+        of_pint = (nm / 1000 * pint.UnitRegistry().um, values)
+        cases += [
+            (of_pint, "unit of its own, micrometer"),
+            (bare.assign_coords(wavelength=nm).copy(data=values * pint.UnitRegistry().W), "unit of its own"),
+        ]
+    for paint, words in cases:
         scene = ball()
         scene["spectra"]["paint"] = paint
         with pytest.raises(sp.SceneError, match=words):

@@ -1,5 +1,7 @@
 """The page on Python: its programs run, one after the other as they stand, and its tables name what is there."""
 
+import ast
+import inspect
 import re
 
 from conftest import ROOT
@@ -23,6 +25,33 @@ def test_programs_run(toml, monkeypatch, capsys):
     assert names["camera"].sizes["wavelength"] == 3 and names["picture"].shape == (32, 32, 3)
     said = capsys.readouterr().out
     assert said.count("(32, 32, 3)") == 8 and "film.width" in said
+
+
+def test_the_stub_says_what_the_module_takes():
+    from spectile import _spectile
+
+    def taken(arguments):
+        """Names of parameters, and whether each may be left out."""
+        names = [argument.arg for argument in arguments.args if argument.arg not in ("self", "cls")]
+        return {name: i >= len(names) - len(arguments.defaults) for i, name in enumerate(names)}
+
+    stub = ast.parse((ROOT / "python/spectile/_spectile.pyi").read_text()).body
+    said = {node.name: taken(node.args) for node in stub if isinstance(node, ast.FunctionDef)}
+    for kind in [node for node in stub if isinstance(node, ast.ClassDef)]:
+        methods = [node for node in kind.body if isinstance(node, ast.FunctionDef)]
+        said |= {(kind.name if node.name == "__new__" else f"{kind.name}.{node.name}"): taken(node.args) for node in methods}
+    found = {}
+    for name, thing in vars(_spectile).items():
+        if callable(thing):
+            found[name] = thing
+            public = [key for key in vars(thing) if not key.startswith("_")] if isinstance(thing, type) else []
+            found |= {f"{name}.{key}": getattr(thing, key) for key in public}
+    del found["Data"]  # Only `mesh` and the like make one.
+    there = {}
+    for name, thing in found.items():
+        parameters = inspect.signature(thing).parameters.values()
+        there[name] = {p.name: p.default is not p.empty for p in parameters if p.name != "self"}
+    assert said == there
 
 
 def test_tables_name_what_there_is():

@@ -33,6 +33,9 @@ def test_spectra_are_taken_as_scenes_take_them(weights):
     of_lists = sp.relight(weights, spectra={"paint": {"samples": [[400, 0.1], [500, 0.8], [700, 0.3]]}})
     assert of_arrays.radiance.equals(of_lists.radiance)
     assert not of_arrays.radiance.equals(sp.relight(weights).radiance)
+    assert sp.relight(weights, paint=(nm, value)).radiance.equals(of_arrays.radiance)
+    lamps = sp.relight(weights, lamp=sp.illuminant("A", 5.0), spectra={"paint": (nm, value)})
+    assert lamps.radiance.equals(sp.relight(weights, spectra={"paint": (nm, value), "lamp": sp.illuminant("A", 5.0)}).radiance)
     dark = sp.relight(weights, spectra={"lamp": 0.0})
     twice = sp.relight(weights, spectra={"lamp": {"blackbody": 2856, "scale": 2.0}})
     once = sp.relight(weights)
@@ -58,6 +61,10 @@ def test_channels_bands_and_temperatures(weights):
 def test_what_cannot_be_changed_is_refused(weights, tmp_path):
     with pytest.raises(sp.UsageError, match="paint"):
         sp.relight(weights, spectra={"pain": 0.5})
+    with pytest.raises(sp.UsageError, match="overwrit"):
+        sp.relight(weights, overwrit=True)
+    with pytest.raises(sp.UsageError, match="`paint` is given twice"):
+        sp.relight(weights, paint=0.5, spectra={"paint": 0.5})
     with pytest.raises(sp.SceneError, match="must lie in"):
         sp.relight(weights, spectra={"paint": 1.5})
     with pytest.raises(sp.UsageError, match="not both"):

@@ -108,7 +108,9 @@ def test_stop_is_an_error_of_its_own(tmp_path):
 @pytest.mark.skipif(os.name != "posix", reason="sends a signal")
 def test_ctrl_c_leaves_a_cube_that_is_gone_on_with(tmp_path, toml):
     code = (
-        "import sys, spectile as sp\n"
+        # Whoever starts tests in the background may have it ignored.
+        "import signal, sys, spectile as sp\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "try:\n"
         f"    sp.render({str(toml)!r}, 'cube.zarr', time='10m', callback=lambda e: print(e.samples, flush=True))\n"
         "except KeyboardInterrupt as stop:\n"
@@ -149,6 +151,29 @@ def test_two_threads_render_at_once_and_python_goes_on(tmp_path):
     assert counted > 5
 
 
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="forks")
+def test_a_fork_of_a_process_that_has_rendered_is_told_so(tmp_path):
+    code = """
+import os, multiprocessing, sys
+sys.path.insert(0, sys.argv[1])
+from conftest import ball
+import spectile as sp
+def digest(_):
+    return ball().digest
+fork = multiprocessing.get_context("fork")
+with fork.Pool(1) as pool:
+    assert pool.map(digest, [0]) == [digest(0)]
+with fork.Pool(1) as pool:
+    try:
+        pool.map(digest, [0])
+    except sp.UsageError as error:
+        print(error)
+"""
+    folder = str(pathlib.Path(__file__).parent)
+    done = subprocess.run([sys.executable, "-P", "-c", code, folder], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0 and "forked from" in done.stdout and "spawn" in done.stdout, done
+
+
 def test_temporary_cubes_go_when_nobody_reads_them(tmp_path, monkeypatch):
     import gc
     import tempfile
@@ -164,8 +189,9 @@ def test_temporary_cubes_go_when_nobody_reads_them(tmp_path, monkeypatch):
     gc.collect()
     assert not path.parent.exists()
     # Nothing is left of one that failed.
-    with pytest.raises(sp.UsageError, match="tiles"):
-        sp.render(ball(), spp=1, tiles=(5, 9))
+    for tiles in ((5, 9), 3):
+        with pytest.raises(sp.UsageError, match="tiles"):
+            sp.render(ball(), spp=1, tiles=tiles)
     assert path.is_relative_to(tmp_path) and not list(tmp_path.iterdir())
 
 
@@ -214,6 +240,42 @@ def test_errors_have_their_kinds(tmp_path, toml):
     done = subprocess.run([sys.executable, "-P", "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert done.returncode == 0 and done.stdout.startswith("[]\nnone: "), done
     assert not (tmp_path / "a.zarr").exists()
+
+
+@pytest.mark.parametrize(
+    "settings, words",
+    [
+        ({"spp": 2.5}, "`spp` is a whole number, not 2.5"),
+        ({"spp": True}, "`spp` is a whole number"),
+        ({"seed": [1]}, "`seed` is a whole number"),
+        ({"size": 32}, "`size` is .width, height. in pixels"),
+        ({"size": (1, 2, 3)}, "`size` is .width, height. in pixels"),
+        ({"tiles": 1}, "`tiles` is .a, b."),
+        ({"tiles": range(0, 4, 2)}, "without a gap"),
+        ({"devices": []}, "`devices` is"),
+        ({"devices": None}, "`devices` is"),
+        ({"time": "soon"}, r"a time is a positive number with s, min or h, such as 90s, 10m, 2min or 1.5h$"),
+    ],
+)
+def test_arguments_that_make_no_sense_are_refused_in_a_sentence(settings, words):
+    with pytest.raises(sp.UsageError, match=words):
+        sp.render(ball(), **settings)
+
+
+def test_what_is_of_a_wrong_type_is_told_what_is_right(tmp_path):
+    cube = sp.render(ball(), tmp_path / "cube.zarr", spp=2e0, size=[8.0, 8])
+    assert int(cube.samples.max()) == 2
+    for call, words in {
+        lambda: sp.render(None): "the name of a file, not a NoneType",
+        lambda: sp.Scene("scene.toml"): "spectile.load",
+        lambda: sp.render(ball(), callback=3): "called with an Epoch",
+        lambda: sp.open_cube(cube): "by its name",
+        lambda: sp.rgb(cube.radiance): "not of a DataArray",
+        lambda: sp.to_colour(cube): "cube.radiance",
+        lambda: sp.sensor(cube, model={}): "name of a file",
+    }.items():
+        with pytest.raises(TypeError, match=words):
+            call()
 
 
 def test_every_error_of_the_library_has_an_exception():

@@ -35,6 +35,8 @@ pub fn call(arguments: &[OsString], draft: Option<Arc<Draft>>, host: Host) -> Re
     let program = OsString::from("spectile");
     let mut cli = Cli::try_parse_from([program].iter().chain(arguments)).map_err(|usage| {
         let message = usage.render().to_string();
+        // Where to find more is another place for who is not at a command line.
+        let message = message.split("\n\nFor more information").next().unwrap_or_default();
         Error::Usage(message.trim_start_matches("error: ").trim_end().to_owned())
     })?;
     if let Some(draft) = draft {

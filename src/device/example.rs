@@ -257,7 +257,7 @@ impl Exhibit {
     }
 
     pub fn add_voxels(&mut self) {
-        let grid = |value: f32| Field::Grid(Arc::new(Grid { size: [2, 2, 2], values: vec![value; 8] }));
+        let grid = |value: f32| Field::Grid(Arc::new(Grid { size: [2, 2, 2], values: vec![value; 8].into() }));
         self.add_medium(grid(1.0), grid(1.0));
     }
 

@@ -13,6 +13,16 @@ pub enum Range {
 
 const TOLERATED: f64 = 0.01;
 
+impl Range {
+    /// The largest that is possible.
+    fn end(self) -> f64 {
+        match self {
+            Range::Share => 1.0,
+            Range::NotNegative | Range::Extinction => f64::INFINITY,
+        }
+    }
+}
+
 /// What was clipped.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clipped {
@@ -63,13 +73,31 @@ pub fn clip<T: Copy + Into<f64>>(
     range: Range,
     of: impl Fn(f64) -> T,
 ) -> Result<Option<Clipped>, usize> {
+    let found = find(values, range)?;
+    if found.is_some() {
+        let end = range.end();
+        for value in values {
+            let number: f64 = (*value).into();
+            if number < 0.0 {
+                *value = of(0.0);
+            } else if number > end {
+                *value = of(1.0);
+            }
+        }
+    }
+    Ok(found)
+}
+
+/// What [`clip`] would clip, and its error.
+pub fn find<T: Copy + Into<f64>>(values: &[T], range: Range) -> Result<Option<Clipped>, usize> {
     let peak = |at_least: f64| values.iter().map(|v| (*v).into()).fold(at_least, f64::max);
     // What is 0.01 beyond as it is written is so in f32 too.
     let in_f32 = |v: f64| f64::from(v as f32);
-    let (least, most, end) = match range {
-        Range::Share => (in_f32(-TOLERATED).min(-TOLERATED), in_f32(1.0 + TOLERATED).max(1.0 + TOLERATED), 1.0),
-        Range::NotNegative => (-TOLERATED * peak(0.0), f64::INFINITY, f64::INFINITY),
-        Range::Extinction => (-TOLERATED * peak(1.0), f64::INFINITY, f64::INFINITY),
+    let end = range.end();
+    let (least, most) = match range {
+        Range::Share => (in_f32(-TOLERATED).min(-TOLERATED), in_f32(1.0 + TOLERATED).max(1.0 + TOLERATED)),
+        Range::NotNegative => (-TOLERATED * peak(0.0), f64::INFINITY),
+        Range::Extinction => (-TOLERATED * peak(1.0), f64::INFINITY),
     };
     let mut found = Clipped { count: 0, worst: 0.0, above: false, below: false };
     let mut furthest = 0.0;
@@ -88,18 +116,7 @@ pub fn clip<T: Copy + Into<f64>>(
             }
         }
     }
-    if found.count == 0 {
-        return Ok(None);
-    }
-    for value in values {
-        let number: f64 = (*value).into();
-        if number < 0.0 {
-            *value = of(0.0);
-        } else if number > end {
-            *value = of(1.0);
-        }
-    }
-    Ok(Some(found))
+    Ok((found.count > 0).then_some(found))
 }
 
 #[cfg(test)]

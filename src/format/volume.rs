@@ -1,6 +1,7 @@
 //! Volumes of numbers: Zarr arrays [z, y, x], version 2 or 3, as xarray and zarr-python write them.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use super::unit::Measure;
 use super::zarr::Variable;
@@ -11,7 +12,7 @@ use crate::error::Problem;
 pub struct Volume {
     /// Voxels along x, y and z.
     pub size: [u32; 3],
-    pub values: Vec<f32>,
+    pub values: Arc<Vec<f32>>,
     /// What the file says of its unit, and what that is where it is understood.
     pub unit: Option<(String, Option<Measure>)>,
     /// What to say of the file, in words that go on after its name.
@@ -61,7 +62,7 @@ pub fn read(path: &Path) -> Result<Volume, Box<Problem>> {
     }
     let unit = array.units().map(|(text, measure)| (text.to_owned(), measure));
     let notes = array.lost_chunks()?.into_iter().collect();
-    Ok(Volume { size: [nx, ny, nz].map(|side| side as u32), values, unit, notes })
+    Ok(Volume { size: [nx, ny, nz].map(|side| side as u32), values: Arc::new(values), unit, notes })
 }
 
 /// Which dimensions are z, y and x: by their names, in any order, or [z, y, x] where they have none of these.

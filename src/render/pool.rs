@@ -3,7 +3,6 @@
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, OnceLock, Weak};
-use std::thread;
 use std::time::Instant;
 
 use crossbeam_channel::{Sender, unbounded};
@@ -26,7 +25,7 @@ use crate::render::self_test;
 use crate::render::watch::{Device, Reports};
 use crate::render::wave::{Budget, WavePlan};
 use crate::render::worker::{Collected, Profile, UnitRect, Worker, device_limits};
-use crate::{Error, Result};
+use crate::{Error, Result, threads};
 
 /// Threads that merge what a device brings back, at most. A tile of a GPU comes back faster than one core merges it: on an H200 at 400
 /// channels a path took 9 ns on the device, and 106 ns of one core to merge.
@@ -150,8 +149,8 @@ impl Pool {
             let mergers = mergers.clone().filter(|_| !gpu.is_software);
             let (name, deadline) = (gpu.name.clone(), Arc::clone(&gpu.deadline));
             let (pool, sender) = (Arc::clone(self), sender.clone());
-            let thread = thread::Builder::new().name(format!("device {}", device + 1));
-            let thread = thread.spawn(move || pool.work(device, mergers, gpu, &sender));
+            let work = move || pool.work(device, mergers, gpu, &sender);
+            let thread = threads::run(&format!("device {}", device + 1), work);
             let thread = thread.map_err(|e| Error::Internal(format!("no thread for device {}: {e}", device + 1)))?;
             devices.push(Device::new(name, deadline, thread));
         }
@@ -418,7 +417,7 @@ impl Taken {
 
 /// The threads that merge what so many devices bring back, shared by all of them; `None` where that is left to the devices' own.
 fn mergers(devices: usize) -> Result<Option<Arc<ThreadPool>>> {
-    let cores = thread::available_parallelism().map_or(1, usize::from);
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let threads = cores.min(devices * MERGE_THREADS);
     if threads <= 1 {
         return Ok(None);
@@ -464,7 +463,7 @@ mod tests {
     /// The cores of the machine, and not more of them than the devices can keep busy.
     #[test]
     fn mergers_are_few() {
-        let cores = thread::available_parallelism().map_or(1, usize::from);
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let threads = |devices| mergers(devices).expect("threads").map_or(0, |pool| pool.current_num_threads());
         assert_eq!(threads(0), 0);
         assert!([1, 2, 100].map(threads).into_iter().all(|threads| threads <= cores && threads != 1));

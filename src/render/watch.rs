@@ -2,7 +2,6 @@
 
 use std::convert::Infallible;
 use std::sync::Arc;
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, never, select_biased, tick};
@@ -12,6 +11,7 @@ use crate::gpu::deadline::Deadline;
 use crate::preview::Control;
 use crate::render::interrupt::Interrupt;
 use crate::render::pool::{Pool, Report};
+use crate::threads::Running;
 
 /// How often deadlines are looked at.
 const TICK: Duration = Duration::from_millis(if cfg!(test) { 200 } else { 1000 });
@@ -71,13 +71,13 @@ pub struct Device {
     name: String,
     deadline: Arc<Deadline>,
     /// `None` once it has left.
-    thread: Option<JoinHandle<()>>,
+    thread: Option<Running<()>>,
     /// Looks in a row at which its deadline had passed.
     late: u32,
 }
 
 impl Device {
-    pub fn new(name: String, deadline: Arc<Deadline>, thread: JoinHandle<()>) -> Device {
+    pub fn new(name: String, deadline: Arc<Deadline>, thread: Running<()>) -> Device {
         Device { name, deadline, thread: Some(thread), late: 0 }
     }
 }

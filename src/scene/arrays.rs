@@ -1,6 +1,7 @@
 //! Numbers in memory where a scene file would name a file: what a mesh, a picture or a grid says, without one.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use crate::error::Problem;
 use crate::format::image::{Colours, Format, Image, Plane, Transfer};
@@ -14,9 +15,23 @@ pub enum Data {
     Numbers {
         name: String,
         shape: Vec<usize>,
-        values: Vec<f32>,
+        values: Arc<Vec<f32>>,
     },
-    Mesh(Mesh),
+    /// As a file of them would be read, or what is wrong with it.
+    Mesh {
+        name: String,
+        read: Result<Arc<mesh::Mesh>, Box<Problem>>,
+    },
+    Table(Table),
+}
+
+/// Columns of numbers, each under its name.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Table {
+    pub name: String,
+    pub columns: Vec<String>,
+    /// Row by row.
+    pub values: Vec<f64>,
 }
 
 /// Triangles that share vertices.
@@ -45,14 +60,28 @@ pub enum Corners<const N: usize> {
 impl Data {
     pub fn name(&self) -> &str {
         match self {
-            Data::Numbers { name, .. } => name,
-            Data::Mesh(mesh) => &mesh.name,
+            Data::Numbers { name, .. } | Data::Mesh { name, .. } => name,
+            Data::Table(table) => &table.name,
         }
     }
 
-    fn problem(&self, message: impl Into<String>, help: &str) -> Box<Problem> {
-        let (file, message) = (PathBuf::from(self.name()), message.into());
-        Box::new(Problem { file, message, help: Some(help.to_owned()), ..Problem::default() })
+    /// What it is, for messages.
+    fn kind(&self) -> &'static str {
+        match self {
+            Data::Numbers { .. } => "an array",
+            Data::Mesh { .. } => "a mesh",
+            Data::Table(_) => "a table",
+        }
+    }
+
+    /// Something wrong with the whole of it.
+    pub fn problem(&self, message: impl Into<String>, help: &str) -> Box<Problem> {
+        problem(self.name(), message, help)
+    }
+
+    /// What is wrong where it stands for something else.
+    fn no(&self, wanted: &str, help: &str) -> Box<Problem> {
+        self.problem(format!("is {}, where {wanted} is needed", self.kind()), help)
     }
 
     /// As a picture of linear numbers.
@@ -62,7 +91,7 @@ impl Data {
     pub fn image(&self) -> Result<Image, Box<Problem>> {
         const HELP: &str = "give [y, x] or [y, x, channel], rows from the top";
         let Data::Numbers { shape, values, .. } = self else {
-            return Err(self.problem("is a mesh, where a picture is needed", HELP));
+            return Err(self.no("a picture", HELP));
         };
         let [height, width, channels] = match shape[..] {
             [height, width] => [height, width, 1],
@@ -95,7 +124,7 @@ impl Data {
     pub fn volume(&self) -> Result<Volume, Box<Problem>> {
         const HELP: &str = "give [z, y, x]";
         let Data::Numbers { shape, values, .. } = self else {
-            return Err(self.problem("is a mesh, where a grid is needed", HELP));
+            return Err(self.no("a grid", HELP));
         };
         let [z, y, x] = shape[..] else {
             return Err(self.problem(format!("has {} dimensions, but a grid has three", shape.len()), HELP));
@@ -105,23 +134,66 @@ impl Data {
             return Err(self.problem(message, HELP));
         }
         // Each is at most the number of voxels.
-        Ok(Volume { size: [x, y, z].map(|n| n as u32), values: values.clone(), unit: None, notes: Vec::new() })
+        Ok(Volume { size: [x, y, z].map(|n| n as u32), values: Arc::clone(values), unit: None, notes: Vec::new() })
     }
 
     /// As a mesh file of one run of faces.
     ///
     /// # Errors
     /// Where it is none: the face or vertex that is wrong.
-    pub fn mesh(&self) -> Result<mesh::Mesh, Box<Problem>> {
-        const HELP: &str = "give vertices [vertex, 3] and faces [face, 3]";
-        let Data::Mesh(Mesh { vertices, faces, uv, normals, .. }) = self else {
-            return Err(self.problem("is an array, where a mesh is needed", HELP));
-        };
+    pub fn mesh(&self) -> Result<Arc<mesh::Mesh>, Box<Problem>> {
+        match self {
+            Data::Mesh { read, .. } => read.clone(),
+            _ => Err(self.no("a mesh", MESH_HELP)),
+        }
+    }
+
+    /// As columns of numbers.
+    ///
+    /// # Errors
+    /// Where it is something else, or a number is none.
+    pub fn table(&self) -> Result<&Table, Box<Problem>> {
+        let Data::Table(table) = self else { return Err(self.no("a table", "give columns by name")) };
+        if let Some(i) = table.values.iter().position(|value| !value.is_finite()) {
+            let (row, column) = (i / table.columns.len(), &table.columns[i % table.columns.len()]);
+            let message = format!("has {} as `{column}` of row {row}", table.values[i]);
+            return Err(self.problem(message, "numbers are finite; rows are counted from 0"));
+        }
+        Ok(table)
+    }
+}
+
+const MESH_HELP: &str = "give vertices [vertex, 3] and faces [face, 3]";
+
+fn problem(name: &str, message: impl Into<String>, help: &str) -> Box<Problem> {
+    let (file, message) = (PathBuf::from(name), message.into());
+    Box::new(Problem { file, message, help: Some(help.to_owned()), ..Problem::default() })
+}
+
+impl Table {
+    pub fn rows(&self) -> impl Iterator<Item = &[f64]> {
+        self.values.chunks_exact(self.columns.len().max(1))
+    }
+}
+
+impl From<Mesh> for Data {
+    /// Its numbers are not copied.
+    fn from(mut mesh: Mesh) -> Data {
+        let name = std::mem::take(&mut mesh.name);
+        let read = mesh.read(&name).map(Arc::new);
+        Data::Mesh { name, read }
+    }
+}
+
+impl Mesh {
+    fn read(self, name: &str) -> Result<mesh::Mesh, Box<Problem>> {
+        let Mesh { name: _, vertices, faces, uv, normals } = self;
+        let wrong = |message: String, help: &str| problem(name, message, help);
         if faces.is_empty() {
-            return Err(self.problem("has no faces", HELP));
+            return Err(wrong("has no faces".to_owned(), MESH_HELP));
         }
         if let Some(i) = vertices.iter().position(|vertex| vertex.iter().any(|x| !x.is_finite())) {
-            return Err(self.problem(format!("has numbers that are not finite at vertex {i}"), "correct the vertices"));
+            return Err(wrong(format!("has numbers that are not finite at vertex {i}"), "correct the vertices"));
         }
         let beyond = |face: &[u32; 3]| face.iter().any(|corner| *corner as usize >= vertices.len());
         if let Some(i) = faces.iter().position(beyond) {
@@ -130,41 +202,42 @@ impl Data {
                 faces[i],
                 vertices.len() as i64 - 1
             );
-            return Err(self.problem(message, "vertices are counted from 0"));
+            return Err(wrong(message, "vertices are counted from 0"));
         }
-        let uv = uv.as_ref().map(|uv| self.corners(uv, "uv", vertices.len(), faces)).transpose()?;
-        let normals =
-            normals.as_ref().map(|normals| self.corners(normals, "normals", vertices.len(), faces)).transpose()?;
-        let part = Part { positions: vertices.clone(), triangles: faces.clone(), uv, normals, ..Part::default() };
+        let uv = uv.map(|uv| uv.of_faces("uv", vertices.len(), &faces, wrong)).transpose()?;
+        let normals = normals.map(|normals| normals.of_faces("normals", vertices.len(), &faces, wrong)).transpose()?;
+        let part = Part { positions: vertices, triangles: faces, uv, normals, ..Part::default() };
         Ok(mesh::Mesh { parts: vec![part], ..mesh::Mesh::default() })
     }
+}
 
-    fn corners<const N: usize>(
-        &self,
-        given: &Corners<N>,
+impl<const N: usize> Corners<N> {
+    /// At the corners of each of `faces`, which name `vertices` of them; those that are given so are not copied.
+    fn of_faces(
+        self,
         what: &str,
         vertices: usize,
         faces: &[[u32; 3]],
+        problem: impl Fn(String, &str) -> Box<Problem>,
     ) -> Result<Vec<[[f64; N]; 3]>, Box<Problem>> {
-        let (found, wanted) = match given {
-            Corners::OfVertices(values) => (values.len(), vertices),
-            Corners::OfFaces(values) => (values.len(), faces.len()),
+        let (found, wanted, of) = match &self {
+            Corners::OfVertices(values) => (values.len(), vertices, "vertices"),
+            Corners::OfFaces(values) => (values.len(), faces.len(), "faces"),
         };
         if found != wanted {
-            let of = if matches!(given, Corners::OfVertices(_)) { "vertices" } else { "faces" };
             let message = format!("has {wanted} {of}, but `{what}` has {found}");
             let help = "give one for each vertex, or one for each corner of each face [face, 3, number]";
-            return Err(self.problem(message, help));
+            return Err(problem(message, help));
         }
-        let corners: Vec<[[f64; N]; 3]> = match given {
+        let corners: Vec<[[f64; N]; 3]> = match self {
             Corners::OfVertices(values) => {
                 faces.iter().map(|face| face.map(|corner| values[corner as usize])).collect()
             }
-            Corners::OfFaces(values) => values.clone(),
+            Corners::OfFaces(values) => values,
         };
         if let Some(i) = corners.iter().position(|face| face.iter().flatten().any(|x| !x.is_finite())) {
             let message = format!("has numbers in `{what}` that are not finite at face {i}");
-            return Err(self.problem(message, "correct them"));
+            return Err(problem(message, "correct them"));
         }
         Ok(corners)
     }

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use glam::{DAffine3, DMat3, DVec3};
 
+use super::arrays::Data;
 use super::decode::{Item, did_you_mean, list};
 use super::keys;
 use super::object::Objects;
@@ -13,7 +14,7 @@ use super::transform;
 use super::{Assembly, AssemblyId, Object, Scene, Shape};
 use crate::error::Problem;
 use crate::format::mesh;
-use crate::format::table::{self, Table};
+use crate::format::table;
 
 /// All assemblies that are placed, their objects added to `objects`. What is placed nowhere is left out, which is said.
 pub fn decode<'a>(
@@ -79,10 +80,20 @@ pub fn decode<'a>(
     decoded
 }
 
-/// An instance, and the line of a file that it stands in.
+/// An instance, and where it stands.
 struct Placed {
     to_world: DAffine3,
-    line: Option<usize>,
+    place: Place,
+}
+
+#[derive(Clone, Copy)]
+enum Place {
+    /// In the entry itself.
+    Entry,
+    /// In a line of the file that it names.
+    Line(usize),
+    /// In a row, counted from 0, of numbers in memory.
+    Row(usize),
 }
 
 /// The assembly that an entry of `[[instances]]` names, and where it is placed.
@@ -112,10 +123,14 @@ fn decode_instances<'a>(item: &Item<'a>, named: &[(&'a str, Item<'a>)]) -> Optio
         None => Some(DVec3::Y),
     };
     let Some(placements) = placements else {
-        return Some((name?, vec![Placed { to_world: transform?, line: None }]));
+        return Some((name?, vec![Placed { to_world: transform?, place: Place::Entry }]));
     };
     let ((_, path), up) = (placements.source()?, up?);
-    let mut placed = match mesh::content(&path).and_then(|bytes| read_placements(&bytes, &path, up)) {
+    let read = match placements.data() {
+        Some(data) => placements_of(data, up),
+        None => mesh::content(&path).and_then(|bytes| read_placements(&bytes, &path, up)),
+    };
+    let mut placed = match read {
         Ok(placed) => placed,
         Err(problem) => {
             report_in_file(&placements, *problem);
@@ -127,7 +142,7 @@ fn decode_instances<'a>(item: &Item<'a>, named: &[(&'a str, Item<'a>)]) -> Optio
     Some((name?, placed))
 }
 
-/// What the columns of a file of placements are: places of x, y, z, and of `yaw_degrees` and `scale` where there are any; or of a
+/// What the columns of placements are: places of x, y, z, and of `yaw_degrees` and `scale` where there are any; or of a
 /// matrix, row by row.
 enum Columns {
     Points { at: [usize; 3], yaw: Option<usize>, scale: Option<usize> },
@@ -137,11 +152,8 @@ enum Columns {
 const MATRIX: [&str; 12] = ["m00", "m01", "m02", "m03", "m10", "m11", "m12", "m13", "m20", "m21", "m22", "m23"];
 
 impl Columns {
-    fn of(table: &Table) -> Result<Columns, Box<Problem>> {
-        const HELP: &str = "begin the file with x,y,z or x,y,z,yaw_degrees or x,y,z,yaw_degrees,scale, or with m00,m01,m02,m03,m10 … m23";
-        if table.names.is_empty() {
-            return Err(table.problem(Some(table.line), "names no columns".to_owned(), HELP));
-        }
+    /// Of these names; `problem` is told what is wrong with them.
+    fn of(written: &[String], problem: impl Fn(String) -> Box<Problem>) -> Result<Columns, Box<Problem>> {
         // All lengths of a scene are in metres: that may be said.
         let name = |name: &String| {
             let lower = name.trim().to_lowercase();
@@ -150,19 +162,18 @@ impl Columns {
                 .find_map(|unit| lower.strip_suffix(unit))
                 .map_or(lower.clone(), |name| name.trim().to_owned())
         };
-        let names: Vec<String> = table.names.iter().map(name).collect();
+        let names: Vec<String> = written.iter().map(name).collect();
         let place = |wanted: &str| names.iter().position(|name| name == wanted);
         let all = |wanted: &[&str]| wanted.iter().map(|name| place(name)).collect::<Option<Vec<usize>>>();
         let is_matrix = MATRIX.iter().any(|name| place(name).is_some());
         let known: &[&str] = if is_matrix { &MATRIX } else { &["x", "y", "z", "yaw_degrees", "scale"] };
         if let Some((i, is_twice)) = table::stray(&names, known) {
             let why = if is_twice { "twice" } else { "which no placement has" };
-            let message = format!("has a column `{}`, {why}", table.names[i].trim());
-            return Err(table.problem(Some(table.line), message, HELP));
+            return Err(problem(format!("has a column `{}`, {why}", written[i].trim())));
         }
         let missing = |wanted: &[&str]| {
             let missing = wanted.iter().filter(|name| place(name).is_none());
-            table.problem(Some(table.line), format!("has no column {}", list(missing)), HELP)
+            problem(format!("has no column {}", list(missing)))
         };
         if is_matrix {
             let columns = all(&MATRIX).ok_or_else(|| missing(&MATRIX))?;
@@ -175,56 +186,88 @@ impl Columns {
             scale: place("scale"),
         })
     }
-}
 
-/// An instance a line.
-fn read_placements(bytes: &[u8], path: &Path, up: DVec3) -> Result<Vec<Placed>, Box<Problem>> {
-    let table = table::read_for(bytes, path, "`x,y,z` and the like")?;
-    table.check_metres()?;
-    let columns = Columns::of(&table)?;
-    let placed = |row: &table::Row| {
-        table.check_row(row)?;
-        let number = |column: usize| {
-            let missing =
-                || table.problem(Some(row.line), format!("has no `{}`", table.names[column]), "give a number");
-            table.number(row, column)?.ok_or_else(missing)
-        };
-        let to_world = match &columns {
+    /// Where an instance is whose row has `number` of a column.
+    fn to_world<E>(&self, up: DVec3, number: impl Fn(usize) -> Result<f64, E>) -> Result<DAffine3, E> {
+        let given = |column: &Option<usize>, usual: f64| column.map_or(Ok(usual), &number);
+        match self {
             Columns::Points { at: [x, y, z], yaw, scale } => {
                 let translation = DVec3::new(number(*x)?, number(*y)?, number(*z)?);
-                let turn = yaw.map(number).transpose()?.unwrap_or(0.0).to_radians();
-                let scale = scale.map(number).transpose()?.unwrap_or(1.0);
-                DAffine3 { matrix3: DMat3::from_axis_angle(up, turn) * scale, translation }
+                let (turn, scale) = (given(yaw, 0.0)?.to_radians(), given(scale, 1.0)?);
+                Ok(DAffine3 { matrix3: DMat3::from_axis_angle(up, turn) * scale, translation })
             }
             Columns::Matrix(columns) => {
                 let mut m = [0.0; 12];
                 for (value, column) in m.iter_mut().zip(columns) {
                     *value = number(*column)?;
                 }
-                transform::of_rows(&m)
+                Ok(transform::of_rows(&m))
             }
-        };
-        if !transform::is_invertible(&to_world) {
-            let message = "flattens space: its determinant is 0 or cannot be represented".to_owned();
-            return Err(table.problem(
-                Some(row.line),
-                message,
-                "use a scale that is not 0, or a matrix that can be inverted",
-            ));
         }
-        Ok(Placed { to_world, line: Some(row.line) })
+    }
+}
+
+/// An instance a line.
+fn read_placements(bytes: &[u8], path: &Path, up: DVec3) -> Result<Vec<Placed>, Box<Problem>> {
+    const HELP: &str =
+        "begin the file with x,y,z or x,y,z,yaw_degrees or x,y,z,yaw_degrees,scale, or with m00,m01,m02,m03,m10 … m23";
+    let table = table::read_for(bytes, path, "`x,y,z` and the like")?;
+    table.check_metres()?;
+    let of_names = |message: String| table.problem(Some(table.line), message, HELP);
+    if table.names.is_empty() {
+        return Err(of_names("names no columns".to_owned()));
+    }
+    let columns = Columns::of(&table.names, of_names)?;
+    let placed = |row: &table::Row| {
+        table.check_row(row)?;
+        let to_world = columns.to_world(up, |column| {
+            let missing =
+                || table.problem(Some(row.line), format!("has no `{}`", table.names[column]), "give a number");
+            table.number(row, column)?.ok_or_else(missing)
+        })?;
+        if !transform::is_invertible(&to_world) {
+            return Err(table.problem(Some(row.line), FLAT.to_owned(), INVERTIBLE));
+        }
+        Ok(Placed { to_world, place: Place::Line(row.line) })
     };
     table.rows.iter().map(placed).collect()
 }
 
+/// An instance a row.
+fn placements_of(data: &Data, up: DVec3) -> Result<Vec<Placed>, Box<Problem>> {
+    const HELP: &str = "give columns x, y, z, and yaw_degrees and scale or not; or m00, m01, m02, m03, m10 … m23";
+    let table = data.table()?;
+    let columns = Columns::of(&table.columns, |message| data.problem(message, HELP))?;
+    if table.values.is_empty() {
+        return Err(data.problem("places nothing", "give a row for each instance, or leave it out"));
+    }
+    let placed = |(i, row): (usize, &[f64])| {
+        let to_world = columns.to_world(up, |column| Ok::<f64, Box<Problem>>(row[column]))?;
+        if !transform::is_invertible(&to_world) {
+            return Err(data.problem(format!("row {i}, counted from 0, {FLAT}"), INVERTIBLE));
+        }
+        Ok(Placed { to_world, place: Place::Row(i) })
+    };
+    table.rows().enumerate().map(placed).collect()
+}
+
+const FLAT: &str = "flattens space: its determinant is 0 or cannot be represented";
+const INVERTIBLE: &str = "use a scale that is not 0, or a matrix that can be inverted";
+
 /// Says what is wrong about an instance that the entry `item` places.
 fn report(placed: &Placed, message: String, item: &Item) {
-    let name = if placed.line.is_some() { "placements" } else { "transform" };
-    let key = item.member(name);
+    let key = item.member(if matches!(placed.place, Place::Entry) { "transform" } else { "placements" });
     let at = key.as_ref().unwrap_or(item);
-    match placed.line.and_then(|line| Some((line, at.source()?.1))) {
-        Some((line, file)) => report_in_file(at, Problem { file, line: Some(line), message, ..Problem::default() }),
-        None => at.error(message),
+    let file = || at.source().map(|(_, file)| file).unwrap_or_default();
+    match placed.place {
+        Place::Entry => at.error(message),
+        Place::Line(line) => {
+            report_in_file(at, Problem { file: file(), line: Some(line), message, ..Problem::default() });
+        }
+        Place::Row(i) => {
+            let message = format!("row {i}, counted from 0, {message}");
+            report_in_file(at, Problem { file: file(), message, ..Problem::default() });
+        }
     }
 }
 

@@ -89,7 +89,7 @@ impl<'a> Item<'a> {
         let words = format!("a whole number from {} to {}", range.start(), range.end());
         let Value::Integer(value) = self.node.value else {
             if let Value::Float(value) = self.node.value {
-                self.error(format!("must be {words}, but is {value}"));
+                self.error(format!("must be {words}, but is {value:?}"));
                 return None;
             }
             return self.wrong_kind(&words);

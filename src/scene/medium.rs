@@ -175,7 +175,7 @@ fn with_molecules(fields: &Fields, kind: Kind, kelvin: &Grid) -> Option<Vec<Kind
         }
         values.push(value as f32);
     }
-    let molecules = Field::Grid(Arc::new(Grid { size: kelvin.size, values }));
+    let molecules = Field::Grid(Arc::new(Grid { size: kelvin.size, values: Arc::new(values) }));
     let gas = Kind { absorbers: by_molecule, scattering: None, density: molecules };
     if others.is_empty() && scattering.is_none() {
         return Some(vec![gas]);
@@ -314,7 +314,7 @@ fn divided(grid: &Grid, size: [u32; 3]) -> Grid {
             values.extend((0..size[0]).map(|x| grid.values[row + (x / each[0]) as usize]));
         }
     }
-    Grid { size, values }
+    Grid { size, values: Arc::new(values) }
 }
 
 fn least_common_multiple(a: u64, b: u64) -> u64 {
@@ -451,15 +451,19 @@ fn checked(item: &Item, volume: Volume, describes: Describes) -> Option<Grid> {
         format!("[{}, {}, {}]", i / (nx * ny), i / nx % ny, i % nx)
     };
     if let Some((text, measure)) = unit {
-        convert(item, name, &mut values, describes, &text, measure)?;
+        convert(item, name, Arc::make_mut(&mut values).as_mut_slice(), describes, &text, measure)?;
     }
     if let Some(i) = values.iter().position(|value| value.is_nan()) {
         item.error_help(format!("{name} has no value at {}", place(i)), "fill the gaps");
         return None;
     }
-    match noise::clip(&mut values, Range::NotNegative, |v| v as f32) {
+    match noise::find(&values, Range::NotNegative) {
         Ok(None) => {}
-        Ok(Some(clipped)) => item.cx.warn(format!("{name} holds {}", clipped.words(Range::NotNegative))),
+        Ok(Some(clipped)) => {
+            // What was found is within noise: this cannot fail.
+            let _ = noise::clip(Arc::make_mut(&mut values).as_mut_slice(), Range::NotNegative, |v| v as f32);
+            item.cx.warn(format!("{name} holds {}", clipped.words(Range::NotNegative)));
+        }
         Err(i) => {
             let what = if describes == Describes::Temperature { "temperatures in K" } else { "densities" };
             item.error_help(

@@ -523,7 +523,8 @@ pub enum Field {
 pub struct Grid {
     /// Voxels along x, y and z.
     pub size: [u32; 3],
-    pub values: Vec<f32>,
+    /// Shared with whoever gave them, where that is memory.
+    pub values: Arc<Vec<f32>>,
 }
 
 impl Medium {

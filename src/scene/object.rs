@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
+use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
 
@@ -38,7 +39,7 @@ pub struct Objects<'s, 'a> {
 /// A mesh file in memory.
 #[derive(Clone)]
 enum Loaded {
-    Mesh(Format, Rc<Mesh>),
+    Mesh(Format, Arc<Mesh>),
     /// Of which each object may have another node.
     Gltf(Rc<gltf::File>),
 }
@@ -255,13 +256,13 @@ impl<'s, 'a> Objects<'s, 'a> {
         item: &Item<'a>,
         group: Option<&Item<'a>>,
         node: Option<&Item<'a>>,
-    ) -> Option<(Format, Rc<Mesh>)> {
+    ) -> Option<(Format, Arc<Mesh>)> {
         let (_, path) = item.source()?;
         let loaded = match self.meshes.get(&path) {
             Some(known) => known.clone(),
             None => {
                 let loaded = match item.data() {
-                    Some(data) => data.mesh().map(|mesh| Loaded::Mesh(Format::Memory, Rc::new(mesh))),
+                    Some(data) => data.mesh().map(|mesh| Loaded::Mesh(Format::Memory, mesh)),
                     None => load(&path),
                 };
                 let loaded = match loaded {
@@ -300,7 +301,7 @@ impl<'s, 'a> Objects<'s, 'a> {
                 match file.mesh(name) {
                     Ok(mesh) => {
                         warn_about(item, &mesh);
-                        Some((Format::Gltf, Rc::new(mesh)))
+                        Some((Format::Gltf, Arc::new(mesh)))
                     }
                     Err(message) => {
                         report_in_file(item, *file.problem(message));
@@ -525,7 +526,7 @@ fn load(path: &Path) -> Result<Loaded, Box<Problem>> {
     let bytes = mesh::content(path)?;
     Ok(match Format::of(path, &bytes) {
         Format::Gltf => Loaded::Gltf(Rc::new(gltf::parse(&bytes, path)?)),
-        format => Loaded::Mesh(format, Rc::new(mesh::parse(format, &bytes, path)?)),
+        format => Loaded::Mesh(format, Arc::new(mesh::parse(format, &bytes, path)?)),
     })
 }
 

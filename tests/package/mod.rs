@@ -5,6 +5,7 @@ use std::process::Command;
 
 use crate::binary::repository;
 use crate::outside::package;
+use crate::program::scenes::make_scene;
 use crate::report::{Part, skip, timed};
 
 #[test]
@@ -12,6 +13,15 @@ fn tests_and_docstrings() {
     let Some(mut pytest) = package(&["--doctest-modules", "--durations=10", "--pyargs", "spectile", "."]) else {
         return;
     };
+    // What the notebook on the grove needs is not committed.
+    let grove = tempfile::tempdir().expect("a folder");
+    let scene = repository("scenes/grove");
+    std::fs::create_dir(grove.path().join("spectra")).expect("a folder");
+    for file in ["grove.toml", "spectra/leaf.csv", "spectra/ground.csv"] {
+        std::fs::copy(scene.join(file), grove.path().join(file)).expect("copied");
+    }
+    make_scene::make("grove", grove.path()).expect("the grove");
+    pytest.env("SPECTILE_GROVE", grove.path());
     if crate::size::is_full() {
         pytest.arg("--long");
     }

@@ -8,5 +8,5 @@ mod converge;
 mod documents;
 mod drivers;
 mod peer;
-mod scenes;
+pub mod scenes;
 mod stress;

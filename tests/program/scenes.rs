@@ -3,7 +3,7 @@
 
 #[path = "../../examples/make_scene/main.rs"]
 #[allow(dead_code, reason = "its `main` is the example's")]
-mod make_scene;
+pub mod make_scene;
 
 use std::collections::HashMap;
 use std::fs;

@@ -168,9 +168,9 @@ fn grids_resolve() {
     assert_eq!(gas.grid_size(), Some([4, 3, 2]));
     let Some(Field::Grid(t)) = &gas.temperature else { panic!() };
     let expected: Vec<f32> = (0..24).map(|i| 300.0 + i as f32).collect();
-    assert_eq!((t.size, &t.values), ([4, 3, 2], &expected));
+    assert_eq!((t.size, &*t.values), ([4, 3, 2], &expected));
     let Field::Grid(d) = &gas.components[0].density else { panic!() };
-    assert_eq!(d.values, [3.0; 24]);
+    assert_eq!(*d.values, [3.0; 24]);
     let to_grid = scene.objects[1].interior.unwrap().to_grid;
     // Scaled by 2, a quarter turn about z, then moved.
     let world = DVec3::new(10.0 - 2.0 * 6.0, 2.0 * 4.0, 2.0 * 1.0);
@@ -202,7 +202,7 @@ fn depths_run_downward() {
         array("/z", vec![2], &["z"], &places);
         let scene = scene::parse(&text, &dir.path().join("scene.toml"), &overrides(&[])).unwrap();
         let Field::Grid(grid) = &scene.media[0].components[0].density else { panic!("no grid") };
-        assert_eq!(grid.values, expected, "{positive}, {places:?}");
+        assert_eq!(*grid.values, expected, "{positive}, {places:?}");
     }
 }
 

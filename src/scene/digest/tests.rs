@@ -67,7 +67,7 @@ fn full() -> Scene {
     let to_grid = DAffine3::from_scale(DVec3::new(2.0, 3.0, 5.0));
     objects[3].interior = Some(Interior { body: 7, medium: 1, to_grid });
 
-    let grid = Field::Grid(Arc::new(Grid { size: [2, 1, 1], values: vec![280.5, 300.25] }));
+    let grid = Field::Grid(Arc::new(Grid { size: [2, 1, 1], values: vec![280.5, 300.25].into() }));
     let absorbers = vec![Absorber { strength: 0.04, columns: vec![(200.0, 1), (300.0, 2)] }];
     let medium = |temperature, density| {
         let component = Component { absorbers: absorbers.clone(), scattering: None, density };

@@ -56,7 +56,10 @@ pub(super) fn source<'a>(item: &Item<'a>, needed: Option<[f64; 2]>) -> Option<So
         if !matches!(item.node.value, Value::Integer(_) | Value::Float(_)) {
             item.error_help(
                 format!("must be a spectrum, but is {}", item.node.value.kind()),
-                "write a name, a number, or a table such as { file = \"spectrum.csv\" }",
+                match item.node.value {
+                    Value::Array(_) => "write { samples = [[nm, value], …] }, a pair for each wavelength",
+                    _ => "write a name, a number, or a table such as { file = \"spectrum.csv\" }",
+                },
             );
             return None;
         }

@@ -105,7 +105,7 @@ impl Builder {
 pub fn grid(size: [u32; 3], value: impl Fn([u32; 3]) -> f64) -> Field {
     let [nx, ny, nz] = size;
     let voxels = (0..nz).flat_map(|z| (0..ny).flat_map(move |y| (0..nx).map(move |x| [x, y, z])));
-    Field::Grid(Arc::new(Grid { size, values: voxels.map(|voxel| value(voxel) as f32).collect() }))
+    Field::Grid(Arc::new(Grid { size, values: Arc::new(voxels.map(|voxel| value(voxel) as f32).collect()) }))
 }
 
 /// A box with outward faces.
