@@ -9,6 +9,7 @@ use clap::Parser;
 use serde_json::Value;
 
 use super::{Cli, Command, Output};
+use crate::gpu::kept::keep_devices;
 use crate::preview::Feed;
 use crate::render::interrupt::Interrupt;
 use crate::scene::Draft;
@@ -32,6 +33,7 @@ pub struct Host {
 /// # Errors
 /// [`Error::Usage`] where the arguments make no sense, [`Error::Internal`] where the command panics, else what it ends with.
 pub fn call(arguments: &[OsString], draft: Option<Arc<Draft>>, host: Host) -> Result<()> {
+    keep_devices();
     let program = OsString::from("spectile");
     let mut cli = Cli::try_parse_from([program].iter().chain(arguments)).map_err(|usage| {
         let message = usage.render().to_string();

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 
+use super::kept::{self, Identity, Kept};
 use crate::gpu::allocation::{self, Given};
 use crate::gpu::deadline::Deadline;
 use crate::gpu::instance::instance;
@@ -46,7 +47,20 @@ pub struct Gpu {
     #[cfg(test)]
     pub faults: Arc<crate::gpu::fault::Faults>,
     trouble: Arc<Mutex<Option<Trouble>>>,
-    _instance: wgpu::Instance,
+    instance: wgpu::Instance,
+    identity: Identity,
+}
+
+impl Drop for Gpu {
+    fn drop(&mut self) {
+        kept::give(Kept {
+            identity: self.identity.clone(),
+            device: self.device.clone(),
+            queue: self.queue.clone(),
+            trouble: Arc::clone(&self.trouble),
+            instance: self.instance.clone(),
+        });
+    }
 }
 
 /// What went wrong on a device: the first thing, unless it is lost.
@@ -262,6 +276,10 @@ impl Gpu {
 
     /// Opens the adapter that `listed[index]` describes, in an Instance of its own.
     fn open_like(listed: &[AdapterFacts], index: usize) -> Result<Gpu> {
+        let identity = Identity::of(listed, index);
+        if let Some(kept) = kept::take(&identity) {
+            return Ok(Gpu::of(listed[index].name.clone(), listed[index].is_software, kept));
+        }
         let instance = instance();
         let mut adapters = sorted_adapters(&instance);
         let now: Vec<AdapterFacts> = adapters.iter().map(facts).collect();
@@ -295,9 +313,15 @@ impl Gpu {
         device.set_device_lost_callback(move |reason, message| {
             note(&on_lost, Trouble::Lost(format!("device lost ({reason:?}) {message}")));
         });
-        Ok(Gpu {
-            name: info.name,
-            is_software: info.device_type == wgpu::DeviceType::Cpu,
+        let is_software = info.device_type == wgpu::DeviceType::Cpu;
+        Ok(Gpu::of(info.name, is_software, Kept { identity, device, queue, trouble, instance }))
+    }
+
+    fn of(name: String, is_software: bool, open: Kept) -> Gpu {
+        let Kept { identity, device, queue, trouble, instance } = open;
+        Gpu {
+            name,
+            is_software,
             limits: device.limits(),
             timestamps: device.features().contains(wgpu::Features::TIMESTAMP_QUERY),
             shader_checks: wgpu::ShaderRuntimeChecks::unchecked(),
@@ -307,8 +331,9 @@ impl Gpu {
             #[cfg(test)]
             faults: crate::gpu::fault::planned(),
             trouble,
-            _instance: instance,
-        })
+            instance,
+            identity,
+        }
     }
 
     /// Notes what [`Gpu::check`] will say.

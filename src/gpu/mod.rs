@@ -7,6 +7,7 @@ pub mod deadline;
 #[cfg(test)]
 pub mod fault;
 mod instance;
+pub mod kept;
 pub mod pass;
 pub mod source;
 pub mod timestamps;
