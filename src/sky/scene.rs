@@ -241,7 +241,13 @@ impl Atmosphere {
         };
         let temperature =
             if parts.heat { format!("temperature = {:?}\n", self.ground_temperature) } else { String::new() };
-        let mut bounces = format!("max_bounces = {}\n", if parts.sunny { 30 } else { 10 });
+        // Of a path that marches through all matter there is, a device can evaluate fewer bounces.
+        let most = match parts {
+            Parts { heat: false, .. } => 30,
+            Parts { sunny: true, .. } => 20,
+            _ => 10,
+        };
+        let mut bounces = format!("max_bounces = {most}\n");
         if parts.heat {
             // Where air absorbs strongly nothing is left of what was scattered, and ways are marched through.
             bounces += "russian_roulette_start = 1\n";
