@@ -54,7 +54,11 @@ pub struct Args {
     pub output: Option<PathBuf>,
 
     /// Write the scene into this folder, which must not be there, and render nothing
-    #[arg(long, value_name = "FOLDER")]
+    #[arg(
+        long,
+        value_name = "FOLDER",
+        conflicts_with_all = ["size", "spp", "time", "uncertainty", "resume", "overwrite", "preview"]
+    )]
     pub scene: Option<PathBuf>,
 
     /// How far the sun is above the horizon, degrees: 5 to 90
@@ -190,6 +194,12 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     let cube = args.output.as_deref().unwrap_or(&temporary.0);
     let render_args = render_args(args, cube, &temporary.0);
     let (mut scene, parts) = made(&atmosphere, &render_args, &temporary.0)?;
+    if args.ground_temperature.is_some() && !parts.have_heat() {
+        return Err(Error::Usage(format!(
+            "--ground-temperature: no channel reaches beyond {} nm, so that heat is left out; leave it out too, or ask for such channels",
+            sky::SUNNY
+        )));
+    }
     let Some(tables) = tables else {
         for warning in atmosphere.warnings() {
             output.warn(&warning)?;

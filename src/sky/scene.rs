@@ -45,6 +45,11 @@ impl Parts {
         let heat = to > SUNNY || atmosphere.sun.is_none();
         Parts { sunny: from < SUNNY || !heat, heat }
     }
+
+    /// Whether air and ground have temperatures.
+    pub fn have_heat(self) -> bool {
+        self.heat
+    }
 }
 
 /// A box of layers.

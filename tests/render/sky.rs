@@ -247,6 +247,7 @@ fn what_no_clear_sky_has_is_refused() {
         (&["--sun-elevation", "40", "--albedo", "1.5"], "--albedo is 1.5"),
         (&["--sun-elevation", "40", "--albedo", "none.csv"], "no file that can be read"),
         (&["--sun-elevation", "40", "--channels", "equal.to=21000"], "ends at 20000 nm"),
+        (&["--sun-elevation", "40", "--ground-temperature", "20 C"], "no channel reaches beyond 2500 nm"),
         (&["--night", "--sun-elevation", "40"], "cannot be used with"),
         (&["--night", "--ground-temperature", "20 m"], "the unit K, C or F"),
         (&["--night", "--ground-temperature", "20"], "from 150 to 400 K"),
