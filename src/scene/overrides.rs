@@ -282,7 +282,7 @@ mod tests {
         let set = |key: &str, value: &str| written(text, &[(key.to_owned(), value.to_owned())]);
         assert_eq!(
             set("channels.equal.count", "9").expect("set"),
-            "[channels.equal]\nfrom = 380.0\nto = 780.0\ncount = 9\n"
+            "[channels.equal]\ncount = 9\nfrom = 380.0\nto = 780.0\n"
         );
         assert_eq!(set("channels.intervals", "[[1, 2.5]]").expect("set"), "[channels]\nintervals = [[1, 2.5]]\n");
         assert_eq!(written(text, &[]).expect("nothing to set"), text);
