@@ -7,8 +7,9 @@ use serde_json::{Value, json};
 
 use super::Output;
 use super::progress::short;
+use super::render::parse_layer;
 use super::scene::SceneArgs;
-use crate::cube::{Choices, Header};
+use crate::cube::{Choices, Header, Layer};
 use crate::device::evaluator::EvaluateShape;
 use crate::device::facts;
 use crate::device::part::OnDevice;
@@ -37,6 +38,7 @@ Examples:
   spectile plan scene.toml
   spectile plan scene.toml --pilot
   spectile plan scene.toml --parts
+  spectile plan scene.toml --layers depth,normal
   spectile plan scene.toml --size 4096x4096 --set channels.equal.count=2000 --spp 256
   spectile plan scene.toml --devices 2 --memory 512MiB")]
 pub struct Args {
@@ -56,6 +58,10 @@ pub struct Args {
     /// Samples per pixel to predict the time for, rounded up as by `render`
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
     pub spp: u32,
+
+    /// Layers to store beside the picture, separated by commas, as for `render`: what they take on disk and on the device
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = parse_layer)]
+    pub layers: Vec<Layer>,
 
     /// Decide by samples what `render` decides before it begins: which paths are worth evaluating
     ///
@@ -79,6 +85,7 @@ pub struct Args {
 pub fn run(args: &Args, output: &Output) -> Result<()> {
     let scene = args.scene.load()?;
     plan::check(&scene)?;
+    let scene = if args.layers.is_empty() { scene } else { scene.with_first_hits() };
     scene.warnings.iter().try_for_each(|warning| warn(output, warning))?;
     // Without a device there is no prediction, but still a plan.
     let mut gpus = match Gpu::open_all(&args.devices) {
@@ -108,14 +115,15 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     let stop = StopRule { samples: Some(args.spp), ..StopRule::default() };
     let samples = stop.samples_limit(scene.integrator.epoch, false)?.unwrap_or(args.spp);
     let tile = plan::tile_size(&scene, args.scene.tile);
-    let header = plan::header(&scene, tile, 0, false, &[])?;
+    let header = plan::header(&scene, tile, 0, false, &args.layers)?;
+    let layer_disk = header.store_bytes() - plan::header(&scene, tile, 0, false, &[])?.store_bytes();
     let budget = Budget { memory: args.memory, paths: None };
     let measured = measure_all(gpus, &prepared, &scene, tile, budget, output)?;
     let waves = match measured.first() {
         Some(m) => m.waves,
         None => plan::waves_without_device(&prepared, tile, budget)?,
     };
-    let plan = Plan { args, scene: &scene, samples, prepared: &prepared, choices, header, waves, measured };
+    let plan = Plan { args, scene: &scene, samples, prepared: &prepared, choices, header, layer_disk, waves, measured };
     output.event("done", plan.facts())?;
     output.text(&plan.describe())
 }
@@ -221,6 +229,8 @@ struct Plan<'a> {
     /// What the pilot decided, if it was asked.
     choices: Option<Choices>,
     header: Header,
+    /// Of the cube's bytes on disk, those of its layers.
+    layer_disk: u64,
     /// Of the first device, or of one that is not there.
     waves: WavePlan,
     measured: Vec<Measured>,
@@ -231,6 +241,11 @@ impl Plan<'_> {
         // Waves were planned with the same limit.
         let windows = Windows::of(&self.prepared.accel, self.waves.limits.binding).unwrap_or(Windows::WHOLE);
         OnDevice { prepared: self.prepared, windows }
+    }
+
+    /// Each that is asked for once, in the order of the cube.
+    fn layer_names(&self) -> Vec<&'static str> {
+        Layer::ALL.into_iter().filter(|layer| self.args.layers.contains(layer)).map(Layer::name).collect()
     }
 
     fn paths(&self) -> f64 {
@@ -288,6 +303,9 @@ impl Plan<'_> {
             "host_scene_bytes": host.scene,
             "host_merge_bytes": host.merge,
             "disk_bytes": self.header.store_bytes(),
+            "layers": self.layer_names(),
+            "layer_disk_bytes": self.layer_disk,
+            "layer_device_bytes": self.waves.first_hit_bytes(),
             "device": self.measured.first().map(|m| m.device.clone()),
             "paths_per_s": self.paths_per_s(),
             "samples": self.samples,
@@ -321,6 +339,14 @@ impl Plan<'_> {
         text += &self.describe_time();
         text += &self.describe_memory();
         text += &format!("disk      {}\n", format_bytes(header.store_bytes()));
+        if !self.args.layers.is_empty() {
+            text += &format!(
+                "layers    {}: {} of the disk, {} of the device's waves; a few rays a pixel, once\n",
+                self.layer_names().join(", "),
+                format_bytes(self.layer_disk),
+                format_bytes(self.waves.first_hit_bytes())
+            );
+        }
         text += &format!("evaluator {}\n", p.evaluator.name());
         text += &match &self.choices {
             Some(choices) => {

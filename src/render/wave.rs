@@ -288,12 +288,16 @@ impl WavePlan {
         let throughputs = self.scaled.then(|| self.throughput_bytes());
         let spectral = (self.spectral_state_size > 0).then(|| self.spectral_state_bytes());
         let saved = self.gathered.then(|| [self.saved_bytes(); SAVED_WAVES]);
-        let [asked, met, read] = FIRST_HIT_BYTES.map(|bytes| bytes * FIRST_HIT_RAYS as u64);
-        let first_hits = self.first_hits.then_some([asked, met, read, UNUSED_BYTES]);
         let sizes = [fixed, by_paths, by_units];
         let others = throughputs.into_iter().chain(spectral).chain(saved.into_iter().flatten());
-        let others = others.chain(first_hits.into_iter().flatten());
-        sizes.iter().flatten().copied().chain(others).map(buffer::allocated).sum()
+        sizes.iter().flatten().copied().chain(others).map(buffer::allocated).sum::<u64>() + self.first_hit_bytes()
+    }
+
+    /// Of those, what asking for single rays takes (layers).
+    pub fn first_hit_bytes(&self) -> u64 {
+        let [asked, met, read] = FIRST_HIT_BYTES.map(|bytes| bytes * FIRST_HIT_RAYS as u64);
+        let buffers = self.first_hits.then_some([asked, met, read, UNUSED_BYTES]);
+        buffers.into_iter().flatten().map(buffer::allocated).sum()
     }
 
     /// The most that a device holds at any moment: the scene, and then the waves' buffers; before those are there, what

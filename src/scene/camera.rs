@@ -217,13 +217,6 @@ fn line(station: &Station, north: DVec3, up: DVec3) -> Line {
     Line { position: DVec3::from(station.position), forward, right, nose }
 }
 
-/// What does not go with a line scanner.
-pub fn check_media(item: &Item, camera: &Camera, has_media: bool) {
-    if has_media && matches!(camera.projection, Projection::Pushbroom { .. }) {
-        item.error("a camera.pushbroom does not go with media yet: it begins rays in many places, which may lie in any of them");
-    }
-}
-
 /// Turned as an environment map is.
 fn decode_latlong(item: &Item, film: Option<&Film>) -> Option<Camera> {
     let fields = item.table(&LATLONG)?;

@@ -128,10 +128,6 @@ fn decode<'a>(cx: &'a Context<'a>, root: &'a [Entry]) -> Option<Scene> {
     let (materials, textures) = materials.finish();
     let outer = top.get("camera").and_then(|item| camera::medium(&item));
     let camera_medium = outer.map(|item| media.take_outer(&item, &mut spectra));
-    if let (Some(item), Some(camera)) = (top.get("camera"), &camera) {
-        let fills = |object: &super::Object| object.interior.is_some();
-        camera::check_media(&item, camera, camera_medium.is_some() || objects.iter().any(fills));
-    }
     let lights = light::decode_lights(top.get("lights"), &mut spectra);
     let environment = top.get("environment").map(|item| environment::decode(&item, &mut spectra));
 

@@ -46,6 +46,7 @@ pub use draft::Draft;
 pub use file::{load, parse, read};
 pub use integrator::{Evaluation, Evaluator, Integrator, MOST_WAVELENGTHS, Sampler, Wavelengths};
 pub use light::{Cone, Light, Profile};
+pub use overrides::written;
 pub use transform::box_around;
 
 pub use crate::format::mtf::MtfTable;

@@ -1,8 +1,45 @@
 //! `--set key=value`: replaces values of the scene tree by dotted path before anything is decoded.
 
+use std::path::Path;
+
 use super::context::Context;
 use super::keys::{self, Section};
 use super::tree::{self, Entry, Node, Origin, Value};
+use crate::{Error, Result as Checked};
+
+/// `text`, a document of TOML or a part of a scene, written anew with `overrides` in it; unchanged where there are none.
+///
+/// # Errors
+/// [`Error::Input`] as [`super::load`]'s, of the overrides themselves: what their keys mean is not looked at.
+pub fn written(text: &str, overrides: &[(String, String)]) -> Checked<String> {
+    if overrides.is_empty() {
+        return Ok(text.to_owned());
+    }
+    let cx = Context::new(Path::new("scene.toml"), text, overrides);
+    let mut root = cx.document().unwrap_or_default();
+    apply(&cx, &mut root, overrides);
+    match cx.finish().0 {
+        problems if problems.is_empty() => Ok(table(&root).to_string()),
+        problems => Err(Error::Input(problems)),
+    }
+}
+
+fn table(entries: &[Entry]) -> toml::Table {
+    entries.iter().map(|entry| (entry.key.clone(), value(&entry.node.value))).collect()
+}
+
+fn value(node: &Value) -> toml::Value {
+    match node {
+        Value::String(text) => text.clone().into(),
+        Value::Integer(number) => (*number).into(),
+        Value::Float(number) => (*number).into(),
+        Value::Boolean(is_true) => (*is_true).into(),
+        Value::Datetime(datetime) => (*datetime).into(),
+        Value::Array(items) => toml::Value::Array(items.iter().map(|item| value(&item.value)).collect()),
+        Value::Table(entries) => table(entries).into(),
+        Value::Data(_) => unreachable!("text holds no arrays in memory"),
+    }
+}
 
 /// Applies every override to `root`, in order; mistakes are recorded in `cx`.
 pub fn apply(cx: &Context<'_>, root: &mut Vec<Entry>, overrides: &[(String, String)]) {
@@ -237,6 +274,19 @@ mod tests {
         leaves("", &Value::Table(root), &mut found);
         found.sort();
         assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn what_is_written_anew_is_what_it_was_set_to() {
+        let text = "[channels]\nequal = { from = 380.0, to = 780.0, count = 4 }\n";
+        let set = |key: &str, value: &str| written(text, &[(key.to_owned(), value.to_owned())]);
+        assert_eq!(
+            set("channels.equal.count", "9").expect("set"),
+            "[channels.equal]\ncount = 9\nfrom = 380.0\nto = 780.0\n"
+        );
+        assert_eq!(set("channels.intervals", "[[1, 2.5]]").expect("set"), "[channels]\nintervals = [[1, 2.5]]\n");
+        assert_eq!(written(text, &[]).expect("nothing to set"), text);
+        assert!(set("channels.equal.count", "[1").is_err());
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
-use super::Atmosphere;
+use super::{Atmosphere, Parts};
 use crate::cube::Cube;
 use crate::spectral::{Channels, Curve, Outside};
 use crate::{Error, Result};
@@ -24,7 +24,7 @@ impl Irradiance {
     ///
     /// # Errors
     /// [`Error::Storage`] where the cube cannot be read or lacks tiles.
-    pub fn of(atmosphere: &Atmosphere, cube: &Cube) -> Result<Irradiance> {
+    pub fn of(atmosphere: &Atmosphere, parts: Parts, cube: &Cube) -> Result<Irradiance> {
         let channels = cube.channels().clone();
         let [width, height] = cube.header().size;
         let mut diffuse = vec![0.0; channels.len()];
@@ -46,10 +46,10 @@ impl Irradiance {
                 }
             }
         }
-        let (nm, value) = atmosphere.direct().into_iter().unzip();
+        let (nm, value) = atmosphere.direct(parts).into_iter().unzip();
         let curve = Curve::Linear { nm, value, outside: Outside::Zero };
         let direct_normal: Vec<f64> = (0..channels.len()).map(|k| channels.mean_of(k, &curve)).collect();
-        let cosine = atmosphere.elevation.to_radians().sin();
+        let cosine = atmosphere.sun.map_or(0.0, |sun| sun.elevation.to_radians().sin());
         let direct = direct_normal.iter().map(|value| value * cosine).collect();
         Ok(Irradiance { channels, direct_normal, direct, diffuse })
     }

@@ -2,7 +2,8 @@
 //!
 //! The atmosphere is plane: layers of a kilometre, whose matter is that of the US standard atmosphere (AFGL-TR-86-0110). Molecules scatter
 //! by Rayleigh's law (Bodhaine et al. 1999), aerosols by Henyey and Greenstein's with the coefficients of Shettle and Fenn (1979), and gases
-//! absorb as LOWTRAN7 has them ([`gas`]). Nothing is rendered here: [`Atmosphere::write_scene`] makes the scene, [`Irradiance`] sums up what
+//! absorb as LOWTRAN7 has them ([`gas`]). Where channels reach beyond [`SUNNY`] the layers have temperatures and send heat ([`thermal`]), below two
+//! kilometres in layers of a hundred metres. Nothing is rendered here: [`Atmosphere::write_scene`] makes the scene, [`Irradiance`] sums up what
 //! came of it.
 
 mod air;
@@ -10,6 +11,7 @@ mod gas;
 mod irradiance;
 mod particle;
 mod scene;
+mod thermal;
 
 use std::fmt;
 
@@ -17,12 +19,16 @@ use crate::{Error, Result};
 
 pub use gas::{STANDARD_OZONE, STANDARD_WATER};
 pub use irradiance::Irradiance;
-pub use scene::FOLDER;
+pub use scene::{FOLDER, Parts};
+
+pub use air::ground_temperature;
 
 use air::Profile;
 
 /// Wavelengths that the tables of matter cover, nm.
-pub const RANGE: [f64; 2] = [380.0, 2500.0];
+pub const RANGE: [f64; 2] = [380.0, 20_000.0];
+/// Up to this wavelength, nm, the sky is sunlight: what it sends as heat is left out where no channel reaches further.
+pub const SUNNY: f64 = 2500.0;
 /// Elevations of the sun, degrees. Below them light comes round the earth, which is plane here.
 pub const ELEVATIONS: [f64; 2] = [5.0, 90.0];
 /// Below this elevation a plane atmosphere's air mass is 1 % or more above the round one's (Kasten and Young 1989).
@@ -54,18 +60,27 @@ impl Aerosol {
 /// What the ground reflects, the same in all directions.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Albedo {
+    /// 0.2 in sunlight, falling to 0.03 from 2,500 to 4,500 nm: soil and plants are nearly black to heat.
+    Land,
     Constant(f64),
     /// A spectrum's file, with its whole path.
     File(std::path::PathBuf),
 }
 
+/// Where the sun stands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sun {
+    /// Above the horizon, degrees.
+    pub elevation: f64,
+    /// Degrees from north over east.
+    pub azimuth: f64,
+}
+
 /// What decides a sky.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Atmosphere {
-    /// Of the sun above the horizon, degrees.
-    pub elevation: f64,
-    /// Of the sun, degrees from north over east.
-    pub azimuth: f64,
+    /// `None` at night.
+    pub sun: Option<Sun>,
     pub aerosol: Aerosol,
     /// Vertical optical depth of the aerosol at 550 nm.
     pub aerosol_depth: f64,
@@ -76,6 +91,8 @@ pub struct Atmosphere {
     /// Column of water vapour, cm of liquid (the same number as g/cm²).
     pub water: f64,
     pub albedo: Albedo,
+    /// Of the ground, K.
+    pub ground_temperature: f64,
 }
 
 /// Vertical optical depths of the whole atmosphere at a wavelength.
@@ -106,30 +123,29 @@ impl Atmosphere {
             }
             Err(Error::Usage(format!("{name} is {value}{unit}, but it must be from {least} to {most}{unit}")))
         };
-        if self.elevation < ELEVATIONS[0] {
-            return Err(Error::Usage(format!(
-                "--sun-elevation is {}, but the atmosphere is plane here, which has no dusk: give 5 to 90 degrees",
-                self.elevation
-            )));
+        if let Some(Sun { elevation, azimuth }) = self.sun {
+            if elevation < ELEVATIONS[0] {
+                return Err(Error::Usage(format!(
+                    "--sun-elevation is {elevation}, but the atmosphere is plane here, which has no dusk: give 5 to 90 degrees"
+                )));
+            }
+            number("--sun-elevation", elevation, ELEVATIONS, " degrees")?;
+            number("--sun-azimuth", azimuth, [-360.0, 360.0], " degrees")?;
         }
-        number("--sun-elevation", self.elevation, ELEVATIONS, " degrees")?;
-        number("--sun-azimuth", self.azimuth, [-360.0, 360.0], " degrees")?;
         number("--aerosol", self.aerosol_depth, [0.0, 5.0], "")?;
         number("--aerosol-height", self.aerosol_height, [0.1, 10.0], " km")?;
         number("--ozone", self.ozone, [0.0, 1000.0], " Dobson units")?;
         number("--water", self.water, [0.0, 10.0], " cm")?;
+        number("--ground-temperature", self.ground_temperature, [150.0, 400.0], " K")?;
         match self.albedo {
             Albedo::Constant(albedo) => number("--albedo", albedo, [0.0, 1.0], ""),
-            Albedo::File(_) => Ok(()),
+            Albedo::Land | Albedo::File(_) => Ok(()),
         }
     }
 
     /// What to know of this sky although it can be made.
     pub fn warnings(&self) -> Vec<String> {
-        if self.elevation >= LOW_SUN {
-            return Vec::new();
-        }
-        let h = self.elevation;
+        let Some(Sun { elevation: h, .. }) = self.sun.filter(|sun| sun.elevation < LOW_SUN) else { return Vec::new() };
         let round = 1.0 / (h.to_radians().sin() + 0.50572 * (h + 6.07995).powf(-1.6364));
         let more = 100.0 * (self.air_mass() / round - 1.0);
         vec![format!(
@@ -137,15 +153,21 @@ impl Atmosphere {
         )]
     }
 
-    /// Ways through the atmosphere to the sun over the vertical one.
+    /// Ways through the atmosphere to the sun over the vertical one; at night that of light from everywhere.
     pub fn air_mass(&self) -> f64 {
-        1.0 / self.elevation.to_radians().sin()
+        self.sun.map_or(thermal::DIFFUSE, |sun| 1.0 / sun.elevation.to_radians().sin())
     }
 
-    /// Depths at a wavelength (nm, vacuum) within [`RANGE`]; those of gases are what they are for sunlight: [`gas`].
+    /// Depths at a wavelength (nm, vacuum) within [`RANGE`]; those of gases are what they are for sunlight: [`gas`], [`thermal`].
     pub fn depths(&self, nm: f64) -> Depths {
         let [extinction, absorption, _] = particle::of(self.aerosol, nm).map(|value| value * self.aerosol_depth);
-        let [water, ozone, mixed] = gas::depths(nm, self.water, self.ozone, self.air_mass());
+        let [water, ozone, mixed] = if nm <= SUNNY {
+            gas::depths(nm, self.water, self.ozone, self.air_mass())
+        } else {
+            let [lines, own, foreign, ozone, bands, continua] =
+                thermal::depths(nm, self.water, self.ozone, self.air_mass());
+            [lines + own + foreign, ozone, bands + continua]
+        };
         Depths {
             molecules: Profile::standard().molecules() * air::cross_section(nm),
             aerosol_scattering: extinction - absorption,

@@ -26,8 +26,10 @@ pub fn of(kind: Aerosol, nm: f64) -> [f64; 3] {
     })
 }
 
-/// Wavelengths that show the whole of it, nm.
-pub fn wavelengths() -> impl Iterator<Item = f64> {
-    let steps = 120;
-    (0..=steps).map(move |i| 370.0 * (2520.0_f64 / 370.0).powf(f64::from(i) / f64::from(steps)))
+/// Wavelengths that show the whole of it, nm, as far as sunlight goes; and `beyond`.
+pub fn wavelengths(beyond: bool) -> impl Iterator<Item = f64> {
+    let spread = |from: f64, to: f64, steps: u32| {
+        (0..=steps).map(move |i| from * (to / from).powf(f64::from(i) / f64::from(steps)))
+    };
+    spread(370.0, 2520.0, 120).chain(beyond.then(|| spread(2540.0, 20_500.0, 180)).into_iter().flatten())
 }

@@ -186,6 +186,27 @@ fn cameras_cut_by_media() {
     assert_as_reference("lens in glass", &lens_in_glass(), [32, 256], 10_000, bound);
 }
 
+/// A line scanner's rays start where it is at their moment, in whatever gas is there: against the closed form and the reference.
+#[test]
+fn line_scanners_in_media() {
+    for inner_first in [true, false] {
+        let Case { scene, expected, seed } = scanner_in_gases(inner_first);
+        let bound = Bound { resolution: 5e-3, allowance: 5.0 * 5.0 * ORIGIN_OFFSET + 1e-5 };
+        for (row, expected) in expected.into_iter().enumerate() {
+            let row = row as u32;
+            let mut line = scene.clone();
+            line.film.crop = [0, row, 16, row + 1];
+            let rendered = render(&line, 8, 64, Settings { seed, ..Settings::default() });
+            rendered.assert_clean();
+            assert_estimates(&format!("line {row}"), &rendered.image_means(), &[expected], bound);
+        }
+        let bound = Bound { resolution: 0.03, allowance: 5.0 * 5.0 * ORIGIN_OFFSET + 3e-4 };
+        let mut column = scene;
+        column.film.crop = [0, 0, 1, 7];
+        assert_as_reference("scanner", &column, [32, 256], 10_000, bound);
+    }
+}
+
 /// Light that is aimed at goes through gas on its way too: a patch under a point light and a directional one.
 #[test]
 fn shadow_rays_through_gas() {

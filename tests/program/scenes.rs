@@ -261,8 +261,9 @@ fn every_scene_renders_a_small_picture_cleanly() {
         let plan = binary::output(binary::without_devices(&mut plan));
         let is_other = |line: &str| line.contains("warning") && !line.contains("no adapter that can run Spectile");
         assert!(plan.status.success() && !words(&plan).lines().any(is_other), "{name}: {}", words(&plan));
-        // The tour renders Cornell's box, what the other aircraft has is in the infrared one, and what the haze has in the cloud.
-        if !size::is_full() && ["cornell", "aircraft", "haze"].contains(&name.as_str()) {
+        // The tour renders Cornell's box, what the other aircraft have is in the infrared one and under the panels' sky, and what the haze has in
+        // the cloud.
+        if !size::is_full() && ["cornell", "aircraft", "aircraft-sky", "haze"].contains(&name.as_str()) {
             continue;
         }
         let output = run(out.path(), &[&["render", &scene, "-o", &path][..], &small].concat());
@@ -280,6 +281,41 @@ fn every_scene_renders_a_small_picture_cleanly() {
         }
         // Hardly a pixel of these scenes is black in all of its four paths.
         assert!(lit > 900, "{name}: {lit} of 1000 pixels are lit");
+    }
+}
+
+/// Reflectance factors of the panels, by the irradiance that `spectile sky` told, are those of their paint: within 4 %, of which the box beside them
+/// takes and gives some, and the table's means over 20 nm.
+#[test]
+fn panels_have_their_reflectance() {
+    let out = TempDir::new().expect("a folder");
+    let success = |arguments: &[&str]| {
+        let output = run(out.path(), arguments);
+        assert!(output.status.success(), "{arguments:?}: {}", words(&output));
+    };
+    let scene = made().join("panels/panels.toml");
+    let channels = "channels.intervals=[[540, 560], [860, 880], [1240, 1260], [1640, 1660]]";
+    let small =
+        ["--size", "96x60", "--spp", "256", "--quiet", "--set", channels, "--set", "film.crop=[31, 33, 63, 38]"];
+    success(&[&["render", scene.to_str().expect("a name"), "-o", "panels.zarr"][..], &small].concat());
+    let table = made().join("sky/clear-irradiance.csv");
+    let white = format!("{{ file = {:?}, column = \"global horizontal (W/m2/nm)\" }}", table.display().to_string());
+    success(&["export", "panels.zarr", "-o", "factors.csv", "--reflectance", &white]);
+    let factors = fs::read_to_string(out.path().join("factors.csv")).expect("written");
+    let rows: Vec<Vec<f64>> = factors
+        .lines()
+        .filter(|line| line.starts_with(|c: char| c.is_ascii_digit()))
+        .map(|line| line.split(',').map(|cell| cell.parse().expect("a number")).collect())
+        .collect();
+    // The middles of the panels, in pixels of the whole picture.
+    for ([x, y], paint) in [([33, 36], 0.05), ([42, 35], 0.2), ([51, 35], 0.5), ([60, 34], 0.95)] {
+        let near = |row: &&Vec<f64>| (row[0] - f64::from(x)).abs() < 1.5 && (row[1] - f64::from(y)).abs() < 1.5;
+        let pixels: Vec<&Vec<f64>> = rows.iter().filter(near).collect();
+        assert!(!pixels.is_empty(), "{:?}", rows.first());
+        for k in 2..6 {
+            let mean = pixels.iter().map(|row| row[k]).sum::<f64>() / pixels.len() as f64;
+            assert!((mean / paint - 1.0).abs() < 0.04, "panel of {paint}, band {}: {mean}", k - 2);
+        }
     }
 }
 

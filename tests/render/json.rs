@@ -80,7 +80,7 @@ fn the_document_names_every_event_and_field() {
         render(&["a.zarr"]),
         render(&["d.zarr", "--set", "film.width=0"]),
         vec!["render", "fog.toml", "--json", "-o", "fog.zarr", "--spp", "1"],
-        vec!["plan", "scene.toml", "--parts", "--json"],
+        vec!["plan", "scene.toml", "--parts", "--layers", "depth", "--json"],
         vec!["devices", "--json"],
         vec!["info", "a.zarr", "--json"],
         vec!["info", "a.zarr", "--json", "--watch"],

@@ -278,8 +278,39 @@ fn layers_that_are_none_are_refused() {
     let more = "\n[[lights]]\ndirectional = { direction = [0, 0, -1], irradiance = 1.0 }\n";
     std::fs::write(place.path().join("two.toml"), format!("{SCENE}{more}")).expect("written");
     refused("render two.toml -o no.zarr --layers depth,sun", "2 lights that are infinitely far away");
+    // And so before anything is rendered.
+    refused("plan layers.toml --layers depht", "layers are depth, normal, object");
+    refused("plan dark.toml --layers sun", "no `sun` and no `directional` light");
     render(place.path(), "some.zarr", "--spp 1 --layers depth");
     refused("render layers.toml -o some.zarr --tile 16 --spp 2 --resume", "layers");
+}
+
+/// `plan` says what layers take: on disk as much as their files and folders do, by `du`.
+#[test]
+fn plans_know_what_layers_take() {
+    let place = place();
+    let planned = |more: &str| {
+        let line = format!("plan layers.toml --tile 16 --json {more}");
+        let output = run(place.path(), &line.split_whitespace().collect::<Vec<_>>());
+        assert!(output.status.success(), "{line}: {}", text(&output.stderr));
+        crate::binary::events(&text(&output.stdout)).pop().expect("done")
+    };
+    let number = |plan: &serde_json::Value, key: &str| plan[key].as_u64().expect("a number");
+    let (plain, layered) = (planned(""), planned("--layers sun,depth,coordinates"));
+    assert_eq!(layered["layers"], serde_json::json!(["depth", "coordinates", "sun"]));
+    assert_eq!(plain["layers"], serde_json::json!([]));
+    assert_eq!([number(&plain, "layer_disk_bytes"), number(&plain, "layer_device_bytes")], [0, 0]);
+    let more = |key: &str| number(&layered, key) - number(&plain, key);
+    assert_eq!(more("disk_bytes"), number(&layered, "layer_disk_bytes"));
+    assert!(number(&layered, "layer_device_bytes") > 1 << 16);
+    // Files of tiles alone: 4, 24 and 4 bytes a pixel.
+    let tiles = number(&layered, "tiles");
+    assert!(
+        more("disk_bytes") >= tiles * 16 * 16 * 32
+            && more("disk_bytes") < tiles * (16 * 16 * 32 + 8 * 4096) + (1 << 17)
+    );
+    let said = text(&run(place.path(), &["plan", "layers.toml", "--layers", "depth"]).stdout);
+    assert!(said.lines().any(|line| line.starts_with("layers    depth: ")), "{said}");
 }
 
 /// Of the exports, by readers of their own.

@@ -6,6 +6,7 @@ mod by_tile;
 mod evaluation;
 mod factored;
 mod georeference;
+mod heat_of_sky;
 mod json;
 mod latlong;
 mod layers;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 use spectile::cube::Cube;
-use spectile::sky::{Aerosol, Albedo, Atmosphere, Irradiance};
+use spectile::sky::{Aerosol, Albedo, Atmosphere, Irradiance, Parts, Sun};
 use spectile::spectral::{Channels, Curve, Outside, SOLAR, columns};
 
 use super::Place;
@@ -90,7 +90,7 @@ fn radiance_is_that_of_discrete_ordinates() {
 /// The optical depths are those that the other code was given by the scene's files: direct light to the rounding of its file.
 #[test]
 fn direct_light_is_what_the_layers_let_through() {
-    let atmosphere = Atmosphere { elevation: 41.5, aerosol_depth: 0.15, ..standard() };
+    let atmosphere = Atmosphere { sun: Some(Sun { elevation: 41.5, azimuth: 0.0 }), aerosol_depth: 0.15, ..standard() };
     let mut seen = 0;
     for [nm, _, _, _, _, direct] in answers() {
         let expected = direct / 41.5_f64.to_radians().sin();
@@ -106,15 +106,19 @@ fn direct_light_is_what_the_layers_let_through() {
 /// 0.084 at 500 nm, an air mass of 1.5.
 fn standard() -> Atmosphere {
     Atmosphere {
-        elevation: (1.0_f64 / 1.5).asin().to_degrees(),
-        azimuth: 180.0,
+        sun: Some(Sun { elevation: (1.0_f64 / 1.5).asin().to_degrees(), azimuth: 180.0 }),
         aerosol: Aerosol::Rural,
         aerosol_depth: 0.0767,
         aerosol_height: 1.5,
         ozone: 343.8,
         water: 1.4164,
         albedo: Albedo::Constant(0.2),
+        ground_temperature: 288.2,
     }
+}
+
+fn sunlight(atmosphere: &Atmosphere) -> Parts {
+    Parts::of(atmosphere, [380.0, 2500.0])
 }
 
 /// Within 3 % of the standard over all, and in windows between bands. In bands the two codes' gases differ, LOWTRAN7 (1988) and SMARTS
@@ -122,7 +126,7 @@ fn standard() -> Atmosphere {
 #[test]
 fn the_sun_is_that_of_the_standard() {
     let atmosphere = standard();
-    let (nm, value) = atmosphere.direct().into_iter().unzip();
+    let (nm, value) = atmosphere.direct(sunlight(&atmosphere)).into_iter().unzip();
     let found = Curve::Linear { nm, value, outside: Outside::Zero };
     let (nm, value) = columns::<3>(SOLAR).map(|row| (row[0], row[2])).unzip();
     let known = Curve::Linear { nm, value, outside: Outside::Zero };
@@ -153,7 +157,7 @@ fn irradiance_is_the_cosines_integral() {
         [channels]\nequal = { from = 500, to = 520, count = 2 }\n[environment]\nradiance = 0.7\n";
     let place = Place::of(scene);
     let cube: Cube = place.render("even.zarr", &["--spp", "1"]);
-    let found = Irradiance::of(&standard(), &cube).expect("summed up");
+    let found = Irradiance::of(&standard(), sunlight(&standard()), &cube).expect("summed up");
     for diffuse in &found.diffuse {
         // Radiance is an f32.
         assert!((diffuse / (0.7 * PI) - 1.0).abs() < 1e-6, "{diffuse}");
@@ -242,7 +246,11 @@ fn what_no_clear_sky_has_is_refused() {
         (&["--sun-elevation", "40", "--water", "nan"], "--water is NaN"),
         (&["--sun-elevation", "40", "--albedo", "1.5"], "--albedo is 1.5"),
         (&["--sun-elevation", "40", "--albedo", "none.csv"], "no file that can be read"),
-        (&["--sun-elevation", "40", "--channels", "equal.to=4000"], "by its own heat"),
+        (&["--sun-elevation", "40", "--channels", "equal.to=21000"], "ends at 20000 nm"),
+        (&["--sun-elevation", "40", "--ground-temperature", "20 C"], "no channel reaches beyond 2500 nm"),
+        (&["--night", "--sun-elevation", "40"], "cannot be used with"),
+        (&["--night", "--ground-temperature", "20 m"], "the unit K, C or F"),
+        (&["--night", "--ground-temperature", "20"], "from 150 to 400 K"),
         (&["--sun-elevation", "40", "--channels", "equal.from=350"], "begins at 380 nm"),
         (&["--sun-elevation", "40", "--size", "100x100"], "twice as wide as high"),
     ] {

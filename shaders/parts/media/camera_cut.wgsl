@@ -1,6 +1,6 @@
-// Lenses and windows that boundaries of media cut.
+// Lenses, windows and tracks of line scanners that boundaries of media cut.
 
-// The volumes around `start`, where a camera ray begins: those of a place in the same lens or window, but for what the straight way
+// The volumes around `start`, where a camera ray begins: those of a place in the same lens or window, or on the same track, but for what the straight way
 // from there enters and leaves.
 fn volumes_at(start: vec3<f32>, overflow: ptr<function, bool>) -> vec2<u32> {
     var around = vec2<u32>(volumes[1], volumes[2]);

@@ -12,7 +12,8 @@ use crate::device::words::{
     NONE, NULL_BOUNDARY, Primitive, VOLUME_EMITS, VOLUME_GRID, VOLUME_SCATTERS, VOLUME_WORDS, VOLUMES_HEAD,
 };
 use crate::scene::{
-    Absorber, Bsdf, Component, Field, Interior, MaterialId, Medium, MediumId, Scene, SpectrumId, box_around_all,
+    Absorber, Bsdf, Component, Field, Interior, Line, MaterialId, Medium, MediumId, Projection, Scene, SpectrumId,
+    box_around_all,
 };
 use crate::spectral::{Curve, planck};
 use crate::{Error, Result};
@@ -77,7 +78,7 @@ pub const VACUUM: Part = Part {
 pub const CAMERA_CUT: Part = Part {
     name: "camera rays that start in different media",
     used: |scene| scene.media.as_ref().is_some_and(|media| media.camera_is_cut),
-    effect: |_| "a way through the lens or window for each path".into(),
+    effect: |_| "a way through the lens or window, or along the track, for each path".into(),
     is_planned: true,
     modules: &[(Place::Generate, module!("parts/media/camera_cut.wgsl"))],
     lines: &[("CAMERA_STARTS", "    nested = volumes_at(ray.origin, overflow);")],
@@ -498,16 +499,17 @@ impl Media {
     /// place there, from which devices find those of each ray.
     fn place_camera(&mut self, scene: &Scene, accel: &Accel) -> Result<()> {
         let mut place = (scene.camera.position - accel.space.center) * accel.space.scale;
-        if let Some(origins) = Origins::of(scene, &accel.space) {
+        if let Projection::Pushbroom { lines, .. } = &scene.camera.projection {
+            // Any place of the track does, to which straight ways lead from all others; one that is on no boundary that a model is likely to have.
+            const SHARE: f64 = 0.381_966_011;
+            let middle = Line::at(lines, 0.5 + SHARE * (lines.len() as f64 - 1.0)).position;
+            place = self.start_everywhere((middle - accel.space.center) * accel.space.scale);
+        } else if let Some(origins) = Origins::of(scene, &accel.space) {
             let boundaries =
                 accel.primitives.iter().zip(&self.boundaries).filter(|(_, boundary)| **boundary & 0xff != 0);
             let cuts: Vec<Cut> = boundaries.filter_map(|(primitive, _)| origins.cut(primitive)).collect();
             if !cuts.is_empty() {
-                let on_device = origins.place_apart_from(&cuts).as_vec3();
-                place = on_device.as_dvec3();
-                self.camera_is_cut = true;
-                self.volumes[3] = self.volumes.len() as u32;
-                self.volumes.extend(on_device.to_array().map(f32::to_bits));
+                place = self.start_everywhere(origins.place_apart_from(&cuts));
             }
         }
         let Some(around) = self.around(place, &accel.primitives) else {
@@ -515,6 +517,15 @@ impl Media {
         };
         self.volumes[1..3].copy_from_slice(&[around as u32, (around >> 32) as u32]);
         Ok(())
+    }
+
+    /// Has each camera ray find what is around its start on the way there from `place`, in device units; gives that as devices have it.
+    fn start_everywhere(&mut self, place: DVec3) -> DVec3 {
+        let on_device = place.as_vec3();
+        self.camera_is_cut = true;
+        self.volumes[3] = self.volumes.len() as u32;
+        self.volumes.extend(on_device.to_array().map(f32::to_bits));
+        on_device.as_dvec3()
     }
 
     /// Volume `number` and those around it, as they are at one place of its surface; the innermost first.

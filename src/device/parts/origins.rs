@@ -35,7 +35,7 @@ impl Origins {
     pub fn of(scene: &Scene, space: &DeviceSpace) -> Option<Origins> {
         let camera = &scene.camera;
         let half_size = match camera.projection {
-            // A line scanner goes with no media.
+            // A line scanner has a track instead.
             Projection::Perspective { .. } | Projection::Latlong | Projection::Pushbroom { .. } => return None,
             Projection::ThinLens { aperture_radius, .. } => DVec2::splat(aperture_radius),
             Projection::Orthographic { half_size } => {

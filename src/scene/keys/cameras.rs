@@ -84,6 +84,10 @@ lines = "track.csv"
 up = [0, 0, 1]
 north = [1, 0, 0]
 ifov = 0.5
+medium = "air"
+
+[media.air]
+absorption = 0.0
 
 [film]
 width = 60
@@ -410,11 +414,12 @@ pub static PUSHBROOM: Section = Section {
         IFOV,
         GROUND_SAMPLING_DISTANCE,
         ALTITUDE,
+        CAMERA_MEDIUM,
     ],
     later: &[],
     at: "camera.pushbroom",
     examples: &[A_PUSHBROOM, A_WIDE_PUSHBROOM, A_PUSHBROOM_BY_LENS, A_PUSHBROOM_BY_GROUND],
     notes: "Row 0 is the first line, columns run to the right of the flight. A line is exposed until the next begins, and the scanner moves \
             and turns evenly between their middles: what a pixel sees is smeared along the track by that and by its own size. How \
-            much is seen is said of the row, across the track; pixels are square. Not with media.",
+            much is seen is said of the row, across the track; pixels are square. The track may lead through bodies of gas: each ray begins in what is around the scanner at that moment.",
 };

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DVec2, DVec3};
 use spectile::scene::{
-    Absorber, Camera, Component, Field, Filter, Grid, Interior, Medium, Mesh, Object, Phase, Projection, Scattering,
-    Scene, Shape, Sides, Temperature,
+    Absorber, Camera, Component, Field, Filter, Grid, Interior, Line, Medium, Mesh, Object, Phase, Projection,
+    Scattering, Scene, Shape, Sides, Temperature,
 };
 use spectile::spectral::{Channels, Curve, Outside, planck as law};
 
@@ -208,6 +208,39 @@ pub fn window_in_gases(inner_first: bool) -> (Scene, Vec<f64>) {
     let b = if inner_first { outer(inner(b)) } else { inner(outer(b)) };
     let depths: [f64; 4] = [0.9 * 2.0 + 0.4 * 0.5 + 0.1 * 0.5, 0.4 * 2.5 + 0.1 * 0.5, 0.1 * 3.0, 0.1 * 3.0];
     (b.gas(0.1).outer().build(), depths.map(|depth| (-depth).exp()).to_vec())
+}
+
+/// A line scanner that dives through two boxes of gas, 0.3 and 0.7 per metre around z = 5, towards a lamp of radiance 1 at z = 0, and looks down: the mean
+/// of what each line's exposure sees. It begins where the gases are entered and ends below them.
+pub fn scanner_in_gases(inner_first: bool) -> Case {
+    let line = |height: f64| Line {
+        position: DVec3::new(0.1, 0.2, height),
+        forward: DVec3::NEG_Z,
+        right: DVec3::X,
+        nose: DVec3::Y,
+    };
+    let heights = [9.0, 7.5, 6.2, 5.3, 4.4, 3.3, 2.0];
+    let lines: Arc<[Line]> = heights.into_iter().map(line).collect();
+    let projection = Projection::Pushbroom { half_width: 1e-6, half_pixel: 1e-6, lines: lines.clone() };
+    let b = Builder::new()
+        .camera(look(lines[0].position, DVec3::new(0.1, 0.2, 0.0), DVec3::Y, projection))
+        .film(16, heights.len() as u32, Filter::Box)
+        .lamp(disk(DVec3::ZERO, DVec3::Z, 4.0), 1.0, Sides::Front);
+    let outer = |b: Builder| b.gas(0.3).null_box(DVec3::new(-2.0, -2.0, 3.0), DVec3::new(2.0, 2.0, 7.0));
+    let inner = |b: Builder| b.gas(0.7).null_box(DVec3::new(-1.0, -1.0, 4.0), DVec3::new(1.0, 1.0, 6.0));
+    let b = if inner_first { outer(inner(b)) } else { inner(outer(b)) };
+    // The midpoint rule over the exposure.
+    const STEPS: u32 = 100_000;
+    let seen = |y: f64| {
+        let z = Line::at(&lines, y).position.z;
+        let within = |low: f64, high: f64| z.clamp(low, high) - low;
+        (-0.1 * z - 0.2 * within(3.0, 7.0) - 0.4 * within(4.0, 6.0)).exp()
+    };
+    let mean = |row: usize| {
+        let moment = |i: u32| row as f64 + (f64::from(i) + 0.5) / f64::from(STEPS);
+        (0..STEPS).map(|i| seen(moment(i))).sum::<f64>() / f64::from(STEPS)
+    };
+    Case { scene: b.gas(0.1).outer().build(), expected: (0..heights.len()).map(mean).collect(), seed: 361 }
 }
 
 /// A lens of radius 0.8 at z = 3, half of it in gas, and sharp in one point of a lamp of radiance 1 at z = 0: the mean over the lens of
