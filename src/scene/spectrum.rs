@@ -465,14 +465,18 @@ impl<'a> Spectra<'a> {
         };
         if let (Some(instead), None) = (instead, source.outside) {
             let (first, last) = (nm[0], nm[nm.len() - 1]);
-            warnings.extend(self.uncovered(first, last).map(|gap| {
-                let noun = quantity.noun();
-                let hint = match self.meets_no_channel(first, last) {
-                    true => format!("; it lies at {first} to {last} nm, beside all channels: is that its unit?"),
-                    false => String::new(),
-                };
-                format!("spectrum `{name}` ({noun}) does not cover {gap}: {instead}{hint}")
-            }));
+            let noun = quantity.noun();
+            if self.meets_no_channel(first, last) {
+                user.error_help(
+                    format!("spectrum `{name}` ({noun}) lies at {first} to {last} nm, beside all channels"),
+                    "say its unit, such as unit = \"um\"; or, if what is beyond its ends is meant, outside = \"hold\" or \"zero\"",
+                );
+                return None;
+            }
+            warnings.extend(
+                self.uncovered(first, last)
+                    .map(|gap| format!("spectrum `{name}` ({noun}) does not cover {gap}: {instead}")),
+            );
         }
         let mut nm = nm.to_vec();
         // One row that is left, and held, is a step of no height: a curve has two nodes at least.

@@ -255,11 +255,11 @@ fn warnings_are_said_once_and_name_the_interval() {
     let explicit = ("spectra.grey", "{ samples = [[450, 0.1], [650, 0.8]], outside = \"hold\" }");
     assert!(good(BASE, &[], &[explicit]).warnings.is_empty());
     let beside = ("spectra.grey", "{ samples = [[0.4, 0.1], [0.7, 0.8]] }");
-    let warnings = good(BASE, &[], &[beside]).warnings;
-    assert!(
-        warnings.len() == 1 && warnings[0].contains("at 0.4 to 0.7 nm, beside all channels: is that its unit?"),
-        "{warnings:?}"
-    );
+    let error = parse_with(BASE, &[], &[beside]).expect_err("beside all channels").to_string();
+    assert!(error.contains("`grey` (a reflectance) lies at 0.4 to 0.7 nm, beside all channels"), "{error}");
+    assert!(error.contains("unit = \"um\""), "{error}");
+    let held = ("spectra.grey", "{ samples = [[0.4, 0.1], [0.7, 0.8]], outside = \"hold\" }");
+    assert_eq!(good(BASE, &[], &[held]).warnings, Vec::<String>::new());
     let unused = ("spectra.other", "{ samples = [[450, 0.1], [650, 0.8]] }");
     assert!(good(BASE, &[], &[unused]).warnings.is_empty());
     let rgb = [("spectra.grey", "{ rgb = [0.9, 0.1, 0.1] }"), ("channels.equal.to", "2000")];
