@@ -29,7 +29,8 @@ fn is_fahrenheit(unit: &str) -> bool {
 /// The unit that a name or a sentence says of temperatures: `temperature_C`, `LST_cK`, `tempC`, `temperature [°C]`, `celsius`,
 /// `Temperature in Celsius`.
 pub fn of_temperature(name: &str) -> Option<String> {
-    let text = plain(name);
+    // A name of EXR in UTF-8, read as Latin-1, has a sign more.
+    let text = plain(&name.replace("\u{c2}\u{b0}", "\u{b0}"));
     let is_unit = |word: &str| {
         let is_rankine = ["r", "rankine"].contains(&word.to_lowercase().as_str());
         is_celsius(word)
@@ -72,6 +73,7 @@ mod tests {
             ("celsius", "celsius"),
             ("LST_C", "C"),
             ("temperature [\u{b0}C]", "\u{b0}C"),
+            ("temperature [\u{c2}\u{b0}C]", "\u{b0}C"),
             ("temperature.C", "C"),
             ("degF", "degF"),
             ("fahrenheit", "fahrenheit"),
