@@ -48,25 +48,25 @@ pub struct Args {
     pub model: Option<PathBuf>,
 
     /// Of the noise of this exposure; fixed patterns have the model's `pattern_seed`
-    #[arg(long, default_value_t = 0, requires = "model")]
+    #[arg(long, default_value_t = 0, requires = "model", conflicts_with = "responses")]
     pub seed: u64,
 
     /// Noise and fixed patterns, or what the mean of many exposures of a perfect detector would be
-    #[arg(long, value_enum, default_value_t = Noise::On, requires = "model")]
+    #[arg(long, value_enum, default_value_t = Noise::On, requires = "model", conflicts_with = "responses")]
     pub noise: Noise,
 
     /// Keep the signal without noise, background included, beside the counts: electrons, or W of a thermal detector
-    #[arg(long, requires = "model")]
+    #[arg(long, requires = "model", conflicts_with = "responses")]
     pub electrons: bool,
 
     /// Take a cube of which tiles are missing; their pixels get the fill value
-    #[arg(long, requires = "model")]
+    #[arg(long, requires = "model", conflicts_with = "responses")]
     pub partial: bool,
 
     /// Draw the transfer functions of optics and pixel too, as SVG, at the mean wavelength of every band
     ///
     /// An earlier plot of that name is replaced; nothing else is.
-    #[arg(long, value_name = "FILE.svg", requires = "model")]
+    #[arg(long, value_name = "FILE.svg", requires = "model", conflicts_with = "responses")]
     pub mtf_plot: Option<PathBuf>,
 
     /// The cube to make, a folder

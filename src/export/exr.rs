@@ -22,6 +22,7 @@ use super::{Progress, check_space};
 use crate::cube::{Integers, Quantity, Rect, Strides, View};
 use crate::files::output::{Product, Replacement, cannot_write};
 use crate::format::maps::exr::QUANTITY;
+use crate::spectral::{Curve, Response};
 use crate::{Error, Result};
 
 /// What [`write`] writes. Where its chunks lie stands at the beginning, and is known at the end: no pipe takes it.
@@ -239,13 +240,17 @@ fn header(view: &View, named: &[(String, Source)], strict_units: bool) -> Result
     for (key, value) in of_all {
         other.insert(text(key)?, AttributeValue::Text(text(value)?));
     }
-    // How wide each band is: its response, one over its interval, under its own name.
+    // How wide each band is: its response, which is one over its interval where it has no other, under its own name.
     for (name, source) in named {
         if let Source::Band(b) = source {
             let [from, to] = view.channels().bounds[*b];
-            if view.channels().responses.is_empty() {
-                other.insert(text(name)?, AttributeValue::Text(text(&format!("{from}nm:1;{to}nm:1;"))?));
-            }
+            let written = match view.channels().responses.get(*b).map(Response::curve) {
+                Some(Curve::Linear { nm, value, .. }) => {
+                    nm.iter().zip(value).map(|(nm, value)| format!("{nm}nm:{value};")).collect()
+                }
+                _ => format!("{from}nm:1;{to}nm:1;"),
+            };
+            other.insert(text(name)?, AttributeValue::Text(text(&written)?));
         }
     }
     Ok(header)

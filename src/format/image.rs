@@ -302,16 +302,36 @@ fn exr(bytes: &[u8]) -> Result<Image, String> {
     let gamma = attributes().find_map(|(key, value)| match value {
         AttributeValue::F32(gamma) if is_called(&key.to_string(), &["gamma"]) => Some(f64::from(*gamma)),
         AttributeValue::F64(gamma) if is_called(&key.to_string(), &["gamma"]) => Some(*gamma),
+        AttributeValue::Text(gamma) if is_called(&key.to_string(), &["gamma"]) => gamma.to_string().trim().parse().ok(),
         _ => None,
     });
-    let space = text(&["colorspace", "colourspace"]).filter(|space| !is_linear(space, primaries.is_some()));
+    // OpenEXR 3.4's own attribute, and those of programs before it.
+    let space = text(&["colorinteropid"]).or_else(|| text(&["colorspace", "colourspace"]));
+    let space = space.filter(|space| !is_linear(space, primaries.is_some()));
     let foreign = match (space, gamma) {
-        (Some(space), _) => Some(format!("`{}`, by its attribute `ColorSpace`", shown(&space))),
+        (Some(space), _) => Some(format!("`{}`, by its attribute of the colour space", shown(&space))),
         (None, Some(gamma)) if (gamma - 1.0).abs() > 1e-3 && gamma != 0.0 => Some(format!("a gamma of {gamma}")),
         _ => None,
     };
     let colours = Colours { transfer: Transfer::Linear, primaries, foreign };
-    let units = text(&["units", "unit"]);
+    // Texts of EXR have no encoding, and are given as Latin-1: those of UTF-8 have a sign more in °C.
+    let units = text(&["units", "unit"]).map(|text| {
+        let bytes: Option<Vec<u8>> = text.chars().map(|c| u8::try_from(u32::from(c)).ok()).collect();
+        bytes.and_then(|bytes| String::from_utf8(bytes).ok()).unwrap_or(text)
+    });
+    for (key, neutral) in [("scalefactor", 1.0), ("addoffset", 0.0)] {
+        let scaled = attributes().find_map(|(name, value)| match value {
+            AttributeValue::F32(by) if is_called(&name.to_string(), &[key]) => Some((name, f64::from(*by))),
+            AttributeValue::F64(by) if is_called(&name.to_string(), &[key]) => Some((name, *by)),
+            _ => None,
+        });
+        if let Some((name, by)) = scaled.filter(|(_, by)| *by != neutral) {
+            return Err(format!(
+                "has the attribute `{}` = {by}, which is not applied: write the values so",
+                shown(&name.to_string())
+            ));
+        }
+    }
 
     let reader = exr_reader().no_deep_data().largest_resolution_level().all_channels().first_valid_layer();
     let image = reader.all_attributes().non_parallel().from_buffered(Cursor::new(bytes)).map_err(wrong)?;
@@ -327,7 +347,7 @@ fn exr(bytes: &[u8]) -> Result<Image, String> {
 }
 
 /// Whether an attribute is called so, whatever the program before a colon, and the case.
-fn is_called(key: &str, wanted: &[&str]) -> bool {
+pub fn is_called(key: &str, wanted: &[&str]) -> bool {
     let bare = key.rsplit([':', '/', '.']).next().unwrap_or("").to_lowercase().replace(['_', ' '], "");
     wanted.contains(&bare.as_str())
 }
@@ -336,7 +356,7 @@ fn is_called(key: &str, wanted: &[&str]) -> bool {
 fn is_linear(space: &str, has_primaries: bool) -> bool {
     let lower = space.to_lowercase();
     let has = |words: &[&str]| words.iter().any(|word| lower.contains(word));
-    let of_others = has(&["ap0", "ap1", "aces", "2020", "p3", "adobe"]);
+    let of_others = has(&["ap0", "ap1", "aces", "2020", "p3", "adobe", "xyz"]);
     ["", "raw", "none", "data", "unknown"].contains(&lower.trim())
         || ((has(&["lin"]) || of_others && has(&["aces"]))
             && (has_primaries || !of_others)

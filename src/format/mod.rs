@@ -1,6 +1,7 @@
 //! Readers and writers of other people's formats; they know no GPU.
 
 pub mod asd;
+pub mod columns;
 pub mod csv_table;
 pub mod envi;
 pub mod gltf;

@@ -3,11 +3,12 @@
 
 use std::path::Path;
 
+use super::columns;
 use super::instrument::Format;
 use super::noise::{self, Range};
 use super::said::Said;
 use super::table;
-use super::text::{self, SpectrumTable, ascending, read};
+use super::text::{SpectrumTable, ascending, read};
 use super::unit::{self, Density, Kind, Meaning, Stated, Unit};
 use crate::error::Problem;
 use crate::spectral::Response;
@@ -64,8 +65,6 @@ fn parse(bytes: &[u8], path: &Path, of: Of) -> Result<Responses, Box<Problem>> {
     }
     let name = |column: usize| table.names.get(column).map_or("", String::as_str);
     let is_long = count == 3 && name(0).eq_ignore_ascii_case("band");
-    // pandas writes the numbers of its rows first.
-    let is_numbered = !is_long && count > 2 && text::is_row_number(name(0)) && unit::is_axis(name(1));
     let has_band = table.names.iter().any(|name| name.eq_ignore_ascii_case("band"));
     if is_long && !(unit::is_axis(name(1)) || matches!(Unit::stated(name(1)), Ok(Some(_)))) && unit::is_axis(name(2)) {
         let help = "write the three columns `band,wavelength_nm,response`, in this order";
@@ -75,17 +74,17 @@ fn parse(bytes: &[u8], path: &Path, of: Of) -> Result<Responses, Box<Problem>> {
         let help = "write the three columns `band,wavelength_nm,response`, in this order";
         return Err(wrong(Some(table.line), "has a column `band`, but not the columns of long responses".into(), help));
     }
-    let axis = usize::from(is_long || is_numbered);
+    let axis = if is_long { 1 } else { columns::axis(&table, false)? };
     let first = axis + 1;
     let unit = Unit::from_header(name(axis)).map_err(|other| {
         let message = format!("gives its wavelengths as {other}, from which none follows");
         wrong(Some(table.line), message, "name wavelength and unit: nm, um, angstrom, cm-1, THz, eV")
     })?;
     if !is_long {
-        text::check_intervals(&table, axis)?;
+        columns::check_intervals(&table, axis)?;
         refuse_axes_of_their_own(&table, axis, unit)?;
     }
-    notes.extend(is_numbered.then(|| "begins with a column of row numbers, which is left out".to_owned()));
+    notes.extend((!is_long && axis > 0).then(|| columns::numbered_words(&table, axis)));
     let in_air = unit::is_in_air(name(axis));
     notes.extend(in_air.then(|| unit::FROM_AIR.to_owned()));
 
@@ -215,29 +214,20 @@ fn is_no_response(name: &str) -> bool {
 /// Refuses wavelengths that stand between two responses, as those of each band beside it, unless they are those of the first
 /// column.
 fn refuse_axes_of_their_own(table: &table::Table, axis: usize, unit: Unit) -> Result<(), Box<Problem>> {
-    let name = |column: usize| table.names.get(column).map_or("", String::as_str);
-    let is_value = |column: usize| !name(column).is_empty() && !is_no_response(name(column));
-    let columns = table.columns();
-    let own = |column: &usize| {
-        unit::is_axis(name(*column)) && (axis + 1..*column).any(is_value) && (*column + 1..columns).any(is_value)
-    };
-    for column in (axis + 1..columns).filter(own) {
-        let of_column = Unit::stated(name(column)).ok().flatten().unwrap_or(unit);
-        for row in &table.rows {
-            let same = match (table.number(row, axis)?, table.number(row, column)?) {
-                (Some(first), Some(here)) => {
-                    (unit.to_nm(first) - of_column.to_nm(here)).abs() <= 1e-9 * unit.to_nm(first)
-                }
-                (first, here) => first == here,
-            };
-            if !same {
-                let message = format!(
-                    "gives the responses after column {} over wavelengths of their own, which differ from the first column's here",
-                    column + 1
-                );
-                let help = "write them long, under the header `band,wavelength_nm,response`";
-                return Err(table.problem(Some(row.line), message, help));
-            }
+    let is_value = |column: &usize| table.names.get(*column).is_none_or(|name| !is_no_response(name));
+    let own = columns::own_axes(table, axis);
+    for (i, other) in own.iter().copied().enumerate() {
+        let end = own.get(i + 1).copied().unwrap_or(table.columns());
+        if !(other + 1..end).any(|column| is_value(&column)) {
+            continue;
+        }
+        if let Some(line) = columns::differs(table, axis, unit, other)? {
+            let message = format!(
+                "gives the responses after column {} over wavelengths of their own, which differ from the first column's here",
+                other + 1
+            );
+            let help = "write them long, under the header `band,wavelength_nm,response`";
+            return Err(table.problem(Some(line), message, help));
         }
     }
     Ok(())

@@ -33,6 +33,24 @@ pub enum Said {
     Refractivity,
     /// Of a detector, per power.
     Responsivity,
+    /// Of a detector, per photon.
+    Efficiency,
+    /// What is absorbed and scattered of what meets matter, or k.
+    Attenuation,
+    /// Of a scattering, what is not absorbed.
+    SingleScattering,
+    /// Per steradian: BRDF, Rrs.
+    PerSteradian,
+    /// Photons, moles of them, PAR.
+    Photons,
+    /// As an eye weighs it.
+    Luminous,
+    /// Over an axis of wavenumbers or frequencies, in a unit that is not said.
+    PerWavenumber,
+    /// Of a mean: its error, spread or ratio to the noise.
+    Uncertainty,
+    /// Of quality.
+    Flags,
 }
 
 /// How words begin that name a quantity, in small letters. One that begins so by chance (irradiance) stands first.
@@ -66,6 +84,9 @@ impl Said {
         let bare = lower.split(['(', '[']).next().unwrap_or("").trim().trim_end_matches('.');
         let words: Vec<&str> =
             bare.split(|c: char| !c.is_alphanumeric() && c != '*').filter(|word| !word.is_empty()).collect();
+        if let Some(said) = Said::as_a_whole(name.trim(), bare, &words, lower.contains(['(', '['])) {
+            return Some(said);
+        }
         match words[..] {
             ["counts" | "count" | "dn"] | ["raw" | "dark", "counts"] | ["digital", "number" | "numbers"] => {
                 return Some(Said::Counts);
@@ -96,8 +117,68 @@ impl Said {
         found.dedup();
         match found[..] {
             [one] => Some(one),
+            // Of two nouns side by side the last is what it is: an irradiance reflectance.
+            [_, last] if matches!(words[..], [.., a, b] if noun(a).is_some() && noun(b) == Some(last)) => Some(last),
             _ => None,
         }
+    }
+
+    /// What the `words` of a name say together; `bare` is the name in small letters up to a bracket, which `has_unit` says that
+    /// there is.
+    fn as_a_whole(name: &str, bare: &str, words: &[&str], has_unit: bool) -> Option<Said> {
+        const SPREADS: [&str; 10] = [
+            "stdev",
+            "stddev",
+            "stderr",
+            "sterr",
+            "error",
+            "errors",
+            "uncertainty",
+            "uncertainties",
+            "snr",
+            "variance",
+        ];
+        let any = |of: &[&str]| words.iter().any(|word| of.contains(word));
+        let pair =
+            |first: &str, second: &[&str]| words.windows(2).any(|pair| pair[0] == first && second.contains(&pair[1]));
+        let (first, last) = (words.first().copied().unwrap_or(""), words.last().copied().unwrap_or(""));
+        let has_noun = || words.iter().any(|word| NOUNS.iter().any(|(start, _)| word.starts_with(start)));
+        let squeezed = bare.replace(' ', "");
+        let is_spread = SPREADS.contains(&last)
+            || SPREADS.contains(&first)
+            || pair("standard", &["deviation", "error", "uncertainty"])
+            || pair("std", &["dev", "deviation", "error"])
+            || matches!(words, ["std" | "sd"])
+            || (matches!(last, "std" | "sd" | "unc" | "err" | "sigma") && has_noun());
+        let of_light = any(&["flux", "radiance", "irradiance", "exitance", "intensity"]);
+        let is_flux = (any(&["photon", "photons", "quantum", "quanta"]) && of_light)
+            || any(&["photosynthetic", "photosynthetically", "ppfd", "actinic"]);
+        Some(match () {
+            () if is_spread => Said::Uncertainty,
+            () if name == "PAR" || is_flux => Said::Photons,
+            () if any(&["luminance", "illuminance", "luminous"]) => Said::Luminous,
+            () if matches!(squeezed.as_str(), "%t" | "t%" | "t/%") => Said::Transmittance,
+            () if pair("single", &["scattering", "scatter"]) && last == "albedo" || words == ["ssa"] => {
+                Said::SingleScattering
+            }
+            () if first == "rrs"
+                || any(&["brdf", "bsdf", "btdf"])
+                || pair("remote", &["sensing"]) && last == "reflectance" =>
+            {
+                Said::PerSteradian
+            }
+            () if matches!(name, "Lw" | "nLw" | "LwN") => Said::Radiance,
+            () if pair("quantum", &["efficiency", "efficiencies"]) => Said::Efficiency,
+            () if pair("extinction", &["coefficient", "coefficients"]) => Said::Attenuation,
+            () if matches!(words, ["flag" | "flags"]) => Said::Flags,
+            () if has_noun() && (last == "flag" || last == "flags") || pair("quality", &["flag", "flags"]) => {
+                Said::Flags
+            }
+            () if has_noun() && !has_unit && any(&["per"]) && any(&["wavenumber", "frequency", "hz", "hertz"]) => {
+                Said::PerWavenumber
+            }
+            () => return None,
+        })
     }
 
     pub fn noun(self) -> &'static str {
@@ -121,6 +202,15 @@ impl Said {
             Said::GroupIndex => "a group index, which is no n of refraction",
             Said::Refractivity => "n - 1, and not n",
             Said::Responsivity => "a responsivity",
+            Said::Efficiency => "a quantum efficiency",
+            Said::Attenuation => "an extinction",
+            Said::SingleScattering => "the albedo of a single scattering",
+            Said::PerSteradian => "a reflectance per steradian",
+            Said::Photons => "a number of photons",
+            Said::Luminous => "a luminous quantity",
+            Said::PerWavenumber => "a quantity per wavenumber or frequency",
+            Said::Uncertainty => "an error or spread of values",
+            Said::Flags => "flags",
         }
     }
 }
@@ -170,6 +260,31 @@ mod tests {
             ("responsivity (A/W)", Some(Said::Responsivity)),
             ("n", None),
             ("n-butane", None),
+            ("Rrs", Some(Said::PerSteradian)),
+            ("Rrs_443", Some(Said::PerSteradian)),
+            ("BRDF", Some(Said::PerSteradian)),
+            ("remote sensing reflectance", Some(Said::PerSteradian)),
+            ("photon radiance", Some(Said::Photons)),
+            ("downwelling_photon_radiance_in_sea_water", Some(Said::Photons)),
+            ("PAR", Some(Said::Photons)),
+            ("actinic_flux", Some(Said::Photons)),
+            ("luminance", Some(Said::Luminous)),
+            ("%T", Some(Said::Transmittance)),
+            ("single scattering albedo", Some(Said::SingleScattering)),
+            ("extinction coefficient", Some(Said::Attenuation)),
+            ("quantum efficiency", Some(Said::Efficiency)),
+            ("irradiance reflectance", Some(Said::Reflectance)),
+            ("radiance uncertainty", Some(Said::Uncertainty)),
+            ("standard deviation of radiance", Some(Said::Uncertainty)),
+            ("reflectance_std", Some(Said::Uncertainty)),
+            ("SNR", Some(Said::Uncertainty)),
+            ("toa_outgoing_radiance_per_unit_wavenumber", Some(Said::PerWavenumber)),
+            ("Radiance per wavenumber (W m-2 sr-1 cm)", Some(Said::Radiance)),
+            ("quality flags", Some(Said::Flags)),
+            ("photon detector window, transmittance", Some(Said::Transmittance)),
+            ("par", None),
+            ("sd card", None),
+            ("T", None),
             ("permit", None),
         ] {
             assert_eq!(Said::in_name(name), said, "{name}");

@@ -51,7 +51,9 @@ fn is_binary(bytes: &[u8]) -> Option<usize> {
 
 /// Begins as text does, and has no zeros as numbers of binary files have.
 fn is_text(bytes: &[u8]) -> bool {
-    bytes.trim_ascii_start().starts_with(b"solid") && !bytes[..bytes.len().min(BEGIN + FACET)].contains(&0)
+    let text = bytes.trim_ascii_start();
+    text.get(..5).is_some_and(|start| start.eq_ignore_ascii_case(b"solid"))
+        && !bytes[..bytes.len().min(BEGIN + FACET)].contains(&0)
 }
 
 fn stated(bytes: &[u8]) -> Option<u32> {
@@ -254,7 +256,9 @@ mod tests {
 
     #[test]
     fn solids_of_text_are_parts() {
-        for text in [TEXT.to_owned(), TEXT.replace('\n', "\r\n"), TEXT.replace('\n', "\r")] {
+        // Older programs write capitals only.
+        let capitals = TEXT.replacen("solid a part\nfacet normal", "SOLID a part\nFACET NORMAL", 1);
+        for text in [TEXT.to_owned(), capitals, TEXT.replace('\n', "\r\n"), TEXT.replace('\n', "\r")] {
             let mesh = stl(text.as_bytes()).unwrap();
             assert_eq!(mesh.parts.len(), 2);
             assert_eq!(mesh.parts[0].positions, FIRST);

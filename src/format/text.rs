@@ -7,7 +7,7 @@ use std::path::Path;
 use super::said::Said;
 use super::table::{self, Table};
 use super::unit::{self, Meaning, Stated, Unit};
-use super::{csv_table, instrument, library, modtran};
+use super::{columns, csv_table, instrument, library, modtran};
 use crate::error::Problem;
 use crate::spectral::Channels;
 
@@ -197,11 +197,7 @@ impl Axis {
             return Err(table.problem(Some(table.line), "has one column only".to_owned(), "write lines of `nm,value`"));
         }
         let name = |column: usize| table.names.get(column).map_or("", String::as_str);
-        // pandas writes the numbers of its rows first.
-        let is_index = is_row_number(name(0));
-        let second_is_axis =
-            || !matches!(Unit::stated(name(1)), Ok(None)) || name(1).to_lowercase().starts_with("wave");
-        let column = usize::from(is_index && table.columns() > 2 && second_is_axis());
+        let column = columns::axis(table, unit.is_some())?;
         let stated = Unit::stated(name(column));
         if let (Some(unit), Ok(Some(of_header))) = (unit, &stated)
             && unit != *of_header
@@ -229,14 +225,9 @@ impl Axis {
                 table.problem(Some(table.line), message, help)
             })?,
         };
-        check_intervals(table, column)?;
+        columns::check_intervals(table, column)?;
         let mut notes = table.notes.clone();
-        if column > 0 {
-            let axis = table::shown(name(column));
-            notes.push(format!(
-                "begins with a column of row numbers, which is left out: wavelengths are those of `{axis}`"
-            ));
-        }
+        notes.extend((column > 0).then(|| columns::numbered_words(table, column)));
         Ok(Axis { column, unit, in_air: unit::is_in_air(name(column)), is_guessed, notes })
     }
 
@@ -295,8 +286,9 @@ impl Axis {
         wanted: &[usize],
         of: impl Fn(usize) -> String,
     ) -> Result<Vec<(usize, SpectrumTable)>, Box<Problem>> {
+        let own = columns::own_axes(table, self.column);
         for column in wanted {
-            self.check_axis_of(table, *column)?;
+            self.check_axis_of(table, *column, &own)?;
         }
         let mut found: Vec<SpectrumTable> = vec![SpectrumTable::default(); wanted.len()];
         // Cells that say percent by themselves, in columns that say it too.
@@ -347,36 +339,21 @@ impl Axis {
         wanted.iter().zip(found).map(finish).collect()
     }
 
-    /// Refuses a column that stands after wavelengths of its own, as spectrophotometers write a sample beside the other, unless
-    /// they are the same.
-    fn check_axis_of(&self, table: &Table, column: usize) -> Result<(), Box<Problem>> {
-        let name = |column: usize| table.names.get(column).map_or("", String::as_str);
-        let begins_as_axis = |other: &usize| {
-            let is_same = !name(*other).is_empty() && name(*other) == name(self.column);
-            // Right after the first axis another one is of the same places.
-            let after_values = (self.column + 1..*other).any(|between| !unit::is_axis(name(between)));
-            is_same || (after_values && unit::is_axis(name(*other)))
-        };
-        let Some(other) = (self.column + 1..column).rev().find(begins_as_axis) else { return Ok(()) };
-        let unit = Unit::stated(name(other)).ok().flatten().unwrap_or(self.unit);
-        let is_same = |here: Option<f64>, first: Option<f64>| match (here, first) {
-            (Some(here), Some(first)) => {
-                let (here, first) = (unit.to_nm(here), self.unit.to_nm(first));
-                (here - first).abs() <= 1e-9 * first
-            }
-            (here, first) => here == first,
-        };
-        for row in &table.rows {
-            if !is_same(table.number(row, other)?, table.number(row, self.column)?) {
+    /// Refuses a column that stands after wavelengths of its own, which are among `own`, as spectrophotometers write a sample beside
+    /// the other, unless they are the same.
+    fn check_axis_of(&self, table: &Table, column: usize, own: &[usize]) -> Result<(), Box<Problem>> {
+        let Some(other) = own.iter().rev().find(|other| **other < column) else { return Ok(()) };
+        match columns::differs(table, self.column, self.unit, *other)? {
+            None => Ok(()),
+            Some(line) => {
                 let message = format!(
                     "gives column {} over wavelengths of its own, those of column {}, which differ from the first column's here",
                     column + 1,
                     other + 1
                 );
-                return Err(table.problem(Some(row.line), message, "put each spectrum into a file of its own"));
+                Err(table.problem(Some(line), message, "put each spectrum into a file of its own"))
             }
         }
-        Ok(())
     }
 
     /// What to say of wavelengths in nm that nobody has there.
@@ -416,29 +393,6 @@ fn optical_constant(names: &[String], column: usize) -> Option<Said> {
         () if is(name, "k") => Some(if both { Said::Extinction } else { Said::Kay }),
         () => None,
     }
-}
-
-/// Whether a column is called as that of row numbers is.
-pub(super) fn is_row_number(name: &str) -> bool {
-    ["", "index", "unnamed: 0", "no", "nr", "row"].contains(&name.to_lowercase().as_str())
-}
-
-/// Refuses a table whose columns from `column` on are the two ends of intervals.
-pub(super) fn check_intervals(table: &Table, column: usize) -> Result<(), Box<Problem>> {
-    let name = |column: usize| table.names.get(column).map_or("", String::as_str);
-    let word = |column: usize| name(column).split(|c: char| !c.is_alphabetic()).next().unwrap_or("").to_lowercase();
-    let is_interval = matches!(word(column).as_str(), "from" | "start" | "begin" | "lower" | "min")
-        && matches!(word(column + 1).as_str(), "to" | "end" | "stop" | "upper" | "max");
-    if !is_interval {
-        return Ok(());
-    }
-    let message = format!(
-        "gives values of intervals, from `{}` to `{}`",
-        table::shown(name(column)),
-        table::shown(name(column + 1))
-    );
-    let help = "write the value at each end: two lines of one wavelength make a step";
-    Err(table.problem(Some(table.line), message, help))
 }
 
 /// The column called `wanted`, which no other must be.

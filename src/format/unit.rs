@@ -2,21 +2,24 @@
 //! place where they are understood.
 
 mod axis;
+mod places;
 mod sentence;
 mod spelling;
+mod stated;
+mod temperature;
 #[cfg(test)]
 mod tests;
 
-use super::said::Said;
-use sentence::{
-    begins_with_factor, has_arithmetic, has_factor, is_logarithm, is_percent, is_percent_of, is_power_of_ten,
-};
-use spelling::{bracketed, is_about_the_medium, looks_like_unit, plain, spectral_power_at_end, spells_power, words};
+use places::{bracketed, is_about_the_medium};
+use sentence::{has_factor, is_logarithm, is_percent_of};
+use spelling::{plain, words};
 
 use crate::spectral::planck::{CHARGE, LIGHT_SPEED, PLANCK};
 
 pub use sentence::without_mark;
 pub use spelling::parse;
+pub use stated::{Meaning, Stated};
+pub use temperature::{is_celsius, kelvin, of_temperature};
 
 /// Planck's constant, eV s.
 const PLANCK_EV: f64 = PLANCK / CHARGE;
@@ -164,52 +167,20 @@ impl Unit {
             return Err(format!("`{text}`"));
         }
         // A letter by itself is a name as often as an ångström; ν is a frequency to some and a wavenumber to others.
-        if ["A", "nu", "\u{3bd}", "Nu", "hv", "h\u{3bd}", "hnu"].contains(&text.as_str()) {
+        const AMBIGUOUS: [&str; 12] =
+            ["A", "E", "f", "nu", "\u{3bd}", "\u{3bd}\u{303}", "Nu", "nu_tilde", "nu tilde", "hv", "h\u{3bd}", "hnu"];
+        if AMBIGUOUS.contains(&text.as_str()) {
             return Err(format!("`{text}`"));
         }
-        // What stands in brackets, or after a comma or a slash, is the unit if anything is.
-        if let Some(bracketed) = bracketed(&text) {
-            let inner = bracketed.trim();
-            if let Some(unit) = Unit::named(inner) {
-                return Ok(Some(unit));
-            }
-            if parse(inner).is_some() {
-                return Err(format!("`{inner}`"));
-            }
-        }
-        for separator in [", ", "/", " in ", ","] {
-            if let Some((before, after)) = text.split_once(separator)
-                && parse(before).is_none()
-                && let Some(unit) = parse(after).and_then(Unit::of)
-            {
-                return Ok(Some(unit));
-            }
-        }
-        if let Some(unit) = Unit::named(&text) {
-            return Ok(Some(unit));
-        }
-        // Units among the words of the name, the longest run first: "nu_cm_1", "wavelength nm air", "inverse cm".
-        let mut joined = text.clone();
-        for (spelt, meant) in
-            [("cm_1", "cm-1"), ("cm1", "cm-1"), ("CM_1", "cm-1"), ("cm -1", "cm-1"), ("cm_-1", "cm-1")]
-        {
-            joined = joined.replace(spelt, meant);
-        }
-        let spaced = joined.replace(['_', '(', ')', '[', ']', ','], " ").replace("- ", " ");
-        let words: Vec<&str> = spaced.split_whitespace().collect();
-        for length in (1..=words.len().min(4)).rev() {
-            for start in (0..=words.len() - length).rev() {
-                let run = words[start..start + length].join(" ");
-                // A single letter is a symbol, unless it is that of a length at the end.
-                let at_end = start > 0 && start + length == words.len();
-                let is_symbol =
-                    run.chars().count() == 1 && run != "\u{c5}" && !(at_end && matches!(run.as_str(), "A" | "m"));
-                if !is_symbol && let Some(unit) = parse(&run).and_then(Unit::of) {
-                    return Ok(Some(unit));
-                }
-            }
-        }
         let is_wavenumber = axis::speaks_of_wavenumber(&lower);
+        let stated = Unit::among(&text)?;
+        // A wavenumber in nm, or in cm, is one or the other.
+        if is_wavenumber && matches!(stated, Some(Unit::Wavelength(_))) {
+            return Err(format!("`{text}`"));
+        }
+        if stated.is_some() {
+            return Ok(stated);
+        }
         // `wavenumber (kcm-1)` says more than `wavenumber (measured)`.
         if is_wavenumber && !lower.contains("cm") {
             return Ok(Some(Unit::WAVENUMBER));
@@ -224,7 +195,63 @@ impl Unit {
             return Err(format!("`{text}`"));
         }
         // What is no length and says not in what it is.
-        if axis::needs_unit(&spaced.to_lowercase()) { Err(format!("`{}`", name.trim())) } else { Ok(None) }
+        let spaced = places::spaced(&text).to_lowercase();
+        if axis::needs_unit(&spaced) { Err(format!("`{}`", name.trim())) } else { Ok(None) }
+    }
+
+    /// The unit in a name: in brackets, after a comma or a slash, or among its words; `Err` is of what is in brackets one of
+    /// something else.
+    fn among(text: &str) -> Result<Option<Unit>, String> {
+        // What stands in brackets, or after a comma or a slash, is the unit if anything is.
+        if let Some(bracketed) = bracketed(text) {
+            let inner = bracketed.trim();
+            if let Some(unit) = Unit::named(inner) {
+                return Ok(Some(unit));
+            }
+            if parse(inner).is_some() {
+                return Err(format!("`{inner}`"));
+            }
+        }
+        for separator in [", ", "/", " in ", ","] {
+            // What a slash stands behind a 1 or nothing of is a reciprocal: `wavenumber 1/cm`.
+            let is_reciprocal = |before: &str| {
+                let before = before.trim_end();
+                separator == "/"
+                    && (before.is_empty()
+                        || before.ends_with([' ', '_', '('])
+                        || before.ends_with(" 1")
+                        || before.ends_with("_1"))
+            };
+            if let Some((before, after)) = text.split_once(separator)
+                && !is_reciprocal(before)
+                && parse(before).is_none()
+                && let Some(unit) = parse(after).and_then(Unit::of)
+            {
+                return Ok(Some(unit));
+            }
+        }
+        // Units among the words of the name, the longest run first: "nu_cm_1", "wavelength nm air", "inverse cm".
+        let spaced = places::spaced(text);
+        let whole = if text.contains(['(', '[']) { Unit::named(text) } else { None };
+        if let Some(unit) = whole.or_else(|| Unit::named(spaced.trim())) {
+            return Ok(Some(unit));
+        }
+        let words: Vec<&str> = spaced.split_whitespace().collect();
+        for length in (1..=words.len().min(4)).rev() {
+            for start in (0..=words.len() - length).rev() {
+                let run = words[start..start + length].join(" ");
+                // A single letter is a symbol, unless it is that of a length at the end.
+                let at_end = start > 0 && start + length == words.len();
+                let is_symbol =
+                    run.chars().count() == 1 && run != "\u{c5}" && !(at_end && matches!(run.as_str(), "A" | "m"));
+                // Of no value, in which two letters are a name as often.
+                let run = if at_end && run == "aa" { "\u{c5}".to_owned() } else { run };
+                if !is_symbol && let Some(unit) = parse(&run).and_then(Unit::of) {
+                    return Ok(Some(unit));
+                }
+            }
+        }
+        Ok(None)
     }
 }
 
@@ -342,149 +369,20 @@ impl Measure {
     }
 }
 
-/// The kelvins that `text` says, a number and a unit of temperature.
-pub fn kelvin(text: &str) -> Option<f64> {
-    let number = text.rfind(|c: char| c.is_ascii_digit() || c == '.')? + 1;
-    let (number, unit) = (text[..number].trim().parse::<f64>().ok()?, text[number..].trim());
-    match unit.to_lowercase().trim_start_matches(['°', 'º']) {
-        "f" | "degf" | "deg_f" | "deg f" | "fahrenheit" => Some((number + 459.67) * 5.0 / 9.0),
-        _ if is_celsius(unit) => Some(number + 273.15),
-        _ => Some(number * spelling::parse(unit)?.kelvin()?),
-    }
-}
-
-/// Whether a unit is the degree Celsius, which no factor makes a kelvin.
-pub fn is_celsius(unit: &str) -> bool {
-    let unit = unit.to_lowercase();
-    let spellings = ["c", "celsius", "degc", "deg_c", "deg c", "degree_celsius", "degrees_celsius"];
-    spellings.contains(&unit.trim_start_matches(['°', 'º']).trim_start())
-}
-
 /// Rounds to 15 digits: what products of powers of ten leave behind the last.
 fn tidy(value: f64) -> f64 {
     format!("{value:.14e}").parse().unwrap_or(value)
-}
-
-/// What a file says of its values' unit.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Stated {
-    pub meaning: Meaning,
-    /// What says so.
-    pub text: String,
-    /// Whether it can be nothing but a unit.
-    pub certain: bool,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Meaning {
-    Unit(Measure),
-    /// That of something else than the values themselves: their logarithms, K/S, a derivative, their inverse.
-    Logarithm,
-    /// A unit that is not known here.
-    Unknown,
-    /// A factor, or percent, of which it is not plain whether it is applied already.
-    Factor,
-}
-
-impl Stated {
-    /// What the text of a key for units says; `None` if that is not understood.
-    pub fn of(text: &str) -> Option<Stated> {
-        let measure = parse(text)?;
-        Some(Stated { meaning: Meaning::Unit(measure), text: text.trim().to_owned(), certain: true })
-    }
-
-    /// The unit of spectral power that a sentence speaks of, if there is just one: what stands in its brackets, or a run of its
-    /// words; or that values are in percent.
-    pub fn in_sentence(text: &str) -> Option<Stated> {
-        let measure = spelling::spectral_power_within(&plain(text))
-            .or_else(|| speaks_of_percent(text).then_some(Measure { factor: 0.01, ..Measure::ONE }))?;
-        Some(Stated { meaning: Meaning::Unit(measure), text: text.trim().to_owned(), certain: false })
-    }
-
-    /// Whether what is said is a share or a plain number.
-    pub fn is_number(&self) -> bool {
-        matches!(self.meaning, Meaning::Unit(measure) if measure.is_number())
-    }
-
-    /// Whether values are said to be percent.
-    pub fn is_percent(&self) -> bool {
-        self.meaning == Meaning::Unit(Measure { factor: 0.01, ..Measure::ONE })
-    }
-
-    /// The unit in the name of a column of values: in brackets, at the end of its words, after a comma (where W may as well
-    /// be the west), or a percent sign at either end. What does not look like a unit is a part of the name.
-    pub fn in_name(name: &str) -> Option<Stated> {
-        let text = plain(name);
-        let stated = |meaning, certain| Some(Stated { meaning, text: name.to_owned(), certain });
-        if is_logarithm(&text) {
-            return stated(Meaning::Logarithm, true);
-        }
-        if let Some(inner) = bracketed(&text).map(str::trim).filter(|inner| !inner.is_empty()) {
-            // A number by itself is that of a sample, or a factor that is or is not applied.
-            if inner.starts_with(|c: char| c.is_ascii_digit()) && parse(inner).is_some_and(Measure::is_number) {
-                let is_factor = inner.contains(['e', 'E', '^']) || is_power_of_ten(inner);
-                return if is_factor { stated(Meaning::Factor, true) } else { None };
-            }
-            // A number within the unit belongs to it: (10^-6 W m-2).
-            if parse(inner).is_none() && states_a_factor(inner) || has_factor(&text.replacen(inner, "", 1)) {
-                return stated(Meaning::Factor, true);
-            }
-            // A unit by a line of its own, or in brackets: %R, Abs, which of a reflectance is that it is absolute.
-            if is_percent_of(inner) {
-                return stated(Meaning::Unit(Measure { factor: 0.01, ..Measure::ONE }), true);
-            }
-            let before = text.split(['(', '[']).next().unwrap_or("");
-            let is_absolute = inner.to_lowercase().starts_with("abs") && Said::in_name(before).is_some();
-            if is_logarithm(inner) && !is_absolute {
-                return stated(Meaning::Logarithm, true);
-            }
-            if has_arithmetic(before) || words(&inner.to_lowercase()).any(|word| word == "offset") {
-                return stated(Meaning::Factor, true);
-            }
-            // No factor makes degrees Celsius anything else than a temperature.
-            if inner.starts_with(['°', 'º']) && is_celsius(inner) {
-                return stated(Meaning::Unit(Measure::of(KELVIN, 1.0)), true);
-            }
-            return match parse(inner) {
-                Some(measure) => stated(Meaning::Unit(measure), true),
-                None if looks_like_unit(&text[..text.rfind(inner).unwrap_or(0)], inner) => {
-                    stated(if has_factor(&text) { Meaning::Factor } else { Meaning::Unknown }, true)
-                }
-                None if has_factor(&text) => stated(Meaning::Factor, true),
-                None => None,
-            };
-        }
-        if has_factor(&text) || begins_with_factor(&text) || has_arithmetic(&text) {
-            return stated(Meaning::Factor, true);
-        }
-        // Nothing but a unit, and one of so many parts that no name is like it: photons/s/m2/nm/sr.
-        if let Some(measure) =
-            parse(&text).filter(|measure| measure.powers.iter().filter(|power| **power != 0).count() > 2)
-        {
-            return stated(Meaning::Unit(measure), true);
-        }
-        if let Some(measure) = spectral_power_at_end(&text) {
-            return stated(Meaning::Unit(measure), true);
-        }
-        // Spectrophotometers write %R and %T.
-        match is_percent(&text) {
-            Some(true) => return stated(Meaning::Unit(Measure { factor: 0.01, ..Measure::ONE }), true),
-            Some(false) => {}
-            None => return stated(Meaning::Unknown, true),
-        }
-        if let Some(measure) = text.rsplit_once(", ").and_then(|(_, after)| parse(after)) {
-            return stated(Meaning::Unit(measure), false);
-        }
-        if spells_power(&text) { stated(Meaning::Unknown, true) } else { None }
-    }
 }
 
 /// Whether the name of a column is that of a spectral axis: by its first word, or as nothing but a unit of one after a name.
 pub fn is_axis(name: &str) -> bool {
     let lower = plain(name).to_lowercase();
     let first = words(&lower).find(|word| word.chars().any(char::is_alphabetic)).unwrap_or("");
-    let begins = ["wavelength", "wavenumber", "wavelen", "wvl", "frequency"].iter().any(|axis| first.starts_with(axis));
-    let is_symbol = ["wl", "nu", "lambda", "\u{3bb}", "nm", "um", "cm", "ev", "thz"].contains(&first);
+    let begins = ["wavelength", "wavenumber", "wavelen", "wvl", "frequency"].iter().any(|axis| first.starts_with(axis))
+        || axis::is_of_wavelengths(&lower)
+        || axis::speaks_of_wavenumber(&lower);
+    let of_number = first.trim_end_matches(|c: char| c.is_ascii_digit());
+    let is_symbol = ["nu", "nm", "um", "cm", "ev", "thz"].contains(&of_number);
     // A band over `b nm`; but `b4 (665 nm)` is where one band is.
     let all: Vec<&str> = words(&lower).collect();
     let is_place = all.len() > 1 && all[all.len() - 2].parse::<f64>().is_ok();
@@ -497,9 +395,16 @@ pub fn is_axis(name: &str) -> bool {
     !is_of_values && (begins || ((is_symbol || ends) && !is_place && matches!(Unit::stated(name), Ok(Some(_)))))
 }
 
+/// What stands in the last pair of brackets of a name.
+pub fn bracketed_in(name: &str) -> Option<String> {
+    bracketed(name).map(str::to_owned)
+}
+
 /// Whether the name of a column says that its wavelengths are those in air.
 pub fn is_in_air(name: &str) -> bool {
-    plain(name).to_lowercase().split(|c: char| !c.is_alphanumeric()).any(|word| word == "air")
+    const AIR: [&str; 7] = ["air", "awav", "luft", "aire", "aria", "lucht", "\u{7a7a}\u{6c14}"];
+    let lower = plain(name).to_lowercase();
+    words(&lower).any(|word| AIR.contains(&word))
 }
 
 /// Whether a sentence says that its wavelengths are those in air.

@@ -15,6 +15,10 @@ pub struct Volume {
     pub values: Arc<Vec<f32>>,
     /// What the file says of its unit, and what that is where it is understood.
     pub unit: Option<(String, Option<Measure>)>,
+    /// What attributes call its values.
+    pub said: Vec<String>,
+    /// What attributes tell of them in sentences.
+    pub told: Vec<String>,
     /// What to say of the file, in words that go on after its name.
     pub notes: Vec<String>,
 }
@@ -62,7 +66,11 @@ pub fn read(path: &Path) -> Result<Volume, Box<Problem>> {
     }
     let unit = array.units().map(|(text, measure)| (text.to_owned(), measure));
     let notes = array.lost_chunks()?.into_iter().collect();
-    Ok(Volume { size: [nx, ny, nz].map(|side| side as u32), values: Arc::new(values), unit, notes })
+    let texts = |keys: &[&str]| -> Vec<String> {
+        keys.iter().filter_map(|key| array.attributes.get(*key)?.as_str().map(str::to_owned)).collect()
+    };
+    let (said, told) = (texts(&["standard_name", "long_name", "quantity"]), texts(&["description", "comment"]));
+    Ok(Volume { size: [nx, ny, nz].map(|side| side as u32), values: Arc::new(values), unit, said, told, notes })
 }
 
 /// Which dimensions are z, y and x: by their names, in any order, or [z, y, x] where they have none of these.

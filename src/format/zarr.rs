@@ -9,11 +9,14 @@ use base64::engine::general_purpose::STANDARD as BASE64;
 use half::f16;
 use serde_json::{Map, Value};
 use zarrs::array::{Array, ArrayBytes, ElementOwned};
-use zarrs::filesystem::FilesystemStore;
+
+use folder::Folder;
 
 use super::table::shown;
 use super::unit::{self, FACTORS, Measure};
 use crate::error::Problem;
+
+mod folder;
 
 type Read<T> = Result<T, Box<Problem>>;
 
@@ -233,9 +236,9 @@ impl Variable {
         self.problem(format!("cannot be read as a Zarr array: {e}"), help)
     }
 
-    fn array(&self) -> Read<Array<FilesystemStore>> {
-        let store = FilesystemStore::new(&self.path).map_err(|e| self.broken(&e))?;
-        Array::open(Arc::new(store), "/").map_err(|e| self.broken(&e))
+    fn array(&self) -> Read<Array<Folder>> {
+        let folder = Folder { path: self.path.clone() };
+        Array::open(Arc::new(folder), "/").map_err(|e| self.broken(&e))
     }
 
     /// Refuses attributes that scale numbers, or say which are none, by other names than CF's: nothing here applies them.
@@ -295,7 +298,7 @@ impl Variable {
         )))
     }
 
-    fn lost(&self, array: &Array<FilesystemStore>) -> Option<Lost> {
+    fn lost(&self, array: &Array<Folder>) -> Option<Lost> {
         let grid = array.chunk_grid_shape();
         let of = grid.iter().product();
         let mut lost: Option<Lost> = None;
@@ -377,9 +380,9 @@ fn fill(value: &Value) -> Option<f64> {
 }
 
 /// The elements as f64, whatever real numbers they are.
-fn numbers(array: &Array<FilesystemStore>, bytes: &ArrayBytes<'static>, unsigned: Option<bool>) -> Option<Vec<f64>> {
+fn numbers(array: &Array<Folder>, bytes: &ArrayBytes<'static>, unsigned: Option<bool>) -> Option<Vec<f64>> {
     fn of<T: ElementOwned>(
-        array: &Array<FilesystemStore>,
+        array: &Array<Folder>,
         bytes: &ArrayBytes<'static>,
         f64_of: impl Fn(T) -> f64,
     ) -> Option<Vec<f64>> {
@@ -411,6 +414,34 @@ fn numbers(array: &Array<FilesystemStore>, bytes: &ArrayBytes<'static>, unsigned
 mod tests {
     use super::*;
     use serde_json::json;
+
+    /// numcodecs' Zlib() as it comes, without a level, in a folder whose name is Latin-1.
+    #[cfg(unix)]
+    #[test]
+    fn folders_of_any_name_and_codecs_without_levels_are_read() {
+        use std::os::unix::ffi::OsStrExt;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(std::ffi::OsStr::from_bytes(b"d\xfcsen"));
+        std::fs::create_dir_all(path.join("c")).unwrap();
+        // A stored block of the numbers 1 and 2.
+        let data: Vec<u8> = [1f32, 2.0].iter().flat_map(|x| x.to_le_bytes()).collect();
+        let (mut a, mut b) = (1u32, 0u32);
+        for byte in &data {
+            a += u32::from(*byte);
+            b += a;
+        }
+        let bytes = [&[0x78, 1, 1, 8, 0, 0xf7, 0xff][..], &data, &(b << 16 | a).to_be_bytes()].concat();
+        std::fs::write(path.join("c/0"), bytes).unwrap();
+        let metadata = json!({
+            "zarr_format": 3, "node_type": "array", "shape": [2], "data_type": "float32", "fill_value": 0.0,
+            "chunk_grid": { "name": "regular", "configuration": { "chunk_shape": [2] } },
+            "chunk_key_encoding": { "name": "default", "configuration": { "separator": "/" } },
+            "codecs": [{ "name": "bytes", "configuration": { "endian": "little" } }, { "name": "numcodecs.zlib", "configuration": {} }],
+        });
+        std::fs::write(path.join("zarr.json"), metadata.to_string()).unwrap();
+        let array = Variable::open(&path).unwrap().unwrap();
+        assert_eq!(array.values().unwrap_or_else(|problem| panic!("{problem}")), [1.0, 2.0]);
+    }
 
     #[test]
     fn fill_values_in_every_spelling() {

@@ -134,7 +134,14 @@ impl Data {
             return Err(self.problem(message, HELP));
         }
         // Each is at most the number of voxels.
-        Ok(Volume { size: [x, y, z].map(|n| n as u32), values: Arc::clone(values), unit: None, notes: Vec::new() })
+        Ok(Volume {
+            size: [x, y, z].map(|n| n as u32),
+            values: Arc::clone(values),
+            unit: None,
+            said: Vec::new(),
+            told: Vec::new(),
+            notes: Vec::new(),
+        })
     }
 
     /// As a mesh file of one run of faces.

@@ -134,7 +134,7 @@ fn turned_away(scene: &Scene, index: usize, object: &Object) -> Option<String> {
     if !scene.spectra[emission.radiance].curve.max(1e-3, 1e15).gt(&0.0) {
         return None;
     }
-    let planes = fronts(&object.shape)?;
+    let before = before(object)?;
     let eye = eyes(scene);
     let inside = |[low, high]: [DVec3; 2]| {
         let holds = |point: DVec3| point.cmpge(low).all() && point.cmple(high).all();
@@ -153,10 +153,6 @@ fn turned_away(scene: &Scene, index: usize, object: &Object) -> Option<String> {
             object.name
         ));
     }
-    let [low, high] = object.shape.bounds();
-    // What touches the plane of a lamp is not before it.
-    let margin = 1e-6 * (high - low).max_element().max(low.abs().max(high.abs()).max_element());
-    let before = |point: DVec3| planes.iter().any(|(at, normal)| (point - *at).dot(*normal) > margin);
     let itself = match &object.shape {
         Shape::Mesh(mesh) => mesh.positions.iter().take(4 * LOOKED_AT).any(|point| before(*point)),
         _ => false,
@@ -167,13 +163,40 @@ fn turned_away(scene: &Scene, index: usize, object: &Object) -> Option<String> {
             .objects
             .iter()
             .enumerate()
-            .any(|(other, object)| other != index && scene.boxes(object).flat_map(corners).any(before));
+            .any(|(other, object)| other != index && scene.boxes(object).flat_map(corners).any(&before));
+    let front = match &object.shape {
+        Shape::Sphere { .. } | Shape::Cylinder { .. } => "outward only",
+        _ => "from its front only, where the corners of its faces run counter-clockwise",
+    };
+    let turn = if front == "outward only" { "" } else { "turn it round, or " };
     (!seen).then(|| {
         format!(
-            "{} shines from its front only, where the corners of its faces run counter-clockwise, and neither the camera nor any \
-             other object lies before it: turn it round, or set `emission_sides = \"both\"`",
+            "{} shines {front}, and neither the camera nor any other object lies before it: {turn}set `emission_sides = \"both\"`",
             object.name
         )
+    })
+}
+
+/// Tells which points lie before a front of an object.
+fn before(object: &Object) -> Option<impl Fn(DVec3) -> bool> {
+    let [low, high] = object.shape.bounds();
+    // What touches the plane of a lamp is not before it.
+    let margin = 1e-6 * (high - low).max_element().max(low.abs().max(high.abs()).max_element());
+    let round = match object.shape {
+        Shape::Sphere { center, radius } => Some((center, DVec3::ZERO, radius)),
+        Shape::Cylinder { from, to, radius } => Some((from, (to - from).normalize_or_zero(), radius)),
+        _ => None,
+    };
+    let planes = match round {
+        Some(_) => Vec::new(),
+        None => fronts(&object.shape)?,
+    };
+    Some(move |point: DVec3| match round {
+        Some((at, axis, radius)) => {
+            let from_it = point - at;
+            (from_it - from_it.dot(axis) * axis).length() > radius + margin
+        }
+        None => planes.iter().any(|(at, normal)| (point - *at).dot(*normal) > margin),
     })
 }
 

@@ -13,7 +13,9 @@ use super::spectrum::{Handle, Quantity, Spectra, report_in_file};
 use super::tree::Value;
 use super::{Absorber, Component, Field, Grid, Medium, MediumId, Scattering};
 use crate::format::noise::{self, Range};
-use crate::format::unit::{self, Measure};
+use crate::format::said::Said;
+use crate::format::table::shown;
+use crate::format::unit::{self, Meaning, Measure, Stated};
 use crate::format::volume::{self, Volume};
 
 /// An absorption, or a gas by its table.
@@ -443,14 +445,25 @@ impl Grids {
 
 /// A volume in Spectile's units, without noise; what is missing or impossible is an error.
 fn checked(item: &Item, volume: Volume, describes: Describes) -> Option<Grid> {
-    let Volume { size, mut values, unit, notes } = volume;
+    let Volume { size, mut values, unit, said, told, notes } = volume;
     let (name, _) = item.source()?;
     notes.iter().for_each(|note| item.cx.warn(format!("{name} {note}")));
     let place = |i: usize| {
         let [nx, ny, _] = size.map(|n| n as usize);
         format!("[{}, {}, {}]", i / (nx * ny), i / nx % ny, i % nx)
     };
-    if let Some((text, measure)) = unit {
+    refuse_other_quantities(item, name, &said, describes)?;
+    // Where no attribute is that of the unit, a name may say it: `Temperature (C)`.
+    let of_name = || {
+        let text = said
+            .iter()
+            .chain(&told)
+            .find_map(|text| unit::of_temperature(text))
+            .filter(|_| describes == Describes::Temperature)?;
+        let measure = unit::parse(&text);
+        Some((text, measure))
+    };
+    if let Some((text, measure)) = unit.or_else(of_name) {
         convert(item, name, Arc::make_mut(&mut values).as_mut_slice(), describes, &text, measure)?;
     }
     if let Some(i) = values.iter().position(|value| value.is_nan()) {
@@ -474,6 +487,36 @@ fn checked(item: &Item, volume: Volume, describes: Describes) -> Option<Grid> {
         }
     }
     Some(Grid { size, values })
+}
+
+/// Refuses values that attributes call something else than what they are to be.
+fn refuse_other_quantities(item: &Item, name: &str, said: &[String], describes: Describes) -> Option<()> {
+    for text in said {
+        let is_logarithm = Stated::in_name(text).is_some_and(|stated| stated.meaning == Meaning::Logarithm);
+        let what = match Said::in_name(text) {
+            _ if is_logarithm => "logarithms",
+            Some(said @ (Said::Uncertainty | Said::Flags)) => said.noun(),
+            Some(Said::Temperature) if describes == Describes::Density => Said::Temperature.noun(),
+            // Whatever grows with the matter in a voxel is a density.
+            Some(_) if describes == Describes::Density => continue,
+            Some(said) if said != Said::Temperature => said.noun(),
+            Some(_) => continue,
+            // CF's: air_temperature, sea_surface_temperature.
+            None if describes == Describes::Density
+                && text.to_lowercase().replace(' ', "_").ends_with("_temperature") =>
+            {
+                "a temperature"
+            }
+            None => continue,
+        };
+        let wanted = if describes == Describes::Temperature { "a temperature" } else { "a density" };
+        item.error_help(
+            format!("{name} calls its values `{}`, {what}, and is to be {wanted}", shown(text)),
+            "take another array, or correct the attribute",
+        );
+        return None;
+    }
+    Some(())
 }
 
 /// Brings values into K, or sees that densities are numbers without a unit.

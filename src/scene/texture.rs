@@ -610,15 +610,10 @@ fn numbers(file: &Item, number: Number, image: &Image, name: &str) -> Option<(Ve
 /// The numbers of a channel in kelvins, by its name, such as `temperature_C`, or what its picture says of units; the error is a unit
 /// that is not understood.
 fn kelvins(plane: &Plane, image: &Image, name: &str, warnings: &mut Vec<String>) -> Result<Vec<f32>, String> {
-    let (_, channel) = plane.parts();
-    let last = channel.trim_end_matches([')', ']']).rsplit(['_', '(', '[', ' ']).next().unwrap_or("");
-    let is_after = last.len() < channel.len() && channel.to_lowercase().starts_with('t');
-    let of_name = Some(last).filter(|_| is_after).filter(|last| {
-        let lower = last.to_lowercase();
-        let known = ["f", "k", "degf", "fahrenheit", "kelvin", "kelvins", "mk", "r", "rankine"];
-        unit::is_celsius(last) || known.contains(&lower.as_str())
-    });
-    let Some(unit) = image.units.as_deref().or(of_name) else { return Ok(not_negative(plane, name, warnings)) };
+    let of_name = unit::of_temperature(&plane.name).or_else(|| unit::of_temperature(plane.parts().1));
+    let Some(unit) = image.units.as_deref().or(of_name.as_deref()) else {
+        return Ok(not_negative(plane, name, warnings));
+    };
     if unit::is_celsius(unit) {
         warnings.push(format!("texture {name} gives its temperatures in `{unit}`: they are converted to K"));
         return Ok(plane.samples.iter().map(|v| (f64::from(*v) + 273.15) as f32).collect());

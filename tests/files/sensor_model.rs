@@ -175,6 +175,12 @@ fn holes_existing_stores_and_other_commands_are_refused_in_words() {
     refused(&onto, "cube.zarr");
     assert!(path.join("cube.zarr/radiance").exists());
     refused(&[&sensor[..], &["--responses", "x.csv"]].concat(), "cannot be used with");
+    let integrated = ["sensor", "cube.zarr", "--responses", "x.csv", "-o", "i.zarr"];
+    for of_model in
+        [&["--mtf-plot", "m.svg"][..], &["--electrons"], &["--noise", "off"], &["--seed", "5"], &["--partial"]]
+    {
+        refused(&[&integrated[..], of_model].concat(), "cannot be used with");
+    }
 }
 
 /// A script of tests/python with these arguments, where there is a Python to run it; its standard output.

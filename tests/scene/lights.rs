@@ -13,7 +13,7 @@ use spectile::spectral::{Curve, upsample};
 use spectile::{Error, Result};
 
 use super::wrong::check_wrong;
-use super::{changed, good, overrides};
+use super::{BASE, changed, good, overrides};
 
 const SKY: &str = "[environment]\nradiance = 0.25";
 
@@ -461,6 +461,12 @@ fn zarr_arrays_of_other_quantities_are_refused_by_name() {
         (r#""standard_name": "toa_bidirectional_reflectance""#, "a reflectance"),
         (r#""long_name": "log10 of radiance""#, "logarithms"),
         (r#""long_name": "spectral irradiance""#, "an irradiance"),
+        (r#""long_name": "photon radiance""#, "a number of photons"),
+        (r#""long_name": "irradiance reflectance""#, "a reflectance"),
+        (r#""long_name": "standard deviation of radiance""#, "an error or spread"),
+        (r#""long_name": "luminance""#, "a luminous quantity"),
+        (r#""standard_name": "downwelling_photon_radiance_in_sea_water""#, "a number of photons"),
+        (r#""standard_name": "toa_outgoing_radiance_per_unit_wavenumber""#, "a quantity per wavenumber"),
     ] {
         let attributes = format!("{{{attribute}}}");
         let array = zarr_array(&[4, 2, 3], "float32", &OVER_SKY, &attributes);
@@ -481,6 +487,52 @@ fn zarr_wavelengths_in_air_are_converted() {
         let Texels::Spectral { nm, .. } = &map.texels else { panic!("{map:?}") };
         assert!(nm.iter().zip(BANDS).all(|(a, b)| (a / b - 1.000_28).abs() < 2e-5), "{nm:?}");
         assert!(warnings.len() == 1 && warnings[0].contains("converted to vacuum"), "{warnings:?}");
+    }
+}
+
+/// Beside the wavelengths, by any of the names that they have.
+#[test]
+fn zarr_flags_of_bad_bands_are_told() {
+    for (name, flags, words) in [
+        ("good_wavelengths", [1.0, 0.0, 1.0, 1.0], "1 bands"),
+        ("bbl", [1.0, 0.0, 0.0, 1.0], "2 bands"),
+        ("bad_bands", [1.0, 0.0, 0.0, 0.0], "1 bands"),
+        ("mask", [1.0, 0.0, 0.0, 0.0], "flags of its bands"),
+        ("mask", [1.0; 4], ""),
+        ("valid", [1.0; 4], ""),
+    ] {
+        let values: Vec<u8> = flags.iter().flat_map(|flag: &f64| flag.to_le_bytes()).collect();
+        let folder = zarr_with(&[
+            (&format!("s.zarr/{name}/zarr.json"), zarr_array(&[4], "float64", &["wavelength"], "{}")),
+            (&format!("s.zarr/{name}/c/0"), values),
+        ]);
+        let (_, mut warnings) = folder.map("map = \"s.zarr\"");
+        warnings.retain(|warning| !warning.contains("shines in none"));
+        let is_told = warnings.iter().any(|warning| warning.contains(words) && warning.contains(name));
+        assert!(
+            is_told != words.is_empty() && warnings.len() == usize::from(!words.is_empty()),
+            "{name}: {warnings:?}"
+        );
+    }
+}
+
+/// Balls and pipes shine outward, so that those around everything are dark.
+#[test]
+fn lamps_around_everything_are_told_of() {
+    for (shape, is_told) in [
+        ("sphere = { center = [0, 0, 0], radius = 20 }", true),
+        ("cylinder = { from = [0, 0, -20], to = [0, 0, 20], radius = 20 }", true),
+        ("cube = { min = [-20, -20, -20], max = [20, 20, 20] }", true),
+        ("sphere = { center = [0, 0, 9], radius = 1 }", false),
+        ("cylinder = { from = [0, 0, 9], to = [0, 0, 10], radius = 1 }", false),
+    ] {
+        let lamp = format!("[[objects]]\n{shape}\nmaterial = \"soot\"\nemission = 1.0\n\n[environment]");
+        let warnings = good(&BASE.replace("[environment]", &lamp), &[], &[]).warnings;
+        let told = warnings.iter().filter(|warning| warning.contains("shines ") && warning.contains("emission_sides"));
+        assert_eq!(told.count(), usize::from(is_told), "{shape}: {warnings:?}");
+        let both = lamp.replace("emission = 1.0", "emission = 1.0\nemission_sides = \"both\"");
+        let warnings = good(&BASE.replace("[environment]", &both), &[], &[]).warnings;
+        assert!(!warnings.iter().any(|warning| warning.contains("emission_sides")), "{shape}: {warnings:?}");
     }
 }
 

@@ -177,6 +177,42 @@ fn grids_resolve() {
     assert!((to_grid.transform_point3(world) - DVec3::new(1.0, 1.0, 0.5)).length() < 1e-14);
 }
 
+/// What attributes call a grid's values: the unit of a temperature, or another quantity.
+#[test]
+fn names_of_grids_are_applied_or_refused() {
+    let with = |key: &str, name: &str, text: &str, value: f64| {
+        let dir = folder(&[]);
+        let store = Arc::new(FilesystemStore::new(dir.path().join("g.zarr")).expect("a folder"));
+        let mut builder = ArrayBuilder::new(vec![1, 1, 1], vec![1, 1, 1], data_type::float64(), 0.0f64);
+        let attributes = serde_json::json!({ name: text });
+        builder.attributes(attributes.as_object().expect("an object").clone());
+        let array = builder.build(store, "/d").expect("an array");
+        array.store_metadata().expect("metadata");
+        array.store_array_subset(&array.subset_all(), &[value]).expect("values");
+        let media = format!("[media.gas]\nabsorption = 1\n{key} = {{ grid = \"g.zarr/d\" }}");
+        scene::parse(&filled(BALL, &media), &dir.path().join("s.toml"), &[])
+    };
+    for (name, text) in
+        [("long_name", "Temperature (C)"), ("description", "temperature in Celsius"), ("long_name", "T_degC")]
+    {
+        let scene = with("temperature", name, text, 26.85).unwrap_or_else(|e| panic!("{text}: {e}"));
+        let Some(Field::Grid(grid)) = &scene.media[0].temperature else { panic!("{text}") };
+        assert!((grid.values[0] - 300.0).abs() < 1e-3, "{text}: {:?}", grid.values);
+    }
+    for (key, name, text, words) in [
+        ("density", "standard_name", "air_temperature", "a temperature"),
+        ("density", "long_name", "log10 density", "logarithms"),
+        ("density", "long_name", "density uncertainty", "an error or spread"),
+        ("temperature", "long_name", "transmittance", "a transmittance"),
+    ] {
+        let error = with(key, name, text, 1.0).err().unwrap_or_else(|| panic!("{text}"));
+        assert!(error.to_string().contains(words), "{text}: {error}");
+    }
+    for text in ["mass concentration of water", "extinction coefficient", "liquid water content"] {
+        assert!(with("density", "long_name", text, 1.0).is_ok(), "{text}");
+    }
+}
+
 /// Height grows with z; depth, of which CF says `positive` = `down`, grows against it.
 #[test]
 fn depths_run_downward() {

@@ -34,6 +34,22 @@ fn scene(file: &str, column: &str, quantity: &str) -> String {
     }
 }
 
+/// Holds what a file becomes against what is expected.
+fn check(file: &str, content: &str, column: &str, quantity: &str, expected: Result<[f64; 2], &str>) {
+    let text = scene(file, column, quantity);
+    match (parse_with(&text, &[(file, content)], &[]), expected) {
+        (Ok(scene), Ok([at_450, at_550])) => {
+            let is = |found: f64, wanted: f64| (found / wanted - 1.0).abs() < 1e-5;
+            let holds =
+                |curve: &spectile::spectral::Curve| is(curve.eval(450.0), at_450) && is(curve.eval(550.0), at_550);
+            assert!(scene.spectra.iter().any(|spectrum| holds(&spectrum.curve)), "{content}: {quantity}");
+        }
+        (Err(error), Err(words)) => assert!(error.to_string().contains(words), "{content}: {quantity}: {error}"),
+        (Ok(_), Err(words)) => panic!("{content}: {quantity}: accepted, though {words}"),
+        (Err(error), Ok(_)) => panic!("{content}: {quantity}: {error}"),
+    }
+}
+
 #[test]
 fn files_are_what_they_call_their_values() {
     let cases: [Case; 22] = [
@@ -61,19 +77,40 @@ fn files_are_what_they_call_their_values() {
         ("a.csv", "nm,pine/bark\n400,0.5\n600,0.5\n", "", "reflectance", Ok([0.5, 0.5])),
     ];
     for (file, content, column, quantity, expected) in cases {
-        let text = scene(file, column, quantity);
-        match (parse_with(&text, &[(file, content)], &[]), expected) {
-            (Ok(scene), Ok([at_450, at_550])) => {
-                let is = |found: f64, wanted: f64| (found / wanted - 1.0).abs() < 1e-5;
-                let holds =
-                    |curve: &spectile::spectral::Curve| is(curve.eval(450.0), at_450) && is(curve.eval(550.0), at_550);
-                assert!(scene.spectra.iter().any(|spectrum| holds(&spectrum.curve)), "{content}: {quantity}");
-            }
-            (Err(error), Err(words)) => assert!(error.to_string().contains(words), "{content}: {quantity}: {error}"),
-            (Ok(_), Err(words)) => panic!("{content}: {quantity}: accepted, though {words}"),
-            (Err(error), Ok(_)) => panic!("{content}: {quantity}: {error}"),
-        }
+        check(file, content, column, quantity, expected);
     }
     let said = good(&scene("a.csv", "k", "absorption"), &[("a.csv", NK)], &[]).warnings;
     assert!(said.iter().any(|warning| warning.contains("4 π k / λ")), "{said:?}");
+}
+
+/// The kinds of a file that an outside tester found read wrongly or left out without a word.
+#[test]
+fn common_headers_are_applied_or_refused() {
+    let leaf = "Name: oak leaf\nType: vegetation\nClass: tree\nX Units: Wavelength (micrometers)\nY Units: Reflectance (percentage)\n\
+                First Column: X\nNumber of X Values: 2\n\n0.4 50\n0.6 50\n";
+    let cases: &[Case] = &[
+        ("e.spectrum.txt", leaf, "", "reflectance", Ok([0.5, 0.5])),
+        ("a.csv", ",wl,refl\n1,400,0.25\n2,600,0.75\n3,700,0.5\n", "refl", "reflectance", Ok([0.375, 0.625])),
+        ("a.csv", "No.,Wavelength (nm),refl\n1,400,0.25\n2,600,0.75\n", "refl", "reflectance", Ok([0.375, 0.625])),
+        ("a.csv", "X,a,refl\n1,400,0.25\n2,600,0.75\n3,700,1\n", "refl", "reflectance", Err("numbers of rows")),
+        ("a.csv", "nm,alpha / cm^-1\n400,0.01\n600,0.01\n", "", "absorption", Ok([1.0, 1.0])),
+        ("a.csv", "nm,mu_a_mm-1\n400,0.01\n600,0.01\n", "", "absorption", Ok([10.0, 10.0])),
+        ("a.csv", "nm,alpha_cm\n400,0.01\n600,0.01\n", "", "absorption", Err("which is not applied")),
+        ("a.csv", "nm,R(\u{3bb}) / %\n400,50\n600,50\n", "", "reflectance", Ok([0.5, 0.5])),
+        ("a.csv", "nm,Reflectance....\n400,0.5\n600,0.5\n", "", "reflectance", Err("which is not applied")),
+        ("a.csv", "# nm, %\nnm,value\n400,50\n600,50\n", "", "reflectance", Ok([0.5, 0.5])),
+        ("a.csv", "Wavelength (um),Reflectance (%)\nNA,NA\n0.4,50\n0.6,50\n", "", "reflectance", Ok([0.5, 0.5])),
+        ("a.csv", "wl,a,wl.1,b\n400,1,500,0.5\n600,1,700,0.5\n", "b", "reflectance", Err("wavelengths of its own")),
+        ("a.csv", "wl_min,wl_max,v\n400,500,0.5\n500,600,0.5\n", "v", "reflectance", Err("values of intervals")),
+        ("a.csv", "nm,Rrs\n400,0.5\n600,0.5\n", "", "reflectance", Err("per steradian")),
+        ("a.csv", "nm,%T\n400,50\n600,50\n", "", "reflectance", Err("a transmittance")),
+        ("a.csv", "nm,reflectance_std\n400,0.5\n600,0.5\n", "", "reflectance", Err("an error or spread")),
+        ("a.csv", "nm,photon radiance\n400,2\n600,2\n", "", "radiance", Err("a number of photons")),
+        ("a.csv", "nm,extinction coefficient\n400,2\n600,2\n", "", "absorption", Ok([2.0, 2.0])),
+        ("a.csv", "Wavenumber 1/cm,radiance\n25000,2\n16000,2\n", "", "radiance", Ok([2.0, 2.0])),
+        ("a.csv", "Position,radiance\n400,2\n600,2\n", "", "radiance", Err("no wavelength follows")),
+    ];
+    for (file, content, column, quantity, expected) in cases.iter().copied() {
+        check(file, content, column, quantity, expected);
+    }
 }

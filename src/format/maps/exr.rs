@@ -12,6 +12,7 @@ use crate::error::Problem;
 use crate::format::image::{self, Plane, Rgb};
 use crate::format::table::shown;
 use crate::format::unit::{self, Density, Unit};
+use crate::spectral::Response;
 use crate::spectral::planck::LIGHT_SPEED;
 
 /// The file at `path` as spectra where it has emissive spectral channels, else as R, G and B.
@@ -57,11 +58,27 @@ pub fn read_map(path: &Path) -> Result<Map, Box<Problem>> {
         }
         let (nm, planes): (Vec<f64>, Vec<&[f32]>) = bands.into_iter().unzip();
         let responses: Vec<Option<String>> = emissive.iter().map(|(_, plane)| attribute(&plane.name)).collect();
-        let spans: Option<Vec<[f64; 2]>> = responses.iter().map(|text| interval(text.as_ref()?)).collect();
-        if spans.is_none() && responses.iter().any(Option::is_some) {
-            let what = "has responses of bands that are not 1 over an interval each: they are not applied, and bands count at their wavelengths";
-            warnings.push(what.to_owned());
-        }
+        let boxes: Option<Vec<[f64; 2]>> = responses.iter().map(|text| interval(text.as_ref()?)).collect();
+        let widths = || {
+            let of = |(nm, text): (&f64, &Option<String>)| {
+                let half = 0.5 * response(text.as_ref()?)?.fwhm();
+                (half > 0.0).then_some([nm - half, nm + half])
+            };
+            nm.iter().zip(&responses).map(of).collect::<Option<Vec<[f64; 2]>>>()
+        };
+        let spans = boxes.or_else(|| {
+            let spans = widths();
+            if responses.iter().any(Option::is_some) {
+                let what = match spans {
+                    Some(_) => {
+                        "bands are taken as 1 over their widths at half of their heights, around their wavelengths"
+                    }
+                    None => "they are not applied, and bands count at their wavelengths",
+                };
+                warnings.push(format!("has responses of bands that are not 1 over an interval each: {what}"));
+            }
+            spans
+        });
         let content = spectral(path, &Bands { nm, spans }, &planes, &mut warnings)?;
         return Ok(Map { size, content, warnings });
     }
@@ -106,10 +123,17 @@ fn said(path: &Path, header: Option<&Header>, warnings: &mut Vec<String>) -> Res
     if let Some(luminance) = header.own_attributes.white_luminance {
         warnings.push(format!("says that its white has {luminance} cd/m2 (`whiteLuminance`), which is not applied"));
     }
-    for name in ["EV", "cameraResponse", "lensTransmission"] {
-        let key = Text::from(name);
-        let attributes = [&header.own_attributes.other, &header.shared_attributes.other];
-        if attributes.iter().any(|attributes| attributes.contains_key(&key)) {
+    for (key, value) in header.own_attributes.other.iter().chain(&header.shared_attributes.other) {
+        const CHANGING: [&str; 5] = ["ev", "cameraresponse", "lenstransmission", "exposure", "exposurecompensation"];
+        let name = key.to_string();
+        let is_unit = || match value {
+            AttributeValue::Text(text) if image::is_called(&name, &["units", "unit"]) => {
+                unit::parse(&text.to_string()).is_some_and(|unit| unit.is_number() && unit.factor != 1.0)
+            }
+            _ => false,
+        };
+        if image::is_called(&name, &CHANGING) || is_unit() {
+            let name = shown(&name);
             warnings
                 .push(format!("has the attribute `{name}`, which is not applied: its values are taken as they are"));
         }
@@ -140,6 +164,17 @@ fn interval(response: &str) -> Option<[f64; 2]> {
     });
     let points: Vec<f64> = points.collect::<Option<_>>()?;
     <[f64; 2]>::try_from(points).ok().filter(|[from, to]| from < to)
+}
+
+/// The response of a band, as the layout writes it.
+fn response(text: &str) -> Option<Response> {
+    let points = text.split(';').map(str::trim).filter(|point| !point.is_empty()).map(|point| {
+        let (place, value) = point.split_once(':')?;
+        let nm: f64 = place.trim().strip_suffix("nm")?.replace(',', ".").parse().ok()?;
+        Some((nm, value.trim().parse::<f64>().ok()?))
+    });
+    let (nm, value) = points.collect::<Option<Vec<_>>>()?.into_iter().unzip();
+    Response::new(nm, value).ok()
 }
 
 /// The wavelength, in nm, of an unpolarised emissive channel: `S0.` and a number with a decimal comma, an SI prefix, and
@@ -193,7 +228,7 @@ mod tests {
     use exr::meta::header::LayerAttributes;
     use exr::prelude::{SpecificChannels, WritableImage};
 
-    use super::{emissive_band, interval, read_map};
+    use super::{emissive_band, interval, read_map, response};
 
     #[test]
     fn what_attributes_say_is_told_or_refused() {
@@ -217,6 +252,28 @@ mod tests {
         assert!(white.warnings[0].contains("100 cd/m2"), "{:?}", white.warnings);
         let exposed = write(&|all| drop(all.other.insert(Text::from("EV"), AttributeValue::F32(2.0)))).unwrap();
         assert!(exposed.warnings[0].contains("`EV`"), "{:?}", exposed.warnings);
+        let text = |name: &'static str, value: &'static str| {
+            write(&move |all| drop(all.other.insert(Text::from(name), AttributeValue::Text(Text::from(value)))))
+        };
+        for (name, value) in [
+            ("colorInteropID", "lin_ap1_scene"),
+            ("colorInteropID", "srgb_tx"),
+            ("colorInteropID", "lin_ciexyzd65_scene"),
+            ("oiio:ColorSpace", "acescg"),
+            ("Gamma", "2.2"),
+        ] {
+            assert!(text(name, value).unwrap_err().message.contains("those of"), "{name}: {value}");
+        }
+        for (name, value) in [("colorInteropID", "lin_rec709_scene"), ("colorInteropID", "data"), ("Gamma", "1")] {
+            assert!(text(name, value).unwrap().warnings.is_empty(), "{name}: {value}");
+        }
+        for (name, value) in [("exposure", "1"), ("EXPOSURE", "2"), ("exposureCompensation", "1"), ("units", "percent")]
+        {
+            assert!(text(name, value).unwrap().warnings[0].contains(name), "{name}");
+        }
+        let scaled =
+            |all: &mut LayerAttributes| drop(all.other.insert(Text::from("scale_factor"), AttributeValue::F32(0.5)));
+        assert!(write(&scaled).unwrap_err().message.contains("`scale_factor` = 0.5"));
     }
 
     #[test]
@@ -232,6 +289,14 @@ mod tests {
         ] {
             assert_eq!(interval(text), expected, "{text}");
         }
+    }
+
+    /// A trapezoid from 400 to 500 nm, half of its height 1 nm inside of either end.
+    #[test]
+    fn responses_have_widths() {
+        let width = |text: &str| response(text).map(|response| response.fwhm());
+        assert_eq!(width("400nm:0;402nm:0.5;498nm:0.5;500nm:0;"), Some(98.0));
+        assert_eq!([width("400nm:0;500nm:0;"), width("400nm:x;"), width("")], [None; 3]);
     }
 
     #[test]

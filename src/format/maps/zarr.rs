@@ -400,10 +400,45 @@ fn refuse_other_quantities(path: &Path, array: &Variable) -> Result<(), Box<Prob
 
 /// What to say of bands that an array beside the wavelengths calls bad, as those of EMIT do.
 fn bad_bands(arrays: &[Variable], axis: SpectralAxis) -> Result<Option<String>, Box<Problem>> {
-    let good = arrays.iter().find(|array| array.name == "good_wavelengths" && array.shape == axis.array.shape);
-    let Some(good) = good else { return Ok(None) };
-    let bad = good.values()?.iter().filter(|good| **good == 0.0).count();
-    Ok((bad > 0).then(|| format!("has {bad} bands that `good_wavelengths` calls bad: they are read as the others")))
+    /// Names of flags, and whether 1 is a good band; of others nobody knows which is.
+    const FLAGS: [(&str, Option<bool>); 15] = [
+        ("good_wavelengths", Some(true)),
+        ("good_bands", Some(true)),
+        ("good", Some(true)),
+        ("bbl", Some(true)),
+        ("valid", Some(true)),
+        ("valid_bands", Some(true)),
+        ("bad_bands", Some(false)),
+        ("bad_wavelengths", Some(false)),
+        ("bad", Some(false)),
+        ("mask", None),
+        ("band_mask", None),
+        ("quality", None),
+        ("quality_flag", None),
+        ("flag", None),
+        ("flags", None),
+    ];
+    for array in arrays.iter().filter(|array| array.shape == axis.array.shape) {
+        let lower = array.name.to_lowercase();
+        let Some((_, one_is_good)) = FLAGS.iter().find(|(name, _)| *name == lower) else { continue };
+        let flags = array.values()?;
+        let name = shown(&array.name);
+        let bad = |is_bad: &dyn Fn(f64) -> bool| flags.iter().filter(|flag| is_bad(**flag)).count();
+        let said = match one_is_good {
+            Some(true) => Some(bad(&|flag| flag == 0.0)).filter(|bad| *bad > 0),
+            Some(false) => Some(bad(&|flag| flag != 0.0)).filter(|bad| *bad > 0),
+            None if flags.windows(2).any(|pair| pair[0] != pair[1]) => {
+                return Ok(Some(format!(
+                    "has flags of its bands, `{name}`, which are not applied: all bands are read"
+                )));
+            }
+            None => None,
+        };
+        if let Some(bad) = said {
+            return Ok(Some(format!("has {bad} bands that `{name}` calls bad: they are read as the others")));
+        }
+    }
+    Ok(None)
 }
 
 fn density(path: &Path, array: &Variable, axis: Unit, warnings: &mut Vec<String>) -> Result<Density, Box<Problem>> {

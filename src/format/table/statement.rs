@@ -150,7 +150,9 @@ pub fn is_no_header(cells: &[&str]) -> bool {
     ];
     let begins = AXIS_KEYS.iter().chain(&OTHER_KEYS).any(|start| key.starts_with(start))
         || matches!(key.as_str(), "axis" | "mode");
-    let is_key = is_key || (begins && rest.len() == 1 && !squeezed(rest[0]).starts_with("yaxis"));
+    // `XAXIS (cm-1)` is a name by its unit.
+    let has_unit = first.contains(['(', '[']) && matches!(Unit::stated(first), Ok(Some(_)));
+    let is_key = is_key || (begins && !has_unit && rest.len() == 1 && !squeezed(rest[0]).starts_with("yaxis"));
     let is_unit = rest.len() == 1 && is_length(rest[0]) && Unit::named(first).is_none();
     is_key
         || of_units

@@ -33,6 +33,8 @@ fn whatever_separates_and_ends_lines() {
         b"% about\n! about\n// about\nnm,value\n400.5,1.25\n700,\xe2\x88\x922\n",
         b"nm\tRed; left\n400.5\t1.25\n700\t-2\n",
         b"nm,value\n400.5,125%\n700,-200%\n",
+        b"nm,value\n400.5,125 %\n700,-200 %\n",
+        b"nm;value\n400,5;125,0 %\n700,0;-200,0 %\n",
         b"wavelength (nm)   reflectance (no unit)\n 400.5  1.25\n 700  -2\n",
         &utf16("nm,value\n400.5,1.25\n700,-2\n", false),
         &utf16("nm,value\n400.5,1.25\n700,-2\n", true),
@@ -171,7 +173,7 @@ fn lines_of_units() {
         assert_eq!(name(&format!("nm,{unit}")), (percent, false), "{unit}");
     }
     for unit in ["Abs", "dB", "log10", "OD"] {
-        assert_eq!(name(&format!("nm,{unit}")), (Some(unit::Meaning::Logarithm), false), "{unit}");
+        assert_eq!(name(&format!("nm,{unit}")), (Some(crate::format::unit::Meaning::Logarithm), false), "{unit}");
     }
     for (unit, is_told) in [("", false), ("-", false), ("v", true), ("wt%", true), ("xyz", true)] {
         assert_eq!(name(&format!("nm,{unit}")), (None, is_told), "{unit}");
@@ -181,4 +183,32 @@ fn lines_of_units() {
     assert!(problem.line == Some(1) && problem.message.contains("Mode %T"), "{problem}");
     let table = read(b"Mode,fast\nnm,v\n400,50\n500,60\n", Path::new("t.csv")).unwrap();
     assert_eq!(table.names, ["nm", "v"]);
+}
+
+/// Rows that are none of names do not take the place of those that are.
+#[test]
+fn names_stand_above_rows_without_numbers() {
+    let head = "Wavelength (um),Reflectance (%)\n";
+    for between in ["NA,NA\n", ",\n", "sample,leaf\n", "-----,-----\n", ",Leaf 1\n", "NA,9\n", "N/A,#N/A\n--,--\n"] {
+        let text = format!("{head}{between}0.4,0.5\n0.7,0.5\n");
+        let table = read(text.as_bytes(), Path::new("t.csv")).unwrap();
+        assert_eq!(
+            (&table.names[..], table.rows.len()),
+            (&["Wavelength (um)", "Reflectance (%)"].map(String::from)[..], 2),
+            "{between}"
+        );
+        let is_told = table.notes.iter().any(|note| note.contains("left out"));
+        assert_eq!(is_told, between.contains("eaf") || between.contains('9'), "{between}: {:?}", table.notes);
+    }
+    let labelled = "Wavelength (um),Reflectance (%),Reflectance (%)\n,Leaf 1,Leaf 2\n0.4,1,2\n0.7,1,2\n";
+    let table = read(labelled.as_bytes(), Path::new("t.csv")).unwrap();
+    assert_eq!(table.names, ["Wavelength (um)", "Leaf 1 (%)", "Leaf 2 (%)"]);
+    for rows in [
+        "\"2,500\",0.2\n\"1,000\",0.2\n950,0.6\n900,0.6\n",
+        "\"1'000\",0.2\n950,0.6\n900,0.6\n",
+        "\"1 000\",0.2\n950,0.6\n",
+    ] {
+        let problem = read(format!("Wavelength,Reflectance\n{rows}").as_bytes(), Path::new("t.csv")).unwrap_err();
+        assert!(problem.line == Some(2) && problem.help.unwrap().contains("thousands"), "{rows}");
+    }
 }

@@ -105,7 +105,7 @@ fn an_index_is_two_columns() {
                 assert_eq!((k.nm, k.value), (vec![400.0, 500.0], vec![0.0, 0.25]), "{text}");
             }
             Ok(_) => panic!("{text} gives both"),
-            Err(problem) => assert!(text.starts_with('k') && problem.message.contains("no column \"n\"")),
+            Err(problem) => assert!(text.starts_with('k') && problem.message.contains("has wavelengths in column 2")),
         }
     }
     // Each has the wavelengths at which it is given.
@@ -233,4 +233,105 @@ fn columns_of_an_index_are_known() {
     ] {
         assert_eq!(said(text, column), expected, "{text}: {column}");
     }
+}
+
+/// Rows of 1 nm from 350 nm on, numbered from `first`.
+fn numbered(header: &str, first: usize) -> String {
+    let rows: String =
+        (0..60).map(|i| format!("{},{},{}\n", first + i, 350 + i, if i < 30 { 0.25 } else { 0.75 })).collect();
+    format!("{header}\n{rows}")
+}
+
+/// As R, pandas, spreadsheets and instruments number their rows.
+#[test]
+fn row_numbers_are_no_wavelengths() {
+    for first in ["", "\"\"", "X", "No.", "Nr", "ID", "n", "Obs", "V1", "Step", "Position", "Unnamed: 0", "#", "rank"] {
+        for second in
+            ["wl", "WL", "wvl", "lambda", "\u{3bb}", "wave", "Wavelength (nm)", "Wellenl\u{e4}nge", "Wavelength..nm."]
+        {
+            for from in [0, 1, 50] {
+                let text = numbered(&format!("{first},{second},refl"), from);
+                match csv(&text, Some("refl")) {
+                    Ok(table) => assert_eq!((table.nm[0], table.value[29], table.value[30]), (350.0, 0.25, 0.75)),
+                    // A line that begins with the mark of a comment names no columns.
+                    Err(problem) => assert!(first == "#", "{first},{second}: {problem}"),
+                }
+            }
+        }
+    }
+    // Where no column is called as wavelengths are.
+    for header in ["X,a,refl", "", "No.,Messwert,refl", ",a,refl"] {
+        let problem =
+            csv(numbered(header, 1).trim_start(), Some(if header.is_empty() { "3" } else { "refl" })).unwrap_err();
+        let is_said =
+            ["numbers of rows", "from which no wavelength follows"].iter().any(|words| problem.message.contains(words));
+        assert!(is_said, "{header}: {problem}");
+    }
+    // Behind more than numbers of rows.
+    for header in ["sample,x,wl,refl", "oak,wl,pine,elm"] {
+        let problem = csv(&format!("{header}\n3,7,400,0.5\n9,8,500,0.5\n"), Some("4")).unwrap_err();
+        assert!(problem.message.contains("put") || problem.help.unwrap().contains("first"), "{header}");
+    }
+    // The same places twice, and what counts by ones and is called so.
+    assert_eq!(csv("channel centre,um,v\n400,0.4,1\n401,0.401,2\n", Some("v")).unwrap().nm, [400.0, 401.0]);
+    assert_eq!(csv("wavelength (um),v\n1,3\n2,4\n3,5\n", None).unwrap().nm, [1000.0, 2000.0, 3000.0]);
+}
+
+#[test]
+fn pairs_of_columns_have_wavelengths_of_their_own() {
+    for header in [
+        "wl,B1,wl,B2",
+        "WL,B1,WL,B2",
+        "\u{3bb},B1,\u{3bb},B2",
+        "wl1,B1,wl2,B2",
+        "lambda_1,B1,lambda_2,B2",
+        "x1,y1,x2,y2",
+        "w,B1,w,B2",
+        "nm1,B1,nm2,B2",
+        "wl,B1,wl.1,B2",
+        "wl,B1,,B2",
+        "B1 wavelength,B1 response,B2 wavelength,B2 response",
+        "wl_A,A,wl_B,B",
+        "",
+    ] {
+        let text = format!("{header}\n450,0,600,0\n460,1,610,1\n500,0,650,0\n");
+        let problem = parse(text.trim_start().as_bytes(), Path::new("t.csv"), Column::Number(4), None).unwrap_err();
+        assert!(problem.message.contains("wavelengths of its own"), "{header}: {problem}");
+        let problem = crate::format::response::parse_responses(text.trim_start().as_bytes(), Path::new("t.csv"));
+        assert!(problem.unwrap_err().message.contains("of their own"), "{header}");
+    }
+    // R's names of a table without any, and values that ascend.
+    let read = |text: &str| parse(text.as_bytes(), Path::new("t.csv"), Column::Number(4), None);
+    assert_eq!(read("V1,V2,V3,V4\n400,1,2,7\n500,3,4,8\n600,5,6,9\n").unwrap().value, [7.0, 8.0, 9.0]);
+    assert_eq!(read("400,1,2,7\n500,3,4,8\n600,5,6,9\n").unwrap().value, [7.0, 8.0, 9.0]);
+}
+
+#[test]
+fn values_of_intervals_are_refused() {
+    for header in [
+        "wl_min,wl_max,v",
+        "wavelength_start_nm,wavelength_end_nm,v",
+        "lambda_min,lambda_max,v",
+        "bin_start,bin_end,v",
+        "lo,hi,v",
+        "low,high,v",
+        "left,right,v",
+        "wl_from,wl_to,v",
+        "nm_lo,nm_hi,v",
+        "lambda1,lambda2,v",
+        "edge1,edge2,v",
+        "Lambda von,Lambda bis,v",
+        "from (nm),to (nm),v",
+        "a,b,v",
+        "",
+    ] {
+        for rows in ["400,500,0.1\n500,600,0.2\n600,700,0.3\n", "600,700,0.3\n500,600,0.2\n400,500,0.1\n"] {
+            let text = format!("{header}\n{rows}");
+            let problem = parse(text.trim_start().as_bytes(), Path::new("t.csv"), Column::Number(3), None).unwrap_err();
+            assert!(problem.message.contains("values of intervals"), "{header}: {problem}");
+        }
+    }
+    // Minima and maxima of what lies over a wavelength.
+    assert_eq!(csv("wl,min,max\n400,1,2\n500,2,3\n600,3,4\n", Some("max")).unwrap().value, [2.0, 3.0, 4.0]);
+    assert_eq!(csv("V1,V2,V3\n400,1,2\n500,2,3\n600,3,4\n", Some("V3")).unwrap().value, [2.0, 3.0, 4.0]);
 }

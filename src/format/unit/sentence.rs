@@ -1,6 +1,7 @@
 //! What names and sentences say of values beside their unit: percent, factors, logarithms and other functions.
 
-use super::spelling::{bracketed, is_quantity, parse, plain, words};
+use super::places::bracketed;
+use super::spelling::{is_quantity, parse, plain, words};
 use super::{FACTORS, Measure};
 
 /// Whether the name of a column says that its numbers are logarithms, or Kubelka and Munk's function, of the values.
@@ -52,6 +53,11 @@ fn is_function(lower: &str) -> bool {
     let of = |part: Option<&str>| part.is_some_and(is_quantity_or_letter);
     of(squeezed.strip_prefix("1/"))
         || of(squeezed.strip_suffix("^2"))
+        || squeezed.starts_with(['\u{3b4}', '\u{2206}'])
+        || (squeezed.starts_with('d')
+            && squeezed.split_once("/d").is_some_and(|(before, _)| of(before.strip_prefix('d'))))
+        || words(lower).next() == Some("sqrt")
+        || lower.contains("square root")
         || words(lower).any(|word| word.starts_with("derivativ"))
         || (lower.contains("continuum") && words(lower).any(|word| matches!(word, "removed" | "removal" | "divided")))
 }
@@ -65,8 +71,10 @@ pub(super) fn has_arithmetic(text: &str) -> bool {
     }
     let squeezed = lower.replace(" x ", "*").replace(' ', "");
     let is_pi = |part: &str| matches!(part, "pi" | "\u{3c0}");
+    // `rho_w/pi`
+    let begins = |part: &str| words(part).next().is_some_and(is_quantity_or_letter);
     if let Some((before, after)) = squeezed.split_once(['*', '/'])
-        && ((is_pi(before) && is_quantity_or_letter(after)) || (is_pi(after) && is_quantity_or_letter(before)))
+        && ((is_pi(before) && begins(after)) || (is_pi(after) && begins(before)))
     {
         return true;
     }
@@ -78,11 +86,29 @@ pub(super) fn has_arithmetic(text: &str) -> bool {
     is_divided || is_shifted
 }
 
+/// Percent in words, in small letters.
+const PERCENT: [&str; 10] =
+    ["percent", "percentage", "percents", "pct", "perc", "prozent", "procent", "pourcent", "porcentaje", "%"];
+
+/// Whether a name ends with a range of percent, `(0-100)`, `0 to 100 %`.
+pub(super) fn is_up_to_hundred(text: &str) -> bool {
+    let lower = text.to_lowercase();
+    let spaced = lower.replace(" to ", " - ").replace(['-', '.', '\u{2026}'], " ");
+    let all: Vec<&str> = spaced.trim_end_matches(['%', ' ']).split_whitespace().collect();
+    spaced != lower && matches!(all[..], [.., "0", "100"])
+}
+
+/// Whether a name of R's has only dots where `(%)` or `%` stood: `Reflectance....`, `X..Reflectance`.
+pub(super) fn is_without_its_marks(text: &str) -> bool {
+    let lower = text.to_lowercase();
+    let of_start = lower.strip_prefix("x.").map(|rest| rest.trim_start_matches('.'));
+    lower.ends_with("...") || of_start.is_some_and(|rest| words(rest).next().is_some_and(is_quantity_or_letter))
+}
+
 /// Whether a text is percent and nothing else than what of: `%`, `%R`, `R%`, `% Refl`, `percent`. Of a mixture it is not: `wt%`.
 pub(super) fn is_percent_of(text: &str) -> bool {
     let lower = text.trim().to_lowercase().replace("per cent", "percent").replace(['_', '.', '(', ')'], " ");
-    let marks = ["percent", "perc", "pct", "%"];
-    let rest = marks.iter().find_map(|mark| {
+    let rest = PERCENT.iter().find_map(|mark| {
         let lower = lower.trim();
         let at_end = lower.strip_suffix(mark).filter(|rest| *mark == "%" || rest.is_empty() || rest.ends_with(' '));
         let at_start = || lower.strip_prefix(mark).filter(|rest| *mark == "%" || rest.starts_with(' '));
@@ -110,8 +136,11 @@ pub(super) fn is_percent(text: &str) -> Option<bool> {
         text.insert(text.len() - "Percent".len(), ' ');
     }
     let lower = text.to_lowercase().replace("per cent", "percent").replace('_', " ");
-    let is = |word: &str| ["percent", "pct", "perc", "%"].contains(&word.trim_end_matches('.'));
+    let is = |word: &str| PERCENT.contains(&word.trim_end_matches('.'));
     let all: Vec<&str> = lower.split_whitespace().collect();
+    if is_up_to_hundred(&lower) {
+        return Some(true);
+    }
     let at_end = match lower.trim_end().strip_suffix('%') {
         Some(before) => Some(before.trim_end()),
         None => {
@@ -121,12 +150,26 @@ pub(super) fn is_percent(text: &str) -> Option<bool> {
     match at_end {
         Some(before) if before.ends_with(|c: char| c.is_ascii_digit()) => None,
         Some(_) => Some(true),
+        None if is_percent_among(&lower) => Some(true),
         None => Some(
             all.first().is_some_and(|word| is(word))
                 || all.last().is_some_and(|word| word.starts_with('%') && is_percent_of(word))
                 || lower.strip_prefix('%').is_some_and(|rest| rest.trim_start().starts_with(char::is_alphabetic)),
         ),
     }
+}
+
+/// Whether a name, in small letters, has percent among its words, of a quantity and not of a number: `refl percent mean`, `R% Sample`.
+fn is_percent_among(lower: &str) -> bool {
+    let all: Vec<&str> =
+        lower.split(|c: char| c.is_whitespace() || matches!(c, '.' | ',')).filter(|w| !w.is_empty()).collect();
+    let of_first = all.first().is_some_and(|word| word.len() > 1 && word.ends_with('%') && is_percent_of(word));
+    let of_word = all.windows(2).any(|pair| {
+        let is_of = |word: &str| is_quantity(word) || word == "refl";
+        (is_of(pair[0]) && PERCENT.contains(&pair[1]))
+            || (PERCENT.contains(&pair[0]) && is_of(pair[1]) && pair[0] == all[0])
+    });
+    of_first || of_word
 }
 
 /// Whether a name says that its values are multiplied by something: `reflectance x 10000`, `R (x1e4)`, `R*100`.
@@ -178,12 +221,34 @@ pub(super) fn speaks_of_percent(text: &str) -> bool {
     const BETWEEN: [&str; 9] = ["in", "as", "=", ":", "are", "is", "given", "expressed", "all"];
     let text = plain(without_mark(text));
     let lower = text.to_lowercase().replace("per cent", "percent");
-    let is = |word: &str| ["percent", "pct", "%"].contains(&word.trim_matches(['.', ',', ';', '(', ')', '[', ']']));
+    let is = |word: &str| PERCENT.contains(&word.trim_matches(['.', ',', ';', '(', ')', '[', ']']));
+    let is_said = |value: &str| {
+        let bracketed = bracketed(value).is_some_and(|inner| is(inner.trim()) || is_percent_of(inner));
+        value.split_whitespace().count() <= 3 && (is(value.trim()) || is_percent_of(value) || bracketed)
+    };
     if let Some((key, value)) = lower.split_once([':', '='])
-        && words(key).any(|word| word.starts_with("unit"))
         && !words(key).any(|word| word.starts_with('x') || word.starts_with("wave"))
     {
-        return is(value.trim());
+        let is_key = |word: &str| {
+            word.contains("unit") || word.starts_with("yaxis") || matches!(word, "y" | "ordinate" | "scale" | "range")
+        };
+        if words(key).any(|word| word.contains("unit")) {
+            return is_said(value);
+        }
+        if words(key).any(|word| is_key(word) || is_quantity(word))
+            && (is_said(value) || is_up_to_hundred(&format!(" {value}")))
+        {
+            return true;
+        }
+    }
+    // A list of units, or of columns: `nm, %`, `col 2 - %R`.
+    let pieces: Vec<&str> = lower.split([',', ';']).flat_map(|piece| piece.split(" - ")).map(str::trim).collect();
+    let is_of_axis = |piece: &str| super::Unit::named(piece).is_some() || piece.starts_with("col");
+    if let [first, rest @ ..] = &pieces[..]
+        && is_of_axis(first)
+        && rest.iter().any(|piece| is_said(piece))
+    {
+        return true;
     }
     let all: Vec<&str> = lower.split_whitespace().collect();
     let is_of = |word: &str| {

@@ -16,83 +16,6 @@ pub(super) fn is_quantity(word: &str) -> bool {
     QUANTITIES.iter().any(|start| word.starts_with(start))
 }
 
-/// Whether what stands in brackets after `before` can hardly be anything but a unit, or says that there is none.
-pub(super) fn looks_like_unit(before: &str, inner: &str) -> bool {
-    const RELATIVE: [&str; 15] = [
-        "a.u.",
-        "au",
-        "a. u.",
-        "arb. units",
-        "arb",
-        "arbitrary units",
-        "relative",
-        "normalized",
-        "normalised",
-        "rel.",
-        "rel",
-        "norm.",
-        "norm",
-        "bp",
-        "bps",
-    ];
-    // What is said of a quantity, and changes no number.
-    const PLAIN: &str = "no unit units n a 0 1 mean average avg median measured calculated simulated total direct diffuse specular \
-                         hemispherical spectral";
-    let is_symbol = |word: &str| symbol(word.trim_end_matches(|c: char| c.is_ascii_digit())).is_some();
-    // cm-1, and not the A1 of a sample.
-    let is_power = |word: &str| {
-        let symbol_of = word.trim_end_matches(|c: char| c.is_ascii_digit());
-        symbol_of.len() < word.len() && symbol_of.strip_suffix('-').is_some_and(|name| symbol(name).is_some())
-    };
-    let lower = before.to_lowercase();
-    // Absorptions by temperature are called 300, 300 K, kappa_300K; samples by smaller numbers.
-    let is_kelvin = |word: &str| word.trim_end_matches('k').parse::<f64>().is_ok_and(|kelvin| kelvin >= 50.0);
-    let of_temperature = match words(&lower).collect::<Vec<_>>()[..] {
-        [only] | [only, "k"] => is_kelvin(only),
-        [.., last] => last.ends_with('k') && is_kelvin(last),
-        [] => false,
-    };
-    let of_quantity = of_temperature || words(&lower).any(is_quantity);
-    RELATIVE.contains(&inner.to_lowercase().as_str())
-        || (inner.contains(['/', '^', '*']) && words(inner).any(is_symbol))
-        || inner.split_whitespace().any(is_power)
-        || (of_quantity && words(&inner.to_lowercase()).any(|word| PLAIN.split(' ').all(|plain| plain != word)))
-}
-
-/// A unit of power at the end of a name without brackets: `radiance W/m2/sr/nm`.
-pub(super) fn spectral_power_at_end(text: &str) -> Option<Measure> {
-    let starts = text.char_indices().filter(|(_, c)| c.is_whitespace()).map(|(i, c)| i + c.len_utf8());
-    starts
-        .filter_map(|start| parse(&text[start..]))
-        .find(|measure| measure.powers[WATT] == 1 && measure.powers[METRE] < 0)
-}
-
-/// The unit of spectral power that a sentence has in brackets or among its words, the longest run first.
-pub(super) fn spectral_power_within(text: &str) -> Option<Measure> {
-    /// `mW / ( m2 sr cm-1 )` has as many.
-    const MOST_WORDS: usize = 8;
-    let words: Vec<&str> = text.split_whitespace().collect();
-    let strip = |run: &str| run.trim_matches([',', ';', ':', '.', '"', '=']).to_owned();
-    for length in (1..=words.len().min(MOST_WORDS)).rev() {
-        for run in words.windows(length) {
-            let run = strip(&run.join(" "));
-            let inner = bracketed(&run).filter(|_| run.ends_with([')', ']'])).unwrap_or("");
-            let found = [run.as_str(), inner].into_iter().filter_map(parse).find(|measure| measure.is_spectral_power());
-            if found.is_some() {
-                return found;
-            }
-        }
-    }
-    None
-}
-
-/// Whether the words of a name spell a unit of power in no way that could be read: `L_mW_m2_sr_nm`.
-pub(super) fn spells_power(text: &str) -> bool {
-    let all: Vec<&str> = words(text).collect();
-    let any = |of: &[&str]| all.iter().any(|word| of.contains(word));
-    any(&["W", "mW", "uW"]) && any(&["m2", "cm2", "sr", "nm", "um"])
-}
-
 /// One form for the many ways to write the same characters: superscripts, minus signs, dots, µ and Å, LaTeX.
 pub(super) fn plain(text: &str) -> String {
     let mut text = text.trim().to_owned();
@@ -141,7 +64,15 @@ pub(super) fn plain(text: &str) -> String {
         }
         superscript = false;
         match c {
-            '\u{2212}' | '\u{2013}' | '\u{2010}' | '\u{2011}' | '\u{fe63}' | '\u{ff0d}' => out.push('-'),
+            '\u{2212}' | '\u{2013}' | '\u{2010}' | '\u{2011}' | '\u{fe63}' | '\u{ff0d}' | '\u{af}' => out.push('-'),
+            // Letters, brackets and marks in the width of Chinese ones.
+            '\u{ff01}'..='\u{ff5e}' => out.extend(char::from_u32(c as u32 - 0xfee0)),
+            '\u{3000}' => out.push(' '),
+            // A unit in one character of that width.
+            '\u{339a}' => out.push_str("nm"),
+            '\u{339b}' => out.push_str("um"),
+            '\u{339c}' => out.push_str("mm"),
+            '\u{339d}' => out.push_str("cm"),
             '\u{b7}' | '\u{22c5}' | '\u{2022}' | '\u{d7}' => out.push('*'),
             '\u{b5}' | '\u{3bc}' => out.push('u'),
             '\u{212b}' => out.push('\u{c5}'),
@@ -152,30 +83,9 @@ pub(super) fn plain(text: &str) -> String {
         }
     }
     // A ring put on A by a character of its own.
-    out.replace("A\u{30a}", "\u{c5}").replace("**", "^")
-}
-
-/// What stands in the last pair of brackets; brackets within belong to the unit.
-pub(super) fn bracketed(text: &str) -> Option<&str> {
-    let end = text.rfind([')', ']'])?;
-    let (open, close) = if text[end..].starts_with(')') { ('(', ')') } else { ('[', ']') };
-    let mut depth = 0;
-    for (i, c) in text[..=end].char_indices().rev() {
-        if c == close {
-            depth += 1;
-        } else if c == open {
-            depth -= 1;
-            // What follows a letter or a slash at once is a part of a unit: W/(m2 sr).
-            if depth == 0 && !text[..i].ends_with(['/', '*', '^']) {
-                return Some(&text[i + 1..end]);
-            }
-        }
-    }
-    None
-}
-
-pub(super) fn is_about_the_medium(text: &str) -> bool {
-    ["air", "vac", "vacuum"].contains(&text.trim().to_lowercase().as_str())
+    let out = out.replace("A\u{30a}", "\u{c5}").replace("**", "^");
+    // pint's powers: `meter ** 2`.
+    out.replace(" ^ ", "^")
 }
 
 /// A unit: products and quotients of symbols or names with powers. `None` where any part of it is not understood.
@@ -218,6 +128,12 @@ fn tokens(text: &str) -> Option<Vec<Token>> {
             ')' | ']' => {
                 tokens.push(Token::Close);
                 i += 1;
+            }
+            // W/m2-sr-um
+            '-' if (after_name || matches!(tokens.last(), Some(Token::Power(_))))
+                && next.is_some_and(char::is_alphabetic) =>
+            {
+                i += 1
             }
             '*' => {
                 tokens.push(Token::Times);
@@ -378,7 +294,7 @@ fn product(tokens: &[Token], at: &mut usize, depth: usize) -> Option<Measure> {
 }
 
 /// A unit by symbol, with an SI prefix, or by name.
-fn symbol(name: &str) -> Option<Measure> {
+pub(super) fn symbol(name: &str) -> Option<Measure> {
     let lower = name.to_lowercase();
     // Spellings by their whole name first.
     if let Some(whole) = spelt_out(&lower) {
@@ -443,7 +359,7 @@ fn symbol(name: &str) -> Option<Measure> {
 /// A unit that is spelt in no other way, in small letters.
 fn spelt_out(lower: &str) -> Option<Measure> {
     Some(match lower {
-        "%" | "percent" | "pct" | "perc" => Measure { factor: 0.01, ..Measure::ONE },
+        "%" | "percent" | "percentage" | "pct" | "perc" => Measure { factor: 0.01, ..Measure::ONE },
         "\u{2030}" | "permille" | "promille" => Measure { factor: 1e-3, ..Measure::ONE },
         "ppm" | "ppmv" => Measure { factor: 1e-6, ..Measure::ONE },
         "ppb" | "ppbv" => Measure { factor: 1e-9, ..Measure::ONE },

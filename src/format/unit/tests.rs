@@ -2,6 +2,8 @@
 
 use super::*;
 
+mod outside;
+
 #[test]
 fn axes_in_every_spelling() {
     for (headers, unit) in [
@@ -137,6 +139,7 @@ fn units_of_values() {
         ("W\u{b7}m\u{207b}\u{b2}\u{b7}sr\u{207b}\u{b9}\u{b7}nm\u{207b}\u{b9}", 1.0),
         ("W m**-2 sr**-1 um**-1", 1e-3),
         ("mW m-2 sr-1 nm-1", 1e-3),
+        ("milliwatt / meter ** 2 / nanometer / steradian", 1e-3),
         ("uW/cm^2/sr/nm", 1e-2),
         ("\u{b5}W cm-2 nm-1 sr-1", 1e-2),
         ("uW/(cm^2 nm sr)", 1e-2),
@@ -297,7 +300,7 @@ fn units_in_names_of_columns() {
         ("K/S", Meaning::Logarithm),
         ("F(R)", Meaning::Logarithm),
         ("radiance (bananas)", Meaning::Unknown),
-        ("reflectance (0-100)", Meaning::Unknown),
+        ("reflectance (0-255)", Meaning::Unknown),
         ("300 (cm-1 bananas)", Meaning::Unknown),
         ("300 K (bananas)", Meaning::Unknown),
         ("kappa_300K (bananas)", Meaning::Unknown),
@@ -306,7 +309,7 @@ fn units_in_names_of_columns() {
         ("clay 10 percent", Meaning::Unknown),
         ("radiance (W/m2/sr/furlong)", Meaning::Unknown),
         ("radiance (a.u.)", Meaning::Unknown),
-        ("L_mW_m2_sr_nm", Meaning::Unknown),
+        ("L_mW_furlong_nm", Meaning::Unknown),
         ("reflectance x 10000", Meaning::Factor),
         ("R (x1e4)", Meaning::Factor),
         ("R*100", Meaning::Factor),

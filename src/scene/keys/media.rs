@@ -236,6 +236,7 @@ grid = "d.zarr"
             that `transform` carries it along: its first number is at the least x, y and z, and the last index runs \
             along x. A voxel has one value throughout. Where the grids of one medium differ in shape, their voxels are divided until they do not, which must not take more than 134,217,728.\n\nDimensions called z, \
             y and x may have any order, and coordinates that descend turn an array round; uneven ones are an error. \
-            `units` of a temperature are K, or °C, which is converted; a density has none. Negative values down to -1 % \
+            `units` of a temperature are K, or °C, which is converted; where there are none, a name may say it (`long_name` = \
+            `Temperature (C)`). A density has none, and one that is called a temperature, a logarithm, an error or flags is an error. Negative values down to -1 % \
             of the peak become 0. The last two are told of. [Environment maps](#environment-maps) says what of Zarr is read.",
 };

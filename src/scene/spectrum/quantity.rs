@@ -87,14 +87,17 @@ impl Quantity {
             Quantity::Absorptance => matches!(said, Said::Absorptance | Said::Absorption | Said::Emissivity),
             Quantity::Emissivity => matches!(said, Said::Emissivity | Said::Absorptance),
             // Files of filters and of windows before a detector are taken for what it counts.
-            Quantity::Efficiency => matches!(said, Said::Transmittance | Said::Absorptance | Said::Absorption),
+            Quantity::Efficiency => {
+                matches!(said, Said::Efficiency | Said::Transmittance | Said::Absorptance | Said::Absorption)
+            }
             Quantity::Radiance => said == Said::Radiance,
             Quantity::Irradiance => said == Said::Irradiance,
             Quantity::Intensity => false,
-            Quantity::Absorption => said == Said::Absorption,
+            // Of a gas that does not scatter they are one.
+            Quantity::Absorption => matches!(said, Said::Absorption | Said::Attenuation),
             Quantity::Scattering => said == Said::Scattering,
             Quantity::Index | Quantity::CoatIndex => said == Said::Index,
-            Quantity::Extinction => matches!(said, Said::Extinction | Said::Kay),
+            Quantity::Extinction => matches!(said, Said::Extinction | Said::Kay | Said::Attenuation),
             Quantity::Asymmetry => false,
         }
     }
