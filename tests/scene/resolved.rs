@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 use spectile::scene::{self, Bsdf, Evaluator, Filter, Projection, Reflectance, Sampler, Shape, Sides, Wavelengths};
 use spectile::spectral::{Curve, Outside};
 
-use super::{BASE, changed, good};
+use super::{BASE, changed, good, parse_with};
 
 #[track_caller]
 fn near(a: DVec3, b: [f64; 3]) {
