@@ -5,6 +5,7 @@ mod media;
 mod mitsuba;
 mod numbers;
 mod pbrt;
+mod round_trip;
 mod spoilt;
 
 use std::path::{Path, PathBuf};

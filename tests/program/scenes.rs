@@ -44,7 +44,7 @@ fn files(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// A copy of `scenes/`, with everything that is made, made anew.
-fn made() -> &'static Path {
+pub fn made() -> &'static Path {
     static COPY: OnceLock<TempDir> = OnceLock::new();
     COPY.get_or_init(|| {
         let copy = TempDir::new().expect("a folder");

@@ -37,7 +37,7 @@ fn full() -> Scene {
         Bsdf::Conductor { eta: 1, k: 2, roughness: Roughness::Constant([0.1, 0.3]), energy_compensation: true },
         Bsdf::Dielectric { eta: 3, dispersion: true, roughness: Roughness::even(0.15) },
         Bsdf::Plastic { reflectance: spectrum, eta: 2, roughness: Roughness::even(0.35) },
-        Bsdf::Plastic { reflectance: texel, eta: 2, roughness: Roughness::Texture(1) },
+        Bsdf::Plastic { reflectance: texel, eta: 2, roughness: Roughness::even(0.45) },
         Bsdf::Blend { a: 0, b: 3, weight: Weight::Constant(0.65) },
         Bsdf::Blend { a: 1, b: 2, weight: Weight::Texture(2) },
         Bsdf::Black,
@@ -194,6 +194,24 @@ fn digests_are_those_of_earlier_versions() {
         let mut scene = full();
         change(&mut scene);
         assert_eq!(digest(&scene), expected, "case {number}");
+    }
+}
+
+#[test]
+fn a_textured_roughness_counts() {
+    let with = |material: usize, texture: usize| {
+        let mut scene = full();
+        let (Bsdf::Conductor { roughness, .. } | Bsdf::Dielectric { roughness, .. } | Bsdf::Plastic { roughness, .. }) =
+            &mut scene.materials[material].bsdf
+        else {
+            panic!("one of these")
+        };
+        *roughness = Roughness::Texture(texture);
+        digest(&scene)
+    };
+    for material in [2, 3, 5] {
+        let found = [with(material, 1), with(material, 2), digest(&full())];
+        assert!(found[0] != found[1] && found[1] != found[2] && found[0] != found[2], "material {material}");
     }
 }
 
