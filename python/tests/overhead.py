@@ -6,7 +6,7 @@
 SPECTILE is the program of the same build as the package in FOLDER. Whole processes are measured: processor time of all cores, wall time,
 the most memory that they held; and how long `import spectile` takes. Over the program is what is left of the package when what a Python that has
 imported numpy, xarray and zarr takes has been taken away, by rounds, which are three processes one after the other: medians, and how far
-those are known (the standard deviation of the median of rounds drawn again). What is over has a part that every process pays once, and one that goes
+those are known (the standard deviation of the median of rounds drawn again). What is over has a part that every process pays once, and one that
 goes with the work: the thread of Python that waits for a render, whose time is known to a millisecond whatever else runs.
 """
 
