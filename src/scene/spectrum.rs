@@ -466,7 +466,8 @@ impl<'a> Spectra<'a> {
         if let (Some(instead), None) = (instead, source.outside) {
             let (first, last) = (nm[0], nm[nm.len() - 1]);
             let noun = quantity.noun();
-            if self.meets_no_channel(first, last) {
+            // Databases of indices say their unit, and have pages for other parts of the spectrum.
+            if self.meets_no_channel(first, last) && !quantity.is_optical_constant() {
                 user.error_help(
                     format!("spectrum `{name}` ({noun}) lies at {first} to {last} nm, beside all channels"),
                     "say its unit, such as unit = \"um\"; or, if what is beyond its ends is meant, outside = \"hold\" or \"zero\"",

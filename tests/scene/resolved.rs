@@ -258,6 +258,9 @@ fn warnings_are_said_once_and_name_the_interval() {
     let error = parse_with(BASE, &[], &[beside]).expect_err("beside all channels").to_string();
     assert!(error.contains("`grey` (a reflectance) lies at 0.4 to 0.7 nm, beside all channels"), "{error}");
     assert!(error.contains("unit = \"um\""), "{error}");
+    let glass = ("materials.white", "{ dielectric = { eta = { samples = [[5000, 1.4], [9000, 1.3]] } } }");
+    let warnings = good(BASE, &[], &[glass]).warnings;
+    assert!(warnings[0].contains("(an index of refraction) does not cover 400-700 nm"), "{warnings:?}");
     let held = ("spectra.grey", "{ samples = [[0.4, 0.1], [0.7, 0.8]], outside = \"hold\" }");
     assert_eq!(good(BASE, &[], &[held]).warnings, Vec::<String>::new());
     let unused = ("spectra.other", "{ samples = [[450, 0.1], [650, 0.8]] }");
