@@ -3,6 +3,7 @@
 pub mod asd;
 pub mod columns;
 pub mod csv_table;
+pub mod edges;
 pub mod envi;
 pub mod gltf;
 pub mod image;

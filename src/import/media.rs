@@ -1,6 +1,5 @@
 //! What fills shapes: the same matter all over.
 
-use std::collections::HashMap;
 use std::ops::RangeInclusive;
 
 use glam::DVec3;
@@ -10,7 +9,7 @@ use super::report::Place;
 use super::scene::{Scene, Section};
 use super::text;
 use crate::Result;
-use crate::format::mesh;
+use crate::format::{edges, mesh};
 use crate::spectral::Curve;
 
 /// Coefficients per unit of length, and where scattered light goes.
@@ -95,7 +94,7 @@ pub fn fill(scene: &mut Scene, object: &mut Section, medium: &str, boundary: Bou
     true
 }
 
-/// Whether a shape has an inside, as scenes ask for it: of a mesh, whether every edge runs as often in one direction as in the other.
+/// Whether a shape has an inside, as scenes ask for it.
 fn is_closed(scene: &Scene, object: &Section) -> bool {
     let of = |key: &str| object.entries.iter().find(|(name, _)| name == key).map(|(_, value)| value);
     if of("sphere").or(of("cube")).is_some() {
@@ -105,20 +104,11 @@ fn is_closed(scene: &Scene, object: &Section) -> bool {
     let path = scene.path_of(written.trim_matches('"'));
     let read = mesh::content(&path).and_then(|bytes| mesh::parse(mesh::Format::of(&path, &bytes), &bytes, &path));
     let Ok(read) = read else { return false };
-    let mut balance: HashMap<[[u64; 3]; 2], i32> = HashMap::new();
+    let (mut positions, mut triangles) = (Vec::new(), Vec::new());
     for part in &read.parts {
-        for triangle in &part.triangles {
-            // 0 and -0 are one place.
-            let at = |i: u32| DVec3::from_array(part.positions[i as usize]).to_array().map(|x| (x + 0.0).to_bits());
-            let corners = triangle.map(at);
-            for i in 0..3 {
-                let (a, b) = (corners[i], corners[(i + 1) % 3]);
-                if a != b {
-                    let (key, step) = if a < b { ([a, b], 1) } else { ([b, a], -1) };
-                    *balance.entry(key).or_insert(0) += step;
-                }
-            }
-        }
+        let first = positions.len() as u32;
+        positions.extend(part.positions.iter().copied().map(DVec3::from_array));
+        triangles.extend(part.triangles.iter().map(|triangle| triangle.map(|corner| first + corner)));
     }
-    balance.into_values().all(|times| times == 0)
+    edges::open(&positions, &triangles).is_empty()
 }

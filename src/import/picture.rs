@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
+use super::report::Place;
 use super::scene::Scene;
 use super::text;
 use crate::error::Problem;
@@ -311,11 +312,12 @@ pub enum Numbers {
 }
 
 impl Texture {
-    /// `value` of each texel's `number`; where the channels are shares of two spectra, of the number that they are at 550 nm. `name` is for
-    /// the file that it needs.
+    /// `value` of each texel's `number` within [0, 1], of `what`; where the channels are shares of two spectra, of the number that they are at
+    /// 550 nm. `name` is for the file that it needs, `at` where it is asked for.
     pub fn numbers(
         &self,
         scene: &mut Scene,
+        (what, at): (&str, Place),
         name: &str,
         number: &dyn Fn([f32; 3]) -> f64,
         value: &dyn Fn(f64) -> f64,
@@ -327,29 +329,38 @@ impl Texture {
         };
         // Shares are as they are written.
         let picture = if ends.is_some() { self.picture.clone().raw() } else { self.picture.clone() };
-        let values: Vec<f32> = picture.linear().into_iter().map(|rgb| value(of_texel(rgb)) as f32).collect();
+        let numbers: Vec<f64> = picture.linear().into_iter().map(of_texel).collect();
+        if numbers.iter().any(|number| !(0.0..=1.0).contains(number)) {
+            scene.report.approximated(at, format!("{what} of a texture outside of 0 to 1, which are clipped to that"));
+        }
+        let values: Vec<f32> = numbers.into_iter().map(|number| value(number.clamp(0.0, 1.0)) as f32).collect();
         if let [first, rest @ ..] = &values[..]
             && rest.iter().all(|value| value == first)
         {
             return Ok(Numbers::One(f64::from(*first)));
         }
         let mean = values.iter().map(|value| f64::from(*value)).sum::<f64>() / values.len().max(1) as f64;
+        Ok(Numbers::Texture(self.greys(scene, name, values)?, mean))
+    }
+
+    /// The text of a texture like this one with a number for each texel.
+    pub fn greys(&self, scene: &mut Scene, name: &str, values: Vec<f32>) -> Result<String> {
         let texels = Texels::Floats(values.into_iter().map(|value| [value; 3]).collect());
         let picture = Picture { size: self.picture.size, texels };
-        let texture = Texture { picture, name: format!("{name}.exr"), endmembers: None, file: None, ..self.clone() };
-        Ok(Numbers::Texture(texture.toml(scene, "")?, mean))
+        Texture { picture, name: format!("{name}.exr"), endmembers: None, file: None, ..self.clone() }.toml(scene, "")
     }
 
     /// The roughness that the texels say, by `alpha` of each one's `number`.
     pub fn rough(
         &self,
         scene: &mut Scene,
+        said: (&str, Place),
         name: &str,
         number: &dyn Fn([f32; 3]) -> f64,
         alpha: &dyn Fn(f64) -> f64,
     ) -> Result<Rough> {
         let name = format!("{name}-roughness");
-        let found = self.numbers(scene, &name, number, &|v| alpha(v).clamp(LEAST_ROUGH, 1.0))?;
+        let found = self.numbers(scene, said, &name, number, &|v| alpha(v).max(LEAST_ROUGH))?;
         Ok(match found {
             Numbers::One(alpha) => Rough::Pair([alpha; 2]),
             Numbers::Texture(text, mean) => Rough::Texture(text, mean),

@@ -95,8 +95,8 @@ pub struct Scene {
     /// Where files go.
     folder: PathBuf,
     materials_named: HashSet<String>,
-    /// Names of those by [`Scene::with_opacity`], by their place.
-    masked: HashMap<usize, String>,
+    /// Names of those by [`Scene::with_opacity`], by what it was asked.
+    masked: HashMap<(String, String), String>,
     files: HashSet<String>,
     spectra: HashMap<String, String>,
     copied: HashMap<PathBuf, String>,
@@ -131,21 +131,19 @@ impl Scene {
 
     /// The name of a material like `name` of which a share is there; `None` where it has an opacity already.
     pub fn with_opacity(&mut self, name: &str, opacity: &str) -> Option<String> {
+        let key = (name.to_owned(), opacity.to_owned());
+        if let Some(known) = self.masked.get(&key) {
+            return Some(known.clone());
+        }
         let begins = format!("[materials.{}.", text::key(name));
-        let is_of = |section: &&Section| section.header.starts_with(&begins);
-        let mut section = self.materials.iter().find(is_of)?.clone();
+        let mut section = self.materials.iter().find(|section| section.header.starts_with(&begins))?.clone();
         if section.entries.iter().any(|(key, _)| key == "opacity") {
             return None;
         }
         section.set("opacity", opacity);
-        let (_, kind) = section.header.rsplit_once('.')?;
-        let kind = kind.trim_end_matches(']').to_owned();
-        let masked = |other: &Section| other.entries == section.entries && other.header.ends_with(&format!(".{kind}]"));
-        if let Some(same) = self.materials.iter().position(masked) {
-            return self.masked.get(&same).cloned();
-        }
+        let kind = section.header[begins.len()..].trim_end_matches(']').to_owned();
         let masked = self.put(&format!("{name}-masked"), &kind, section);
-        self.masked.insert(self.materials.len() - 1, masked.clone());
+        self.masked.insert(key, masked.clone());
         Some(masked)
     }
 

@@ -1,10 +1,9 @@
 //! Which shapes have an inside.
 
-use std::collections::HashMap;
-
 use glam::DVec3;
 
 use super::{Mesh, Shape};
+use crate::format::edges;
 
 /// What keeps `shape` from having an inside, in words; `None` if it has one.
 pub fn opening(shape: &Shape) -> Option<String> {
@@ -23,29 +22,9 @@ pub fn opening(shape: &Shape) -> Option<String> {
     }
 }
 
-/// Edges that do not run once in each direction for every time they run in the other: a surface without them bounds
-/// a body, as far as every ray crosses it outward as often as inward. Corners at one point are one corner.
+/// The ends of [`edges::open`].
 fn open_edges(mesh: &Mesh) -> Vec<[DVec3; 2]> {
-    let mut corners: HashMap<[u64; 3], u32> = HashMap::new();
-    let mut welded = Vec::with_capacity(mesh.positions.len());
-    for position in &mesh.positions {
-        // 0 and -0 are one place.
-        let bits = position.to_array().map(|x| (x + 0.0).to_bits());
-        let next = corners.len() as u32;
-        welded.push(*corners.entry(bits).or_insert(next));
-    }
-    // Times forward less times backward, of edges from the lower corner to the higher.
-    let mut balance: HashMap<[u32; 2], (i32, [u32; 2])> = HashMap::new();
-    for triangle in &mesh.triangles {
-        for i in 0..3 {
-            let edge = [triangle[i], triangle[(i + 1) % 3]];
-            let [a, b] = edge.map(|corner| welded[corner as usize]);
-            let (key, step) = if a < b { ([a, b], 1) } else { ([b, a], -1) };
-            balance.entry(key).or_insert((0, edge)).0 += step;
-        }
-    }
-    let mut open: Vec<[u32; 2]> = balance.into_values().filter(|(n, _)| *n != 0).map(|(_, edge)| edge).collect();
-    open.sort_unstable();
+    let open = edges::open(&mesh.positions, &mesh.triangles);
     open.into_iter().map(|edge| edge.map(|corner| mesh.positions[corner as usize])).collect()
 }
 

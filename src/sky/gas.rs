@@ -28,18 +28,29 @@ pub fn wavelengths() -> impl Iterator<Item = f64> {
     table().iter().map(|row| row[0])
 }
 
+/// What `of` makes of the rows around `nm`, which is in the first column, on the line between both.
+pub(super) fn between<const N: usize, const M: usize>(
+    rows: &[[f64; N]],
+    nm: f64,
+    of: impl Fn([f64; N]) -> [f64; M],
+) -> [f64; M] {
+    let i = rows.partition_point(|row| row[0] <= nm).clamp(1, rows.len() - 1);
+    let t = (nm - rows[i - 1][0]) / (rows[i][0] - rows[i - 1][0]);
+    let [below, above] = [of(rows[i - 1]), of(rows[i])];
+    std::array::from_fn(|column| below[column] + t * (above[column] - below[column]))
+}
+
+/// The vertical depth of a band, (C U)^a for `amount` over that for which `depth` holds, such that a way of `air_mass` has its transmittance.
+pub(super) fn on_the_way(depth: f64, amount: f64, power: f64, air_mass: f64) -> f64 {
+    if amount > 0.0 { depth * (amount * air_mass).powf(power) / air_mass } else { 0.0 }
+}
+
 /// Vertical depths of water, ozone and the mixed gases at `nm`, for columns of `water` (cm) and `ozone` (Dobson units) and light that
 /// comes through `air_mass` atmospheres.
 pub fn depths(nm: f64, water: f64, ozone: f64, air_mass: f64) -> [f64; 3] {
-    let rows = table();
-    let i = rows.partition_point(|row| row[0] <= nm).clamp(1, rows.len() - 1);
-    let t = (nm - rows[i - 1][0]) / (rows[i][0] - rows[i - 1][0]);
     let [wetter, richer] = [water / Profile::standard().water(), ozone / Profile::standard().ozone()];
-    let of = |[_, lines, power, continuum, ozone, mixed, mixed_power]: [f64; 7]| {
-        let on_the_way = |depth: f64, amount: f64, power: f64| depth * (amount * air_mass).powf(power) / air_mass;
-        let lines = if wetter > 0.0 { on_the_way(lines, wetter, power) } else { 0.0 };
-        [lines + wetter * continuum, richer * ozone, on_the_way(mixed, 1.0, mixed_power)]
-    };
-    let [below, above] = [of(rows[i - 1]), of(rows[i])];
-    std::array::from_fn(|gas| below[gas] + t * (above[gas] - below[gas]))
+    between(table(), nm, |[_, lines, power, continuum, ozone, mixed, mixed_power]| {
+        let lines = on_the_way(lines, wetter, power, air_mass);
+        [lines + wetter * continuum, richer * ozone, on_the_way(mixed, 1.0, mixed_power, air_mass)]
+    })
 }

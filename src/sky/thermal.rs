@@ -8,6 +8,7 @@
 use std::sync::OnceLock;
 
 use super::air::{Layers, Profile, Step};
+use super::gas::{between, on_the_way};
 use crate::spectral::columns;
 
 /// nm; depth and exponent of water; depths of its continua, by itself and by air; depth and exponent of ozone and of the gases that are mixed
@@ -76,15 +77,9 @@ pub fn wavelengths() -> impl Iterator<Item = f64> {
 /// Vertical depths of [`Gas::ALL`] at `nm`, for columns of `water` (cm) and `ozone` (Dobson units) and light that comes through `air_mass`
 /// atmospheres.
 pub fn depths(nm: f64, water: f64, ozone: f64, air_mass: f64) -> [f64; 6] {
-    let rows = table();
-    let i = rows.partition_point(|row| row[0] <= nm).clamp(1, rows.len() - 1);
-    let t = (nm - rows[i - 1][0]) / (rows[i][0] - rows[i - 1][0]);
     let [wetter, richer] = [water / Profile::standard().water(), ozone / Profile::standard().ozone()];
-    let of = |[_, water, of_water, own, foreign, ozone, of_ozone, mixed, of_mixed, share]: [f64; 10]| {
-        let on_the_way = |depth: f64, amount: f64, power: f64| match amount > 0.0 {
-            true => depth * (amount * air_mass).powf(power) / air_mass,
-            false => 0.0,
-        };
+    between(table(), nm, |[_, water, of_water, own, foreign, ozone, of_ozone, mixed, of_mixed, share]| {
+        let on_the_way = |depth, amount, power| on_the_way(depth, amount, power, air_mass);
         let mixed = on_the_way(mixed, 1.0, of_mixed);
         [
             on_the_way(water, wetter, of_water),
@@ -94,7 +89,5 @@ pub fn depths(nm: f64, water: f64, ozone: f64, air_mass: f64) -> [f64; 6] {
             (1.0 - share) * mixed,
             share * mixed,
         ]
-    };
-    let [below, above] = [of(rows[i - 1]), of(rows[i])];
-    std::array::from_fn(|gas| below[gas] + t * (above[gas] - below[gas]))
+    })
 }

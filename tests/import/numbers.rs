@@ -89,6 +89,7 @@ Shape "sphere" "texture alpha" "fields"
     assert!(halves(texels(weight)), "{:?}", texels(weight));
     let Some(Weight::Texture(mask)) = materials[1].opacity else { panic!("{:?}", materials[1]) };
     assert!(halves(texels(mask)), "{:?}", texels(mask));
+    assert_eq!(mask, weight, "one picture is one file");
     assert_eq!((materials[2].opacity, materials[3].opacity), (Some(Weight::Constant(0.25)), None));
     let Some(Weight::Texture(fields)) = materials[4].opacity else { panic!("{:?}", materials[4]) };
     assert_eq!(texels(fields), [0.75, 0.25, 0.25, 0.75]);

@@ -11,8 +11,9 @@ pub const ROUGHNESS: Part = Part {
     name: "roughness by texture",
     used: |scene| scene.surfaces.as_ref().is_some_and(|surfaces| surfaces.varies()),
     effect: |scene| {
-        let tables = scene.surfaces.as_ref().map_or(0, |surfaces| surfaces.variants);
-        format!("{tables} lobes at roughnesses of their own")
+        let by_place = scene.surfaces.iter().flat_map(|surfaces| &surfaces.by_place);
+        let variants: u32 = by_place.map(|[.., variants]| variants).sum();
+        format!("{variants} lobes at roughnesses of their own")
     },
     is_planned: true,
     modules: &[
@@ -102,7 +103,6 @@ impl Surfaces {
         let ByPlace { texture, first, variants } = by_place;
         let at = if variants.is_empty() { NONE } else { self.lobes.len() as u32 };
         self.by_place.push([texture as u32, first, at, variants.len() as u32]);
-        self.variants += variants.len();
         self.shares.resize(self.shares.len() + variants.len(), Vec::new());
         self.lobes.extend(variants);
         (self.by_place.len() as u32 - 1) * size_of::<Words>() as u32 / 4

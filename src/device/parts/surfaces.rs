@@ -74,9 +74,8 @@ pub struct Surfaces {
     pub visible_place: Option<u32>,
     /// What blend textures leave of each lobe.
     pub(super) shares: Vec<Vec<Share>>,
-    /// Of lobes whose roughness is a texture; and how many lobes at roughnesses of their own these have.
+    /// Of lobes whose roughness is a texture.
     pub(super) by_place: Vec<roughness::Words>,
-    pub(super) variants: usize,
     /// Some surface carries texture coordinates, normals or axes; some of them shading normals.
     pub attributes: bool,
     pub smooth: bool,

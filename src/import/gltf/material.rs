@@ -131,16 +131,7 @@ impl Importer<'_, '_> {
         let value = |rgb: &[f32; 3]| (f64::from(rgb[channel]) * factor).clamp(0.0, 1.0) as f32;
         let values: Vec<f32> = raw.linear().iter().map(value).collect();
         let mean = values.iter().map(|v| f64::from(*v)).sum::<f64>() / values.len().max(1) as f64;
-        Ok((self.numbers(found, values, name)?, mean))
-    }
-
-    fn numbers(&mut self, found: &Found, values: Vec<f32>, name: &str) -> Result<String> {
-        let picture = Picture {
-            size: found.texture.picture.size,
-            texels: Texels::Floats(values.iter().map(|v| [*v; 3]).collect()),
-        };
-        let texture = Texture { picture, name: format!("{name}.exr"), ..found.texture.clone() };
-        texture.toml(self.scene, "")
+        Ok((found.texture.greys(self.scene, name, values)?, mean))
     }
 
     fn made(&mut self, material: &Material, name: &str, path: &str) -> Result<Look> {
@@ -194,7 +185,8 @@ impl Importer<'_, '_> {
         let mut metal_weight = (text::rounded(metallic), metallic);
         if let Some(found) = &shares {
             let texture = Texture { picture: found.texture.picture.clone().raw(), ..found.texture.clone() };
-            rough = texture.rough(self.scene, name, &|rgb| f64::from(rgb[1]), &|v| (v * factor).powi(2))?;
+            let said = ("roughnesses", self.place(path));
+            rough = texture.rough(self.scene, said, name, &|rgb| f64::from(rgb[1]), &|v| (v * factor).powi(2))?;
             if metallic > 0.0 {
                 metal_weight = self.channel(found, 2, metallic, &format!("{name}-metal"))?;
             }
@@ -251,7 +243,7 @@ impl Importer<'_, '_> {
         match base.and_then(|found| found.alpha.as_ref().map(|values| (found, values))) {
             Some((found, values)) => {
                 let values = values.iter().map(|v| share(f64::from(*v) * alpha) as f32).collect();
-                Ok(Some(self.numbers(found, values, &format!("{name}-alpha"))?))
+                Ok(Some(found.texture.greys(self.scene, &format!("{name}-alpha"), values)?))
             }
             None => Ok(Some(text::rounded(share(alpha))).filter(|_| share(alpha) < 1.0)),
         }

@@ -219,12 +219,7 @@ impl<'n> Importer<'n, '_> {
         }
         plugin.boolean("sample_visible", true)?;
         if let Some(texture) = self.texture_of_numbers(plugin, "alpha", flip)? {
-            if texture.picture.linear().into_iter().any(|rgb| !(0.0..=1.0).contains(&grey(rgb))) {
-                self.scene
-                    .report
-                    .approximated(plugin.place(), "alphas of a texture outside of 0 to 1, which are clipped to that");
-            }
-            return texture.rough(self.scene, name, &grey, &|alpha| alpha).map(Some);
+            return texture.rough(self.scene, ("alphas", plugin.place()), name, &grey, &|alpha| alpha).map(Some);
         }
         let alpha = self.mean_number(plugin, "alpha", 0.1)?;
         let (u, v) = (self.mean_number(plugin, "alpha_u", alpha)?, self.mean_number(plugin, "alpha_v", alpha)?);

@@ -283,7 +283,7 @@ impl<'n> Importer<'n, '_> {
                 // The luminance of what is a colour.
                 let luminance = |[r, g, b]: [f32; 3]| f64::from(0.2126 * r + 0.7152 * g + 0.0722 * b);
                 let stem = texture.name.split('.').next().unwrap_or_default();
-                Ok(match texture.numbers(self.scene, stem, &luminance, &|share| share.clamp(0.0, 1.0))? {
+                Ok(match texture.numbers(self.scene, ("shares", place(node)), stem, &luminance, &|share| share)? {
                     Numbers::One(share) => text::rounded(share),
                     Numbers::Texture(text, _) => text,
                 })

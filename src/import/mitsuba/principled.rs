@@ -49,7 +49,8 @@ pub fn principled<'n>(
     };
     let (metallic, glass) = (share("metallic", 0.0)?, share("spec_trans", 0.0)?);
     let rough = match importer.texture_of_numbers(plugin, "roughness", flip)? {
-        Some(texture) => texture.rough(importer.scene, name, &grey, &|roughness| roughness.clamp(0.0, 1.0).powi(2))?,
+        Some(texture) => texture
+            .rough(importer.scene, ("roughnesses", plugin.place()), name, &grey, &|roughness| roughness * roughness)?,
         None => {
             let roughness = importer.mean_number(plugin, "roughness", 0.5)?;
             let place = plugin.place();

@@ -1,5 +1,7 @@
 //! Materials of pbrt.
 
+use std::rc::Rc;
+
 use super::colour::Of;
 use super::token::{At, Parameter, Parameters, shown};
 use super::{Importer, Look};
@@ -111,17 +113,12 @@ impl Importer<'_> {
     /// GGX's alpha along u and v, or by a texture. Unless it is told not to, pbrt takes the square root of what is written.
     fn roughness(&mut self, name: &str, prefix: &str, parameters: &Parameters, at: &At) -> Result<Rough> {
         let remap = parameters.boolean("remaproughness", true)?;
-        let alpha = |roughness: f64| if remap { roughness.max(0.0).sqrt() } else { roughness };
+        let alpha = |roughness: f64| if remap { roughness.sqrt() } else { roughness };
         let [both, u, v] = ["roughness", "uroughness", "vroughness"].map(|key| format!("{prefix}{key}"));
         if let (Some(parameter), None, None) = (parameters.get(&both), parameters.get(&u), parameters.get(&v))
             && let Colour::Texture(texture) = self.colour_of(parameter, Of::Index)?
         {
-            if texture.picture.linear().into_iter().any(|rgb| !(0.0..=1.0).contains(&grey(rgb))) {
-                self.scene
-                    .report
-                    .approximated(at.place(), "roughnesses of a texture outside of 0 to 1, which are clipped to that");
-            }
-            return texture.rough(self.scene, name, &grey, &alpha);
+            return texture.rough(self.scene, ("roughnesses", at.place()), name, &grey, &alpha);
         }
         let both = self.mean_number(parameters, &both)?.unwrap_or(0.0);
         let pair =
@@ -178,16 +175,27 @@ impl Importer<'_> {
         Ok(Look::Material { name: self.scene.put(name, "conductor", section), textured })
     }
 
-    /// A share in [0, 1], as text of the scene, and whether it is a texture.
-    pub fn share(&mut self, parameter: &Parameter, name: &str) -> Result<(String, bool)> {
-        let share = |value: f64| value.clamp(0.0, 1.0);
-        Ok(match self.colour_of(parameter, Of::Index)? {
-            Colour::Spectrum(curve, _) => (text::rounded(share(curve.eval(550.0))), false),
-            Colour::Texture(texture) => match texture.numbers(self.scene, name, &grey, &share)? {
-                Numbers::One(value) => (text::rounded(value), false),
-                Numbers::Texture(text, _) => (text, true),
-            },
-        })
+    /// A share in [0, 1], as text of the scene, and whether it is a texture: of one that many shapes have, a file.
+    pub fn share(&mut self, parameter: &Parameter) -> Result<(String, bool)> {
+        let at = parameter.at.place();
+        let texture = match self.colour_of(parameter, Of::Index)? {
+            Colour::Texture(texture) => texture,
+            Colour::Spectrum(curve, _) => {
+                let what = format!("`{}`", shown(&parameter.name));
+                let share = self.scene.report.within(at, &what, curve.eval(550.0), [0.0, 1.0]);
+                return Ok((text::rounded(share), false));
+            }
+        };
+        if let Some((_, known)) = self.shares.iter().find(|(of, _)| Rc::ptr_eq(of, &texture)) {
+            return Ok(known.clone());
+        }
+        let name = format!("{}-share", texture.name.split('.').next().unwrap_or_default());
+        let made = match texture.numbers(self.scene, ("shares", at), &name, &grey, &|share| share)? {
+            Numbers::One(value) => (text::rounded(value), false),
+            Numbers::Texture(text, _) => (text, true),
+        };
+        self.shares.push((texture, made.clone()));
+        Ok(made)
     }
 
     /// A material of which only a share is there.
@@ -216,7 +224,7 @@ impl Importer<'_> {
         };
         let (a, b) = (look(a)?, look(b)?);
         let (weight, mut textured) = match parameters.get("amount") {
-            Some(amount) => self.share(amount, &format!("{name}-amount"))?,
+            Some(amount) => self.share(amount)?,
             None => ("0.5".to_owned(), false),
         };
         let (Look::Material { name: first, textured: x }, Look::Material { name: second, textured: y }) = (&a, &b)

@@ -10,6 +10,7 @@ mod token;
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 use glam::{DAffine3, DMat3, DVec3};
 
@@ -18,7 +19,7 @@ use self::token::{At, Parameters, Token, Tokens, shown};
 use super::MOST_BOUNCES;
 use super::geometry::similarity;
 use super::media::{self, Boundary};
-use super::picture::Colour;
+use super::picture::{Colour, Texture};
 use super::scene::{Scene, Section};
 use super::text;
 use crate::error::Problem;
@@ -84,6 +85,8 @@ pub struct Importer<'s> {
     pub scene: &'s mut Scene,
     pub textures: HashMap<String, Colour>,
     pub named: HashMap<String, Look>,
+    /// What pictures of shares became.
+    pub shares: Vec<(Rc<Texture>, (String, bool))>,
     /// `None` for those that are left out, which has been said.
     pub media: HashMap<String, Option<String>>,
     state: State,
@@ -116,6 +119,7 @@ pub fn read(source: &Path, scene: &mut Scene) -> Result<()> {
         scene,
         textures: HashMap::new(),
         named: HashMap::new(),
+        shares: Vec::new(),
         media: HashMap::new(),
         state,
         saved: Vec::new(),
@@ -469,7 +473,7 @@ impl Importer<'_> {
             None => None,
         };
         let alpha = match parameters.get("alpha") {
-            Some(alpha) => Some(self.share(alpha, &format!("alpha-{}", at.line))?).filter(|(share, _)| share != "1.0"),
+            Some(alpha) => Some(self.share(alpha)?).filter(|(share, _)| share != "1.0"),
             None => None,
         };
         parameters.finish(&format!("the shape `{kind}`"), &mut self.scene.report);
