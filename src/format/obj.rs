@@ -6,6 +6,8 @@ use std::borrow::Cow;
 use std::io::{self, BufRead, Read};
 use std::path::Path;
 
+use smallvec::SmallVec;
+
 use super::mesh::{Flaws, Labels, Mesh, Part, Place};
 use crate::error::Problem;
 
@@ -336,11 +338,10 @@ impl<'a> Feeder<'a> {
 
     /// A fourth number is a weight; six are a position and a colour, of which only the position counts here.
     fn vertex(&mut self, rest: &str) {
-        self.current.push('v');
-        let keep = if rest.split_whitespace().nth(5).is_some() { 3 } else { usize::MAX };
-        for word in rest.split_whitespace().take(keep) {
-            self.current.push(' ');
-            self.current.push_str(word);
+        self.current.push_str("v ");
+        match rest.split_whitespace().nth(5) {
+            None => self.current.push_str(rest),
+            Some(_) => rest.split_whitespace().take(3).for_each(|word| self.current.extend([word, " "])),
         }
         self.current.push('\n');
     }
@@ -353,16 +354,19 @@ impl<'a> Feeder<'a> {
     }
 
     /// A face goes on with what all its corners have.
-    fn face(&mut self, rest: &str) -> Result<(), String> {
-        let corners = rest.split_whitespace().count();
-        if corners < 3 {
-            return Err(format!("a face needs at least 3 vertices, but has {corners}"));
+    fn face<'c>(&mut self, rest: &'c str) -> Result<(), String> {
+        let corner = |corner: &'c str| {
+            let mut words = corner.splitn(3, '/');
+            std::array::from_fn(|_| words.next().unwrap_or(""))
+        };
+        let corners: SmallVec<[[&str; 3]; 4]> = rest.split_whitespace().map(corner).collect();
+        if corners.len() < 3 {
+            return Err(format!("a face needs at least 3 vertices, but has {}", corners.len()));
         }
-        if corners > 3 {
+        if corners.len() > 3 {
             self.polygons.push(self.line);
         }
-        let all =
-            |place: usize| rest.split_whitespace().all(|c| c.split('/').nth(place).is_some_and(|w| !w.is_empty()));
+        let all = |place: usize| corners.iter().all(|corner| !corner[place].is_empty());
         let given = Given { uv: all(1), normals: all(2) };
         if self.labels_changed || self.given != given {
             (self.labels_changed, self.given) = (false, given);
@@ -370,13 +374,12 @@ impl<'a> Feeder<'a> {
             self.parts.push((self.labels.clone(), self.line, given));
         }
         self.current.push('f');
-        for corner in rest.split_whitespace() {
-            let mut words = corner.splitn(3, '/');
-            let mut word = || words.next().unwrap_or("");
-            let (v, vt, vn) = (word(), word(), word());
-            let vt = if given.uv || !vt.is_empty() && vt.parse::<isize>().is_err() { vt } else { "" };
-            let vn = if given.normals || !vn.is_empty() && vn.parse::<isize>().is_err() { vn } else { "" };
-            self.current.push_str(&format!(" {v}/{vt}/{vn}"));
+        for [v, vt, vn] in corners {
+            // What not all corners have is left out, but for mistakes, which tobj reports.
+            let kept = |word: &'c str, all: bool| {
+                if all || !word.is_empty() && word.parse::<isize>().is_err() { word } else { "" }
+            };
+            self.current.extend([" ", v, "/", kept(vt, given.uv), "/", kept(vn, given.normals)]);
         }
         self.current.push('\n');
         Ok(())

@@ -1,11 +1,14 @@
 //! Curves computed from other curves.
 
-use smallvec::SmallVec;
+use rayon::prelude::*;
+use smallvec::{SmallVec, smallvec};
 
 use super::{Channels, Curve, Outside};
 
 /// Bisections of an interval between nodes at most.
 const MAX_DEPTH: u32 = 14;
+/// Of its own peak, that a curve may be off by.
+const BOUND: f64 = 2e-5;
 
 impl Curve {
     /// The curve f(values of `curves`) within `channels`: piecewise linear, with nodes so close that it is off by at most
@@ -15,94 +18,127 @@ impl Curve {
             let nm = channels.bounds.first().map_or(550.0, |b| b[0]);
             return Curve::Constant(f(&curves.iter().map(|c| c.eval(nm)).collect::<Vec<_>>()));
         }
-        let at = |nm: f64| f(&curves.iter().map(|c| c.eval(nm)).collect::<SmallVec<[f64; 8]>>());
-        let mut nodes: Vec<f64> = channels.bounds.iter().flatten().copied().collect();
-        for curve in curves {
-            if let Curve::Linear { nm, .. } = curve {
-                for [from, to] in &channels.bounds {
-                    nodes.extend(&nm[nm.partition_point(|x| x < from)..nm.partition_point(|x| x <= to)]);
-                }
-            }
-        }
-        nodes.sort_by(f64::total_cmp);
-        nodes.dedup();
-        let peak = nodes.iter().map(|&nm| at(nm).abs()).fold(0.0, f64::max);
-        let (mut nm, mut value) = (Vec::new(), Vec::new());
-        for pair in nodes.windows(2) {
-            // Just inside, so that a step belongs to neither side.
-            let inside = (pair[1] - pair[0]) * 1e-9;
-            let (a, b) = ((pair[0], at(pair[0] + inside)), (pair[1], at(pair[1] - inside)));
-            push(&mut nm, &mut value, a);
-            bisect(&at, a, b, 2e-5 * peak, MAX_DEPTH, &mut |node| push(&mut nm, &mut value, node));
-            push(&mut nm, &mut value, b);
-        }
+        let points = points(curves, &channels.bounds, 1, &|_, values, out| out[0] = f(values));
+        let (nm, value) = points.into_iter().map(|(nm, values)| (nm, values[0])).unzip();
         Curve::Linear { nm, value, outside: Outside::Hold }
     }
-}
 
-impl Curve {
     /// As [`Curve::derived`] with the wavelength in nm as well, f(nm, values): from bound to bound of `channels`, each stretch by
     /// its own peak, so that the tail of Planck's law is as exact as its top.
-    pub fn derived_by_stretch(curves: &[&Curve], channels: &Channels, f: impl Fn(f64, &[f64]) -> f64) -> Curve {
+    pub fn derived_by_stretch(curves: &[&Curve], channels: &Channels, f: impl Fn(f64, &[f64]) -> f64 + Sync) -> Curve {
+        Curve::derived_rows(curves, channels, 1, |nm, values, out| out[0] = f(nm, values)).remove(0)
+    }
+
+    /// As [`Curve::derived_by_stretch`], `rows` curves at once, at nodes that they share: f(nm, values, out) writes them all.
+    pub fn derived_rows(
+        curves: &[&Curve],
+        channels: &Channels,
+        rows: usize,
+        f: impl Fn(f64, &[f64], &mut [f64]) + Sync,
+    ) -> Vec<Curve> {
         let mut edges: Vec<f64> = channels.bounds.iter().flatten().copied().collect();
         edges.sort_by(f64::total_cmp);
         edges.dedup();
-        let (mut nm, mut value) = (Vec::new(), Vec::new());
         let mut bounds = channels.bounds.clone();
         bounds.sort_by(|a, b| a[0].total_cmp(&b[0]));
         // How far the channels reach that begin here or before.
         let (mut next, mut reach) = (0, f64::NEG_INFINITY);
-        for edge in edges.windows(2) {
+        let within = |edge: &[f64]| {
             while let Some(&[_, to]) = bounds.get(next).filter(|bounds| bounds[0] <= edge[0]) {
                 (next, reach) = (next + 1, reach.max(to));
             }
-            if reach < edge[1] {
-                continue;
-            }
-            // The wavelength itself is one of the curves.
-            let wavelength = Curve::Linear { nm: edge.to_vec(), value: edge.to_vec(), outside: Outside::Hold };
-            let all: Vec<&Curve> = std::iter::once(&wavelength).chain(curves.iter().copied()).collect();
-            let stretch = Channels::from_bounds(vec![[edge[0], edge[1]]], None);
-            if let Curve::Linear { nm: x, value: y, .. } = Curve::derived(&all, &stretch, |v| f(v[0], &v[1..])) {
-                nm.extend(x);
-                value.extend(y);
+            (reach >= edge[1]).then(|| [edge[0], edge[1]])
+        };
+        let stretches: Vec<[f64; 2]> = edges.windows(2).filter_map(within).collect();
+        let of_stretches: Vec<Vec<Point>> =
+            stretches.par_iter().map(|&stretch| points(curves, &[stretch], rows, &f)).collect();
+        let nm: Vec<f64> = of_stretches.iter().flatten().map(|point| point.0).collect();
+        let curve = |row: usize| Curve::Linear {
+            nm: nm.clone(),
+            value: of_stretches.iter().flatten().map(|point| point.1[row]).collect(),
+            outside: Outside::Hold,
+        };
+        (0..rows).map(curve).collect()
+    }
+}
+
+/// A wavelength in nm, and what each row is there.
+type Point = (f64, SmallVec<[f64; 1]>);
+
+/// The points between which `rows` functions of `curves` are straight within `bounds`, each up to [`BOUND`] of its peak.
+fn points(curves: &[&Curve], bounds: &[[f64; 2]], rows: usize, f: &impl Fn(f64, &[f64], &mut [f64])) -> Vec<Point> {
+    let at = |nm: f64| -> Point {
+        let values: SmallVec<[f64; 8]> = curves.iter().map(|curve| curve.eval(nm)).collect();
+        let mut out = smallvec![0.0; rows];
+        f(nm, &values, &mut out);
+        (nm, out)
+    };
+    let mut nodes: Vec<f64> = bounds.iter().flatten().copied().collect();
+    for curve in curves {
+        if let Curve::Linear { nm, .. } = curve {
+            for [from, to] in bounds {
+                nodes.extend(&nm[nm.partition_point(|x| x < from)..nm.partition_point(|x| x <= to)]);
             }
         }
-        Curve::Linear { nm, value, outside: Outside::Hold }
     }
+    nodes.sort_by(f64::total_cmp);
+    nodes.dedup();
+    let ends = nodes.windows(2).map(|pair| {
+        // Just inside, so that a step belongs to neither side.
+        let inside = (pair[1] - pair[0]) * 1e-9;
+        [(pair[0], at(pair[0] + inside).1), (pair[1], at(pair[1] - inside).1)]
+    });
+    let ends: Vec<[Point; 2]> = ends.collect();
+    let peak = |row: usize| ends.iter().flatten().map(|point| point.1[row].abs()).fold(0.0, f64::max);
+    let allowed: Vec<f64> = (0..rows).map(|row| BOUND * peak(row)).collect();
+    let mut points: Vec<Point> = Vec::with_capacity(2 * ends.len());
+    for [a, b] in &ends {
+        push(&mut points, a);
+        bisect(&at, a, &at(0.5 * (a.0 + b.0)), b, &allowed, MAX_DEPTH, &mut |node| push(&mut points, node));
+        push(&mut points, b);
+    }
+    points
 }
 
 /// Adds a node, unless it is the last one.
-fn push(nm: &mut Vec<f64>, value: &mut Vec<f64>, node: (f64, f64)) {
+fn push(points: &mut Vec<Point>, node: &Point) {
     let close = |a: f64, b: f64| (a - b).abs() <= 1e-8 * a.abs().max(b.abs());
-    if nm.last() == Some(&node.0) && value.last().is_some_and(|&v| close(v, node.1)) {
-        return;
+    let is_last = |last: &Point| last.0 == node.0 && last.1.iter().zip(&node.1).all(|(&a, &b)| close(a, b));
+    if !points.last().is_some_and(is_last) {
+        points.push(node.clone());
     }
-    nm.push(node.0);
-    value.push(node.1);
 }
 
-/// Nodes between `a` and `b`, in order, until the line through neighbours is within `bound` at three points between.
+/// Nodes between `a` and `b`, whose middle is known, in order, until the lines through neighbours are within `allowed` at three points
+/// between.
 fn bisect(
-    f: &impl Fn(f64) -> f64,
-    a: (f64, f64),
-    b: (f64, f64),
-    bound: f64,
+    at: &impl Fn(f64) -> Point,
+    a: &Point,
+    middle: &Point,
+    b: &Point,
+    allowed: &[f64],
     depth: u32,
-    push: &mut impl FnMut((f64, f64)),
+    push: &mut impl FnMut(&Point),
 ) {
-    let off = |t: f64| {
-        let nm = a.0 + t * (b.0 - a.0);
-        (f(nm) - (a.1 + t * (b.1 - a.1))).abs()
-    };
-    if depth == 0 || [0.25, 0.5, 0.75].iter().all(|&t| off(t) <= bound) {
+    if depth == 0 {
         return;
     }
-    let middle = 0.5 * (a.0 + b.0);
-    let middle = (middle, f(middle));
-    bisect(f, a, middle, bound, depth - 1, push);
+    let [first, last] = [a, b].map(|end| at(0.5 * (end.0 + middle.0)));
+    let is_straight = |(t, point): (f64, &Point)| {
+        let ends = a.1.iter().zip(&b.1);
+        point
+            .1
+            .iter()
+            .zip(ends)
+            .zip(allowed)
+            .all(|((value, (a, b)), allowed)| (value - (a + t * (b - a))).abs() <= *allowed)
+    };
+    if [(0.5, middle), (0.25, &first), (0.75, &last)].into_iter().all(is_straight) {
+        return;
+    }
+    bisect(at, a, &first, middle, allowed, depth - 1, push);
     push(middle);
-    bisect(f, middle, b, bound, depth - 1, push);
+    bisect(at, middle, &last, b, allowed, depth - 1, push);
 }
 
 #[cfg(test)]

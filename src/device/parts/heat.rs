@@ -5,13 +5,9 @@
 //! `device::parts::radiators`.
 
 use std::borrow::Cow;
-use std::cell::RefCell;
-use std::collections::HashMap;
-use std::rc::Rc;
 use std::sync::Arc;
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use crate::device::part::{Part, Place, Records, SceneBuffer};
 use crate::device::parts::geometry::{FEWER_MATERIALS, MATERIALS};
@@ -23,7 +19,7 @@ use crate::scene::{
 };
 use crate::spectral::hemisphere::fresnel::{conductor, dielectric, mean_conductor, mean_dielectric};
 use crate::spectral::hemisphere::{
-    DielectricAlbedo, FACET_COSINES, FacetCosines, ReflectionAlbedo, facet_cosine, index_range,
+    CoatAlbedo, FACET_COSINES, FacetCosines, ReflectionAlbedo, facet_cosine, index_range,
 };
 use crate::spectral::{Channels, Curve, planck};
 
@@ -162,17 +158,10 @@ struct Leaf<'a> {
     absorber: Absorber,
     /// What the absorber depends on, in its order.
     curves: Vec<Cow<'a, Curve>>,
-    /// At the bits of the curves' values met so far: all cosines of a surface ask for the same.
-    facets: RefCell<HashMap<[u64; 2], Rc<OfFacets>>>,
 }
 
-/// 1 - F of metals or F of coats at each [`facet_cosine`], and the mean of F of metals.
-type OfFacets = (Vec<f64>, f64);
-
-/// A side of a leaf, seen at a cosine.
-struct Seen<'l> {
-    leaf: &'l Leaf<'l>,
-    back: bool,
+/// A cosine at which a leaf is seen.
+struct Seen {
     cosine: f64,
     /// Of facets.
     weights: Vec<f64>,
@@ -188,11 +177,11 @@ enum Absorber {
     Mirror,
     RoughMetal { facets: Arc<FacetCosines>, again: Option<Arc<ReflectionAlbedo>> },
     Varnish,
-    RoughPlastic { facets: Arc<FacetCosines>, coat: Arc<DielectricAlbedo> },
+    RoughPlastic { facets: Arc<FacetCosines>, coat: Arc<CoatAlbedo> },
 }
 
 impl Leaf<'_> {
-    fn seen(&self, cosine: f64, back: bool) -> Seen<'_> {
+    fn seen(&self, cosine: f64) -> Seen {
         let o = DVec3::new(((1.0 - cosine) * (1.0 + cosine)).max(0.0).sqrt(), 0.0, cosine);
         let (weights, again) = match &self.absorber {
             Absorber::RoughMetal { facets, again } => {
@@ -202,12 +191,7 @@ impl Leaf<'_> {
             _ => (Vec::new(), 0.0),
         };
         let lost = 1.0 - weights.iter().sum::<f64>();
-        Seen { leaf: self, back, cosine, weights, lost, again }
-    }
-
-    /// What `make` makes for these values of the curves, once.
-    fn facets(&self, values: [f64; 2], make: impl FnOnce() -> OfFacets) -> Rc<OfFacets> {
-        Rc::clone(self.facets.borrow_mut().entry(values.map(f64::to_bits)).or_insert_with(|| Rc::new(make())))
+        Seen { cosine, weights, lost, again }
     }
 }
 
@@ -222,51 +206,55 @@ fn weighted_sum(weights: &[f64], values: &[f64]) -> f64 {
 
 const _: () = assert!(FACET_COSINES.is_multiple_of(8));
 
-impl Seen<'_> {
-    /// ε where the curves have `values`: 1 - what is reflected (see `reference`, which has its own).
-    fn emittance(&self, values: &[f64]) -> f64 {
-        if self.back && !self.leaf.two_sided {
-            return 1.0;
+/// A value at each cosine of facets.
+fn at_facets(f: impl Fn(f64) -> f64) -> [f64; FACET_COSINES] {
+    std::array::from_fn(|j| f(facet_cosine(j)))
+}
+
+impl Leaf<'_> {
+    /// Adds `times` ε to the sum of each cosine at which the leaf is seen, where its curves have `values`: 1 - what is reflected (see
+    /// `reference`, which has its own). What all cosines have in common is worked out once.
+    fn add(&self, seen: &[Seen], back: bool, values: &[f64], times: f64, sums: &mut [f64]) {
+        let mut add = |emittance: &dyn Fn(&Seen) -> f64| {
+            sums.iter_mut().zip(seen).for_each(|(sum, seen)| *sum += times * emittance(seen).max(0.0));
+        };
+        if back && !self.two_sided {
+            return add(&|_| 1.0);
         }
-        let cosine = self.cosine;
-        let mean = |of_facets: &[f64]| weighted_sum(&self.weights, of_facets);
         // What the base under a coat of index η keeps of light that got through.
         let kept = |rho: f64, eta: f64, mean_reflected: f64| {
             let leaves = (1.0 - mean_reflected) / (eta * eta);
             (1.0 - rho) / (1.0 - rho * (1.0 - leaves))
         };
-        let emittance = match &self.leaf.absorber {
-            Absorber::Black => 1.0,
-            Absorber::Diffuse => 1.0 - values[0],
-            Absorber::Translucent => 1.0 - values[0] - values[1],
-            Absorber::Mirror => 1.0 - conductor(cosine, values[0], values[1]),
+        match &self.absorber {
+            Absorber::Black => add(&|_| 1.0),
+            Absorber::Diffuse => add(&|_| 1.0 - values[0]),
+            Absorber::Translucent => add(&|_| 1.0 - values[0] - values[1]),
+            Absorber::Mirror => add(&|seen| 1.0 - conductor(seen.cosine, values[0], values[1])),
             Absorber::RoughMetal { again, .. } => {
                 let (eta, k) = (values[0], values[1]);
-                let facets = self.leaf.facets([eta, k], || {
-                    let absorbed = (0..FACET_COSINES).map(|j| 1.0 - conductor(facet_cosine(j), eta, k));
-                    (absorbed.collect(), mean_conductor(eta, k))
-                });
+                let absorbed = at_facets(|cosine| 1.0 - conductor(cosine, eta, k));
                 let comes_back = again.as_ref().map_or(0.0, |albedo| {
-                    let (f, missing) = (facets.1, albedo.mean_loss());
-                    self.again * f * f * (1.0 - missing) / (1.0 - f * missing)
+                    let (f, missing) = (mean_conductor(eta, k), albedo.mean_loss());
+                    f * f * (1.0 - missing) / (1.0 - f * missing)
                 });
-                mean(&facets.0) + self.lost - comes_back
+                add(&|seen| weighted_sum(&seen.weights, &absorbed) + seen.lost - seen.again * comes_back);
             }
             Absorber::Varnish => {
                 let (rho, eta) = (values[0], values[1]);
-                (1.0 - dielectric(cosine, eta)) * kept(rho, eta, mean_dielectric(eta))
+                let kept = kept(rho, eta, mean_dielectric(eta));
+                add(&|seen| (1.0 - dielectric(seen.cosine, eta)) * kept);
             }
             Absorber::RoughPlastic { coat, .. } => {
                 let (rho, eta) = (values[0], values[1]);
-                let facets = self.leaf.facets([eta, 0.0], || {
-                    ((0..FACET_COSINES).map(|j| dielectric(facet_cosine(j), eta)).collect(), 0.0)
+                let by_facets = at_facets(|cosine| dielectric(cosine, eta));
+                let kept = kept(rho, eta, coat.mean_reflected(eta));
+                add(&|seen| {
+                    let enters = 1.0 - coat.reflected(eta, seen.cosine);
+                    1.0 - weighted_sum(&seen.weights, &by_facets) - enters * (1.0 - kept)
                 });
-                let reflected = mean(&facets.0);
-                let enters = 1.0 - coat.reflected(eta, false, cosine);
-                1.0 - reflected - enters * (1.0 - kept(rho, eta, coat.mean_reflected(eta, false)))
             }
-        };
-        emittance.max(0.0)
+        }
     }
 }
 
@@ -307,11 +295,9 @@ pub fn as_emission(scene: &Scene) -> Heat<'_> {
                     continue;
                 }
                 let by_place = is_picture || parts.iter().any(|part| part.differs_by_place(scene));
-                let leaves = || -> Vec<Leaf> {
-                    match by_place {
-                        true => parts.iter().flat_map(|part| part.typical(scene)).collect(),
-                        false => parts.iter().map(|part| part.leaf(scene)).collect(),
-                    }
+                let leaves: Vec<Leaf> = match by_place {
+                    true => parts.iter().flat_map(|part| part.typical(scene)).collect(),
+                    false => parts.iter().map(|part| part.leaf(scene)).collect(),
                 };
                 let name = format!("heat of \"{}\"", scene.materials[material].name);
                 let of_lamp = |back: bool| {
@@ -321,33 +307,26 @@ pub fn as_emission(scene: &Scene) -> Heat<'_> {
                     lit.spectra.push(Spectrum { name: name.clone(), curve, definition: None });
                     lit.spectra.len() - 1
                 };
-                let of_all = leaves();
-                let even = of_all.iter().all(Leaf::is_even) && emitted.is_none_or(|(_, both, _)| both);
+                let at = |cosines: &[f64], back: bool| radiance(of_lamp(back), &leaves, cosines, back, &scene.channels);
+                let even = leaves.iter().all(Leaf::is_even) && emitted.is_none_or(|(_, both, _)| both);
                 let new = if by_place {
-                    let typical = radiance(of_lamp(false), &of_all, TYPICAL_COSINE, false, &scene.channels);
+                    let typical = at(&[TYPICAL_COSINE], false).remove(0);
                     heat.radiating.push(Radiating { parts, lamp: emitted });
                     (push(typical), Kind::ByPlace(heat.radiating.len() - 1))
                 } else if even {
-                    let spectrum = push(radiance(of_lamp(false), &of_all, 1.0, false, &scene.channels));
+                    let spectrum = push(at(&[1.0], false).remove(0));
                     let lamp = emitted.map(|(lamp, ..)| lamp);
                     heat.made.push(Made { spectrum, lamp, parts });
                     (spectrum, Kind::Lamp)
                 } else {
-                    let row = |back: bool| -> Vec<Curve> {
-                        let cosine = |j: usize| (j as f64 / (COSINES - 1) as f64).powi(3);
-                        // A thread's leaves remember what its cosines have in common.
-                        let share = COSINES.div_ceil(2 * rayon::current_num_threads());
-                        let cosines = (0..COSINES).into_par_iter().with_min_len(share).map_init(leaves, |leaves, j| {
-                            radiance(of_lamp(back), leaves, cosine(j), back, &scene.channels)
-                        });
-                        cosines.collect()
-                    };
-                    let front = row(false);
+                    let cosines: [f64; COSINES] = std::array::from_fn(|j| (j as f64 / (COSINES - 1) as f64).powi(3));
+                    let front = at(&cosines, false);
                     // Lights are chosen by what they send typically.
                     let typical = front[(TYPICAL_COSINE.cbrt() * (COSINES - 1) as f64) as usize].clone();
-                    let same = of_all.iter().all(|leaf| leaf.two_sided) && emitted.is_none_or(|(_, both, _)| both);
+                    let same = leaves.iter().all(|leaf| leaf.two_sided) && emitted.is_none_or(|(_, both, _)| both);
                     let front: Vec<SpectrumId> = front.into_iter().map(&mut push).collect();
-                    let back = if same { front.clone() } else { row(true).into_iter().map(&mut push).collect() };
+                    let back =
+                        if same { front.clone() } else { at(&cosines, true).into_iter().map(&mut push).collect() };
                     heat.by_angle.push([front, back]);
                     (push(typical), Kind::ByAngle(heat.by_angle.len() - 1))
                 };
@@ -448,21 +427,14 @@ impl HotLeaf {
                     true => Absorber::Varnish,
                     false => Absorber::RoughPlastic {
                         facets: FacetCosines::shared(alpha),
-                        coat: DielectricAlbedo::shared(alpha[0], index_range(&curve(eta), &scene.channels)),
+                        coat: CoatAlbedo::shared(alpha[0], index_range(&curve(eta), &scene.channels)),
                     },
                 };
                 (absorber, vec![all_over(reflectance), curve(eta)])
             }
             Bsdf::Dielectric { .. } | Bsdf::Blend { .. } => unreachable!("`collect` has none"),
         };
-        Leaf {
-            weight: self.weight,
-            kelvin,
-            two_sided: material.two_sided,
-            absorber,
-            curves,
-            facets: RefCell::default(),
-        }
+        Leaf { weight: self.weight, kelvin, two_sided: material.two_sided, absorber, curves }
     }
 
     /// What it emits on the whole, for choosing among lights: facets lie flat, textures are their means, of temperatures a
@@ -495,43 +467,42 @@ impl HotLeaf {
                 Bsdf::Dielectric { .. } | Bsdf::Blend { .. } => unreachable!("`collect` has none"),
             };
             let two_sided = material.two_sided;
-            Leaf { weight: weight * share, kelvin, two_sided, absorber, curves, facets: RefCell::default() }
+            Leaf { weight: weight * share, kelvin, two_sided, absorber, curves }
         };
         temperatures.into_iter().map(leaf).collect()
     }
 }
 
-/// E + Σ w ε B(λ, T) at a cosine, within `channels`.
-fn radiance(emitted: Option<&Curve>, leaves: &[Leaf], cosine: f64, back: bool, channels: &Channels) -> Curve {
-    let seen: Vec<Seen> = leaves.iter().map(|leaf| leaf.seen(cosine, back)).collect();
-    if emitted.is_none() && leaves.iter().all(|leaf| leaf.kelvin == leaves[0].kelvin) {
-        // Grey: Planck's law itself.
-        let grey = |seen: &Seen| {
-            let leaf = seen.leaf;
-            let values: Option<Vec<f64>> =
-                leaf.curves.iter().map(|c| c.is_constant().then(|| c.eval(channels.centre(0)))).collect();
-            values.map(|values| leaf.weight * seen.emittance(&values))
-        };
-        let scale: Option<f64> = seen.iter().map(grey).sum();
-        match scale {
-            Some(0.0) => return Curve::Constant(0.0),
-            Some(scale) => return Curve::Blackbody { kelvin: leaves[0].kelvin, scale },
-            None => {}
+/// E + Σ w ε B(λ, T) at each of the cosines, within `channels`.
+fn radiance(emitted: Option<&Curve>, leaves: &[Leaf], cosines: &[f64], back: bool, channels: &Channels) -> Vec<Curve> {
+    let seen: Vec<Vec<Seen>> =
+        leaves.iter().map(|leaf| cosines.iter().map(|&cosine| leaf.seen(cosine)).collect()).collect();
+    let is_grey = |leaf: &Leaf| leaf.kelvin == leaves[0].kelvin && leaf.curves.iter().all(|curve| curve.is_constant());
+    if emitted.is_none() && leaves.iter().all(is_grey) {
+        // Planck's law itself.
+        let mut scales = vec![0.0; cosines.len()];
+        for (leaf, seen) in leaves.iter().zip(&seen) {
+            let values: Vec<f64> = leaf.curves.iter().map(|curve| curve.eval(channels.centre(0))).collect();
+            leaf.add(seen, back, &values, leaf.weight, &mut scales);
         }
+        let curve = |scale: f64| match scale {
+            0.0 => Curve::Constant(0.0),
+            scale => Curve::Blackbody { kelvin: leaves[0].kelvin, scale },
+        };
+        return scales.into_iter().map(curve).collect();
     }
     let tables = emitted.into_iter().chain(leaves.iter().flat_map(|leaf| leaf.curves.iter().map(|curve| &**curve)));
     let tables: Vec<&Curve> = tables.collect();
-    let at = |nm: f64, values: &[f64]| {
+    let at = |nm: f64, values: &[f64], out: &mut [f64]| {
         let (lamp, mut values) = values.split_at(usize::from(emitted.is_some()));
-        let mut of_leaf = |seen: &Seen| {
-            let leaf = seen.leaf;
+        out.fill(lamp.iter().sum());
+        for (leaf, seen) in leaves.iter().zip(&seen) {
             let (own, rest) = values.split_at(leaf.curves.len());
             values = rest;
-            leaf.weight * seen.emittance(own) * planck::radiance(nm, leaf.kelvin)
-        };
-        seen.iter().map(&mut of_leaf).sum::<f64>() + lamp.iter().sum::<f64>()
+            leaf.add(seen, back, own, leaf.weight * planck::radiance(nm, leaf.kelvin), out);
+        }
     };
-    Curve::derived_by_stretch(&tables, channels, at)
+    Curve::derived_rows(&tables, channels, cosines.len(), at)
 }
 
 #[cfg(test)]
@@ -542,7 +513,7 @@ mod tests {
     fn leaf<'a>(reflectance: Option<&'a Curve>, weight: f64, kelvin: f64) -> Leaf<'a> {
         let absorber = if reflectance.is_some() { Absorber::Diffuse } else { Absorber::Black };
         let curves = reflectance.into_iter().map(Cow::Borrowed).collect();
-        Leaf { weight, kelvin, two_sided: true, absorber, curves, facets: RefCell::default() }
+        Leaf { weight, kelvin, two_sided: true, absorber, curves }
     }
 
     /// Means of every channel to 2e-5, also 30 orders below the peak.
@@ -557,7 +528,7 @@ mod tests {
         };
         let leaves = [leaf(Some(&rho), 0.25, 300.0), leaf(None, 0.75, 400.0)];
         for emitted in [None, Some(&step)] {
-            let curve = radiance(emitted, &leaves, 1.0, false, &channels);
+            let curve = radiance(emitted, &leaves, &[1.0], false, &channels).remove(0);
             for &[from, to] in &channels.bounds {
                 const STEPS: u32 = 200_000;
                 let at = |i: u32| {
@@ -577,8 +548,8 @@ mod tests {
     fn grey_heat_is_plancks_law() {
         let channels = Channels::equal(8e3, 14e3, 3);
         let (half, white) = (Curve::Constant(0.5), Curve::Constant(1.0));
-        let mixed = radiance(None, &[leaf(Some(&half), 0.5, 300.0), leaf(None, 0.5, 300.0)], 1.0, false, &channels);
-        assert_eq!(mixed, Curve::Blackbody { kelvin: 300.0, scale: 0.75 });
-        assert_eq!(radiance(None, &[leaf(Some(&white), 1.0, 300.0)], 1.0, false, &channels), Curve::Constant(0.0));
+        let mixed = radiance(None, &[leaf(Some(&half), 0.5, 300.0), leaf(None, 0.5, 300.0)], &[1.0], false, &channels);
+        assert_eq!(mixed, [Curve::Blackbody { kelvin: 300.0, scale: 0.75 }]);
+        assert_eq!(radiance(None, &[leaf(Some(&white), 1.0, 300.0)], &[1.0], false, &channels), [Curve::Constant(0.0)]);
     }
 }

@@ -12,7 +12,7 @@ use crate::device::words::{LOBE_BOUNDED, LOBE_DISPERSES, LOBE_NARROW, LOBE_TEXTU
 use crate::scene::{Reflectance, Scene, SpectrumId};
 use crate::spectral::Curve;
 use crate::spectral::hemisphere::fresnel::{self, mean_conductor, mean_dielectric};
-use crate::spectral::hemisphere::{DielectricAlbedo, ReflectionAlbedo, ReflectionProbability, index_range};
+use crate::spectral::hemisphere::{CoatAlbedo, DielectricAlbedo, ReflectionAlbedo, ReflectionProbability, index_range};
 
 /// Boundaries whose indices are this near to 1 bend by an index this far from it where they are rough (`reference`).
 const MATCHED: f64 = 1e-4;
@@ -141,7 +141,7 @@ impl Surfaces {
         let n = channel_means(scene, eta);
         let range = index_range(curve, &scene.channels);
         let albedo = DielectricAlbedo::shared(alpha, range);
-        let number = self.eta_table(&albedo);
+        let number = self.eta_table(albedo.table());
         let id = self.spectrum(eta);
         let decision = ReflectionProbability::new(curve, &scene.channels);
         let decisions: Vec<f32> = [false, true]
@@ -216,11 +216,11 @@ impl Surfaces {
         let of_index = &scene.spectra[eta].curve;
         let n = channel_means(scene, eta);
         let id = self.spectrum(eta);
-        let rough = roughness.map(|[alpha, _]| DielectricAlbedo::shared(alpha, index_range(of_index, &scene.channels)));
+        let rough = roughness.map(|[alpha, _]| CoatAlbedo::shared(alpha, index_range(of_index, &scene.channels)));
         let table = rough.clone();
         let mean_reflected = move |eta: f64| match &table {
             None => mean_dielectric(eta),
-            Some(table) => table.mean_reflected(eta, false),
+            Some(table) => table.mean_reflected(eta),
         };
         // ρ τ / (1 - ρ (1 - τ)) over the mean transmittance, by `reference::bsdf::plastic`.
         let inner = |v: &[f64]| {
@@ -252,14 +252,14 @@ impl Surfaces {
         // Seen from outside nothing is totally reflected, whatever the index.
         let coat_kind = if roughness.is_some() { Kind::RoughCoat } else { Kind::Mirror };
         let coat = Lobe { kind: coat_kind as u32 | LOBE_DISPERSES, ab: id, alpha, eta: 1.0, ..Lobe::default() };
-        let number = rough.as_ref().map_or(0, |table| self.eta_table(table));
+        let number = rough.as_ref().map_or(0, |table| self.eta_table(table.table()));
         self.rough_base |= rough.is_some();
         let kind = Kind::Base as u32 | textured.kind;
         let base = Lobe { kind, ab: id | number << 16, cd, alpha, ..textured };
         let mean: Vec<f64> = n.iter().map(|&eta| 1.0 - mean_reflected(eta)).collect();
         let reflected = Arc::new(move |cosine: f64, k: usize| match &rough {
             None => fresnel::dielectric(cosine, n[k]),
-            Some(table) => table.reflected(n[k], false, cosine),
+            Some(table) => table.reflected(n[k], cosine),
         });
         let of_coat = Arc::clone(&reflected);
         vec![

@@ -10,7 +10,7 @@ use crate::device::words::{
 use crate::scene::{Bsdf, Reflectance, SMOOTH, Scene, SpectrumId, Temperature, TextureKind};
 use crate::spectral::Curve;
 use crate::spectral::hemisphere::fresnel::{mean_conductor, mean_dielectric};
-use crate::spectral::hemisphere::{DielectricAlbedo, ReflectionAlbedo, index_range};
+use crate::spectral::hemisphere::{CoatAlbedo, ReflectionAlbedo, index_range};
 use crate::{Error, Result};
 
 /// What the surface of a radiator does.
@@ -220,12 +220,12 @@ impl Radiators {
     ) -> Kind {
         let curve = |spectrum: usize| &scene.spectra[spectrum].curve;
         radiator.spectra = surfaces.spectrum(eta);
-        let rough = (roughness >= SMOOTH)
-            .then(|| DielectricAlbedo::shared(roughness, index_range(curve(eta), &scene.channels)));
+        let rough =
+            (roughness >= SMOOTH).then(|| CoatAlbedo::shared(roughness, index_range(curve(eta), &scene.channels)));
         radiator.alpha = [roughness as f32; 2];
         let mean_reflected = |eta: f64| match &rough {
             None => mean_dielectric(eta),
-            Some(table) => table.mean_reflected(eta, false),
+            Some(table) => table.mean_reflected(eta),
         };
         // Of what leaves the base, the share that the coat sends back to it.
         let back = |eta: f64| 1.0 - (1.0 - mean_reflected(eta)) / (eta * eta);
@@ -249,7 +249,7 @@ impl Radiators {
             }
             Some(table) => {
                 self.features.coats = true;
-                radiator.inner |= surfaces.eta_table(table) << 16;
+                radiator.inner |= surfaces.eta_table(table.table()) << 16;
                 Kind::Coat
             }
         }

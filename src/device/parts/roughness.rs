@@ -128,7 +128,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::spectral::hemisphere::{DielectricAlbedo, ReflectionAlbedo};
+    use crate::spectral::hemisphere::{CoatAlbedo, ReflectionAlbedo};
 
     /// The most that what stands in tables is off the line between two roughnesses, halfway, where it is furthest from it: losses of a metal
     /// and reflectances of a coat, times the cosine, and their hemispherical means.
@@ -137,7 +137,7 @@ mod tests {
         let alphas = [node(i), halfway, node(i + 1)];
         let off = |[a, b, c]: [f64; 3]| (0.5 * (a + c) - b).abs();
         let metals = alphas.map(|alpha| ReflectionAlbedo::new([alpha; 2]));
-        let coats = alphas.map(|alpha| DielectricAlbedo::new(alpha, [1.5; 2]));
+        let coats = alphas.map(|alpha| CoatAlbedo::new(alpha, [1.5; 2]));
         let most = |of: &dyn Fn(f64) -> [f64; 3]| {
             (0..=40).map(|step| f64::from(step) / 40.0).map(|z| z * off(of(z))).fold(0.0, f64::max)
         };
@@ -145,8 +145,8 @@ mod tests {
         [
             most(&|z| metals.each_ref().map(|metal| metal.loss(towards(z)))),
             off(metals.each_ref().map(ReflectionAlbedo::mean_loss)),
-            most(&|z| coats.each_ref().map(|coat| coat.reflected(1.5, false, z))),
-            off(coats.each_ref().map(|coat| coat.mean_reflected(1.5, false))),
+            most(&|z| coats.each_ref().map(|coat| coat.reflected(1.5, z))),
+            off(coats.each_ref().map(|coat| coat.mean_reflected(1.5))),
         ]
     }
 

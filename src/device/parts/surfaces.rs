@@ -14,7 +14,7 @@ use crate::device::words::{
     MATERIAL_DIFFUSE, MATERIAL_MASK_IS_TEXTURE, MATERIAL_MASKED, MATERIAL_TRANSMITS, SurfaceMaterial,
 };
 use crate::scene::{Attributes, Bsdf, MaterialId, Scene, SpectrumId, Texture, TextureKind, Weight};
-use crate::spectral::hemisphere::DielectricAlbedo;
+use crate::spectral::hemisphere::IndexTable;
 use crate::spectral::{Curve, Outside};
 
 /// What a lobe does.
@@ -412,10 +412,9 @@ impl Surfaces {
     }
 
     /// Appends a table over index and cosine, as `eta_table` in `program.wgsl` reads it, and gives its number.
-    pub(super) fn eta_table(&mut self, albedo: &DielectricAlbedo) -> u32 {
+    pub(super) fn eta_table(&mut self, IndexTable { first, step, columns }: IndexTable) -> u32 {
         let aligned = self.tables.len().next_multiple_of(ROW);
         self.tables.resize(aligned, 0.0);
-        let (first, step, columns) = albedo.columns();
         let mut head = [0.0; ROW];
         head[..3].copy_from_slice(&[first, if step > 0.0 { 1.0 / step } else { 0.0 }, columns.len() as f64]);
         let values = head.iter().chain(columns.iter().flatten().copied().flatten());

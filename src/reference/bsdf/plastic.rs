@@ -9,7 +9,7 @@ use super::ggx::Ggx;
 use super::reflection::{Boundary, Mirror, RoughMirror};
 use super::{Choice, Lobe, Vertex, cosine_density, cosine_direction, fresnel};
 use crate::scene::{Reflectance, SpectrumId};
-use crate::spectral::hemisphere::DielectricAlbedo;
+use crate::spectral::hemisphere::CoatAlbedo;
 use crate::spectral::hemisphere::fresnel::mean_dielectric;
 
 /// The coat's reflection, and what comes out of the base; `range` bounds the coat's index.
@@ -19,7 +19,7 @@ pub fn lobes(
     range: [f64; 2],
     roughness: Option<[f64; 2]>,
 ) -> Vec<Box<dyn Lobe>> {
-    let rough = roughness.map(|[alpha, _]| DielectricAlbedo::shared(alpha, range));
+    let rough = roughness.map(|[alpha, _]| CoatAlbedo::shared(alpha, range));
     let coat = Coat { eta, rough };
     let base = Box::new(Base { reflectance, coat: coat.clone() });
     match roughness {
@@ -32,7 +32,7 @@ pub fn lobes(
 #[derive(Clone)]
 struct Coat {
     eta: SpectrumId,
-    rough: Option<Arc<DielectricAlbedo>>,
+    rough: Option<Arc<CoatAlbedo>>,
 }
 
 impl Coat {
@@ -41,7 +41,7 @@ impl Coat {
         let eta = at.spectra.value(self.eta, k);
         match &self.rough {
             None => fresnel::dielectric(z, eta),
-            Some(table) => table.reflected(eta, false, z),
+            Some(table) => table.reflected(eta, z),
         }
     }
 
@@ -49,7 +49,7 @@ impl Coat {
         let eta = at.spectra.value(self.eta, k);
         match &self.rough {
             None => mean_dielectric(eta),
-            Some(table) => table.mean_reflected(eta, false),
+            Some(table) => table.mean_reflected(eta),
         }
     }
 }

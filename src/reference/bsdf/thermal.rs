@@ -7,7 +7,7 @@ use super::{Vertex, fresnel};
 use crate::scene::{Bsdf as Description, Material, Reflectance, SMOOTH, Scene, SpectrumId, Temperature, TextureId};
 use crate::spectral::hemisphere::fresnel::{mean_conductor, mean_dielectric};
 use crate::spectral::hemisphere::{
-    DielectricAlbedo, FACET_COSINES, FacetCosines, ReflectionAlbedo, facet_cosine, index_range,
+    CoatAlbedo, FACET_COSINES, FacetCosines, ReflectionAlbedo, facet_cosine, index_range,
 };
 use crate::spectral::planck;
 
@@ -53,7 +53,7 @@ enum Absorber {
         eta: SpectrumId,
         facets: Arc<FacetCosines>,
         /// As the base has it.
-        coat: Arc<DielectricAlbedo>,
+        coat: Arc<CoatAlbedo>,
     },
 }
 
@@ -85,7 +85,7 @@ impl Hot {
                 [alpha, _] if alpha < SMOOTH => Absorber::Varnish { reflectance, eta },
                 alpha => {
                     let range = index_range(&scene.spectra[eta].curve, &scene.channels);
-                    let coat = DielectricAlbedo::shared(alpha[0], range);
+                    let coat = CoatAlbedo::shared(alpha[0], range);
                     Absorber::RoughPlastic { reflectance, eta, facets: FacetCosines::shared(alpha), coat }
                 }
             },
@@ -150,8 +150,8 @@ impl Hot {
                 let (rho, eta) = (at.spectra.reflectance(*reflectance, k), value(*eta));
                 let reflected: [f64; FACET_COSINES] =
                     std::array::from_fn(|j| fresnel::dielectric(facet_cosine(j), eta));
-                let enters = 1.0 - coat.reflected(eta, false, at.o.z);
-                let kept = kept(rho, eta, coat.mean_reflected(eta, false));
+                let enters = 1.0 - coat.reflected(eta, at.o.z);
+                let kept = kept(rho, eta, coat.mean_reflected(eta));
                 // 1 - R - (what comes out of the base), whose table of R is a coarser one.
                 (1.0 - facets.mean(at.o, &reflected) - enters * (1.0 - kept)).max(0.0)
             }

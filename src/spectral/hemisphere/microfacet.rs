@@ -18,9 +18,11 @@ use super::{fresnel, recent};
 /// Nodes along the cosine, and around the normal over a quarter turn.
 const COSINES: usize = 128;
 const AZIMUTHS: usize = 33;
-/// Points of the lattice for a node of a table, and its generator: two Fibonacci numbers.
-pub(super) const LATTICE: (usize, usize) = (10_946, 6_765);
-/// Four times the points of a table's node, and no common factor with them.
+/// Points of the lattice for a node of a table, and its generator: two Fibonacci numbers. Off by at most 4e-5.
+pub(super) const LATTICE: (usize, usize) = (4_181, 2_584);
+/// The same where some of what is seen is totally reflected, an edge in the integrand: off by up to 5e-4.
+const LATTICE_OF_DENSER: (usize, usize) = (10_946, 6_765);
+/// At least four times the points of a table's node, and no common factor with them.
 #[cfg(test)]
 pub(super) const FINE: (usize, usize) = (46_368, 28_657);
 /// Largest step of a table along ln η.
@@ -110,11 +112,8 @@ impl ReflectionAlbedo {
 /// less rough than its nodes are apart, where reflection alone may be wrong by 0.3; the loss is not.
 pub struct DielectricAlbedo {
     alpha: f64,
-    /// ln η at the first node, and the step; η is the index behind over that before.
-    first: f64,
-    step: f64,
-    /// \[η\]\[before, behind\].
-    sides: Vec<[SideAlbedo; 2]>,
+    /// Before and behind; η is the index behind over that before.
+    sides: ByIndex<[SideAlbedo; 2]>,
 }
 
 #[derive(Clone)]
@@ -123,6 +122,45 @@ struct SideAlbedo {
     loss: [f64; COSINES],
     mean_reflected: f64,
     mean_loss: f64,
+}
+
+/// What the index of a boundary decides, at equal steps of ln η.
+struct ByIndex<T> {
+    first: f64,
+    step: f64,
+    nodes: Vec<T>,
+}
+
+impl<T: Send> ByIndex<T> {
+    fn new(range: [f64; 2], of_index: impl Fn(f64) -> T + Sync) -> Self {
+        let [first, last] = range.map(f64::ln);
+        let steps = ((last - first) / INDEX_STEP).ceil().max(0.0) as usize;
+        let step = (last - first) / steps.max(1) as f64;
+        let node = |i: usize| of_index((first + i as f64 * step).exp());
+        ByIndex { first, step, nodes: (0..=steps).into_par_iter().map(node).collect() }
+    }
+
+    fn blend(&self, eta: f64, value: impl Fn(&T) -> f64) -> f64 {
+        if self.nodes.len() == 1 {
+            return value(&self.nodes[0]);
+        }
+        let x = ((eta.ln() - self.first) / self.step).clamp(0.0, (self.nodes.len() - 1) as f64);
+        let i = (x as usize).min(self.nodes.len() - 2);
+        let [a, b] = [i, i + 1].map(|i| value(&self.nodes[i]));
+        a + (x - i as f64) * (b - a)
+    }
+
+    /// As devices read it.
+    fn table<'a>(&'a self, columns: impl Fn(&'a T) -> [&'a [f64; COSINES]; 4]) -> IndexTable<'a> {
+        IndexTable { first: self.first, step: self.step, columns: self.nodes.iter().map(columns).collect() }
+    }
+}
+
+/// Tables over ln η, from `first` on in steps, and cosine: for each index what is reflected and lost before, and behind.
+pub struct IndexTable<'a> {
+    pub first: f64,
+    pub step: f64,
+    pub columns: Vec<[&'a [f64; COSINES]; 4]>,
 }
 
 impl DielectricAlbedo {
@@ -134,33 +172,18 @@ impl DielectricAlbedo {
 
     /// For η within `range` and isotropic roughness `alpha` above 0.
     pub fn new(alpha: f64, range: [f64; 2]) -> Self {
-        let [first, last] = range.map(f64::ln);
-        let steps = ((last - first) / INDEX_STEP).ceil().max(0.0) as usize;
-        let step = (last - first) / steps.max(1) as f64;
-        let lattice = Lattice::new(LATTICE);
-        let sides = (0..=steps).into_par_iter().map(|i| {
-            let eta = (first + i as f64 * step).exp();
-            [eta, eta.recip()].map(|eta| SideAlbedo::new(alpha, eta, &lattice))
-        });
-        let sides = sides.collect();
-        DielectricAlbedo { alpha, first, step, sides }
+        let (lattice, of_denser) = (Lattice::new(LATTICE), Lattice::new(LATTICE_OF_DENSER));
+        let side = |eta: f64| SideAlbedo::new(alpha, eta, if eta < 1.0 { &of_denser } else { &lattice });
+        DielectricAlbedo { alpha, sides: ByIndex::new(range, |eta| [eta, eta.recip()].map(side)) }
     }
 
     fn blend(&self, eta: f64, behind: bool, value: impl Fn(&SideAlbedo) -> f64) -> f64 {
-        let value = |i: usize| value(&self.sides[i][usize::from(behind)]);
-        if self.sides.len() == 1 {
-            return value(0);
-        }
-        let x = ((eta.ln() - self.first) / self.step).clamp(0.0, (self.sides.len() - 1) as f64);
-        let i = (x as usize).min(self.sides.len() - 2);
-        value(i) + (x - i as f64) * (value(i + 1) - value(i))
+        self.sides.blend(eta, |sides| value(&sides[usize::from(behind)]))
     }
 
-    /// The tables themselves: ln η at the first node, the step, and for each node what is reflected and lost before, and
-    /// behind, by cosine.
-    pub fn columns(&self) -> (f64, f64, Vec<[&[f64; COSINES]; 4]>) {
-        let columns = self.sides.iter().map(|[a, b]| [&a.reflected, &a.loss, &b.reflected, &b.loss]);
-        (self.first, self.step, columns.collect())
+    /// The tables themselves.
+    pub fn table(&self) -> IndexTable<'_> {
+        self.sides.table(|[a, b]| [&a.reflected, &a.loss, &b.reflected, &b.loss])
     }
 
     /// Flux reflected by one scattering event, for an observer `behind` the boundary or before it at cosine `z`.
@@ -200,6 +223,53 @@ impl SideAlbedo {
         side.mean_reflected = mean(&side.reflected, alpha);
         side.mean_loss = mean(&side.loss, alpha);
         side
+    }
+}
+
+/// What a rough coat reflects by one scattering event, seen from outside, where nothing is reflected totally: to 3e-4 for α of at
+/// least 0.02.
+pub struct CoatAlbedo {
+    alpha: f64,
+    /// By cosine, and the hemispherical mean.
+    reflected: ByIndex<([f64; COSINES], f64)>,
+}
+
+impl CoatAlbedo {
+    /// For an index within `range`, of at least 1, and isotropic roughness `alpha` above 0; kept for the next who asks.
+    pub fn shared(alpha: f64, range: [f64; 2]) -> Arc<Self> {
+        static RECENT: LazyLock<Cache<[u64; 3], Arc<CoatAlbedo>>> = LazyLock::new(|| Cache::new(RECENT_TABLES));
+        recent(&RECENT, [alpha, range[0], range[1]].map(f64::to_bits), || Self::new(alpha, range))
+    }
+
+    /// As [`CoatAlbedo::shared`].
+    pub fn new(alpha: f64, range: [f64; 2]) -> Self {
+        let lattice = Lattice::new(LATTICE);
+        let of_index = |eta: f64| {
+            let at = |i: usize| {
+                let z = cosine_at(i, alpha);
+                boundary(alpha, DVec3::new((1.0 - z * z).max(0.0).sqrt(), 0.0, z), &lattice, eta).x
+            };
+            let reflected = std::array::from_fn(at);
+            (reflected, mean(&reflected, alpha))
+        };
+        CoatAlbedo { alpha, reflected: ByIndex::new(range, of_index) }
+    }
+
+    /// At cosine `z`.
+    pub fn reflected(&self, eta: f64, z: f64) -> f64 {
+        let at = position(z, self.alpha);
+        self.reflected.blend(eta, |(reflected, _)| between(reflected, at))
+    }
+
+    /// Hemispherical mean of [`Self::reflected`].
+    pub fn mean_reflected(&self, eta: f64) -> f64 {
+        self.reflected.blend(eta, |(_, mean)| *mean)
+    }
+
+    /// The table itself; what nobody asks a coat for is 0.
+    pub fn table(&self) -> IndexTable<'_> {
+        const NOTHING: &[f64; COSINES] = &[0.0; COSINES];
+        self.reflected.table(|(reflected, _)| [reflected, NOTHING, NOTHING, NOTHING])
     }
 }
 
@@ -409,6 +479,18 @@ mod tests {
             }
             assert!((wide.mean_loss(eta, behind) - exact.mean_loss(eta, behind)).abs() < 1e-4);
         }
+    }
+
+    /// A coat is the front of a boundary.
+    #[test]
+    fn coats_are_fronts() {
+        let range = [1.45, 1.5];
+        let (coat, boundary) = (CoatAlbedo::new(0.2, range), DielectricAlbedo::new(0.2, range));
+        for z in [0.0, 0.3, 1.0] {
+            assert_eq!(coat.reflected(1.47, z), boundary.reflected(1.47, false, z));
+        }
+        assert_eq!(coat.mean_reflected(1.47), boundary.mean_reflected(1.47, false));
+        assert_eq!(coat.table().columns[1][0], boundary.table().columns[1][0]);
     }
 
     #[test]

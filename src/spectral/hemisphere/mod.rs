@@ -19,7 +19,7 @@ use quick_cache::sync::Cache;
 
 pub use decision::{ReflectionProbability, index_range};
 pub use facet_cosines::{FACET_COSINES, FacetCosines, facet_cosine};
-pub use microfacet::{DielectricAlbedo, ReflectionAlbedo};
+pub use microfacet::{CoatAlbedo, DielectricAlbedo, IndexTable, ReflectionAlbedo};
 
 /// The value of `key`, made unless it is among the latest. Two who ask at once may both make it: nobody waits, since those
 /// who make it do so on threads that others wait on.
