@@ -5,8 +5,8 @@
 *Gain*: to bring every tile to the same error, an even render takes everywhere the samples of the tile that needs most. The same tile has
 the same bytes in both, so one render with `--error-per tile` tells what both take: the mean and the most of `samples`.
 
-*Bias*: a rule that looks at data stops sooner where these happen to agree. Renders of many seeds, 4 x 4 tiles of a scene, are compared with even ones of the same seeds: those of the first look, which every tile passes through, or those that go on, whichever has more in common with
-what has ended (decided by seeds of their own). The mean of an even render has no such bias, so the mean difference is what is sought; told by tile and channel in standard errors of one render's tile mean, with its own uncertainty, and beside it the error's true size over its estimate.
+*Bias*: a rule that looks at data stops sooner where these happen to agree. Renders of many seeds, 4 x 4 tiles of a scene, are read where the rule may end a tile for the first time, and gone on with until it has ended all. A mean over a number of samples that no data decide has no such bias, so the
+mean difference of the two is what is sought; told by tile and channel in standard errors of one render's tile mean, with its own uncertainty, and beside it the error's true size over its estimate.
 Needs nothing but Python 3.9 and the program.
 """
 
@@ -28,9 +28,9 @@ GAINS = [
     ("aircraft", (380, 780), "96x60", 8, 16, 0.1, 16384),
     ("aircraft-infrared", (1500, 5500), "48x32", 8, 4, 0.2, 2048),
 ]
-# Scene, error, samples of the even renders that go on. Epochs are those of the scene: 64 samples, so that a tile takes 640 at least.
-BIASES = [("cornell", 0.03, 8192), ("conference", 0.3, 2048)]
-FIRST, PILOTS = 640, 4
+# Scene, error. Epochs are those of the scenes: 64 samples, and a tile ends at the second look in a row, after ten of them at the earliest.
+BIASES = [("cornell", 0.08), ("conference", 0.35)]
+FIRST = 640
 TILES, TILE, CHANNELS = 4, 8, 8
 
 
@@ -90,56 +90,48 @@ def gain(program, folder, of):
 
 
 def bias(program, folder, of, seeds):
-    for scene, error, even in BIASES:
+    for scene, error in BIASES:
         if of in (None, scene):
-            yield from bias_of(program, folder, scene, error, even, seeds)
+            yield from bias_of(program, folder, scene, error, seeds)
 
 
-def renders(program, cube, scene, error, seed, on, samples_on):
-    """One seed: the even render of the first look, what has ended, and the tiles `on` after `samples_on`. Each goes on with the one before, as the same tile has the same bytes by any way."""
+def renders(program, cube, scene, error, seed):
+    """One seed: means of tiles after `FIRST` samples; and of what has ended samples, means, pixels and sums of squared errors of pixels."""
     side = TILES * TILE
     shape = ["--size", f"{side}x{side}", "--tile", str(TILE), "--set", channels((380, 780)), "--seed", str(seed), "--uncertainty"]
-    render(program, scene, str(cube), *shape, "--spp", str(FIRST), "--overwrite")
+    rule = ["--error", str(error), "--error-per", "tile"]
+    render(program, scene, str(cube), *shape, *rule, "--spp", str(FIRST), "--overwrite")
+    assert set(samples(cube)) == {FIRST}
     first = means(cube)
-    render(program, scene, str(cube), *shape, "--error", str(error), "--error-per", "tile", "--resume")
-    taken, ended, ended_pixels = samples(cube), means(cube), pixels(cube)
+    render(program, scene, str(cube), *shape, *rule, "--resume")
     errors = [numbers(cube / f"standard_error/c/0/{i // TILES}/{i % TILES}", "f") for i in range(TILES**2)]
     squares = [[math.fsum(v * v for v in tile[k::CHANNELS]) for k in range(CHANNELS)] for tile in errors]
-    if on:
-        render(program, scene, str(cube), *shape, "--spp", str(samples_on), "--tiles", f"{on.start}..{on.stop}", "--resume")
-    return first, taken, ended, ended_pixels, squares, means(cube)
+    return first, samples(cube), means(cube), pixels(cube), squares
 
 
-def bias_of(program, folder, scene, wanted, samples_on, seeds):
-    cube, cells = pathlib.Path(folder) / "bias.zarr", TILES**2
-    pilots = [renders(program, cube, scene, wanted, 1_000_000 + seed, range(0), 0)[1] for seed in range(PILOTS)]
-    usual = [statistics.fmean(p[i] for p in pilots) for i in range(cells)]
-    # Var(mean of m - mean of n) of nested samples is 1/m - 1/n of the variance of one.
-    gains = [i for i in range(cells) if 1 / usual[i] - 1 / samples_on < 1 / FIRST - 1 / usual[i]]
-    on = range(gains[0], gains[-1] + 1) if gains else range(0)
-    found = []
+def bias_of(program, folder, scene, wanted, seeds):
+    cube, cells, found = pathlib.Path(folder) / "bias.zarr", TILES**2, []
     for seed in range(seeds):
-        found.append(renders(program, cube, scene, wanted, seed, on, samples_on))
+        found.append(renders(program, cube, scene, wanted, seed))
         if seed % 10 == 9:
             print(f"{scene}: {seed + 1} of {seeds} seeds", file=sys.stderr, flush=True)
     n = len(found)
     shifts, ratios = [], []
     for i in range(cells):
-        even = 5 if i in on else 0
         # The pixels' means over all seeds have the bias itself in them, which is small beside a pixel's error.
         middle = [math.fsum(f[3][i][j] for f in found) / n for j in range(TILE**2 * CHANNELS)]
         for k in range(CHANNELS):
             told = statistics.fmean(f[4][i][k] for f in found)
             # Of the mean over the tile, as one render has it.
             error = math.sqrt(told) / TILE**2
-            differences = [f[2][i][k] - f[even][i][k] for f in found]
+            differences = [f[2][i][k] - f[0][i][k] for f in found]
             shift, known = (statistics.fmean(differences) / error, statistics.stdev(differences) / math.sqrt(n) / error) if error > 0 else (0.0, 0.0)
             real = math.fsum(math.fsum((f[3][i][j] - middle[j]) ** 2 for j in range(k, TILE**2 * CHANNELS, CHANNELS)) for f in found) / (n - 1)
             ratio = math.sqrt(real / told) if told > 0 else 1.0
             shifts.append(shift)
             ratios.append(ratio)
             taken = statistics.fmean(f[1][i] for f in found)
-            yield ["bias", scene, wanted, i, k, n, f"{taken:.1f}", samples_on if i in on else FIRST, f"{shift:.4f}", f"{known:.4f}", f"{ratio:.4f}"]
+            yield ["bias", scene, wanted, i, k, n, f"{taken:.1f}", f"{shift:.4f}", f"{known:.4f}", f"{ratio:.4f}"]
     by_tile = [statistics.fmean(shifts[i * CHANNELS:(i + 1) * CHANNELS]) for i in range(cells)]
     print(f"{scene}, bias over {n} seeds: mean {statistics.fmean(shifts):+.3f} standard errors, by tile {min(by_tile):+.3f} to {max(by_tile):+.3f}, by tile and channel {min(shifts):+.3f} to {max(shifts):+.3f}; "
           f"true error over estimate {statistics.fmean(ratios):.3f}, from {min(ratios):.3f} to {max(ratios):.3f}")
@@ -157,7 +149,7 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         for name, head, rows in [
             ("gain", "kind,scene,size,tile,epoch,error,tiles,ended_by_samples,least,mean,most,times_fewer_paths", lambda: gain(asked.spectile, folder, asked.scene)),
-            ("bias", "kind,scene,error,tile,channel,seeds,samples,samples_of_even,shift_in_standard_errors,known_to,true_error_over_estimate", lambda: bias(asked.spectile, folder, asked.scene, asked.seeds)),
+            ("bias", "kind,scene,error,tile,channel,seeds,samples,shift_in_standard_errors,known_to,true_error_over_estimate", lambda: bias(asked.spectile, folder, asked.scene, asked.seeds)),
         ]:
             if asked.only in (None, name):
                 with open(asked.output / f"tiles-{name}.csv", "w", newline="") as file:

@@ -44,7 +44,7 @@ pub fn decode<'a>(
         if parts.is_empty() {
             fields.error_help("has no objects", format!("add tables [[{}.objects]]", item.path));
         }
-        parts.iter().for_each(|part| objects.add_to(decoded.len(), part));
+        objects.add_to(decoded.len(), &parts);
         let own = objects.since(first);
         let is_round = own.iter().any(|object| !matches!(object.shape, Shape::Mesh(_)));
         // Without any, what is wrong with its objects has been said.

@@ -121,7 +121,7 @@ fn decode<'a>(cx: &'a Context<'a>, root: &'a [Entry]) -> Option<Scene> {
     let mut media = Media::new(top.get("media"), &mut spectra);
     let mut objects = Objects::new(&mut spectra, &mut materials, &mut media);
     if let Some(items) = top.get("objects").and_then(|item| item.array()) {
-        items.iter().for_each(|item| objects.add(item));
+        objects.add_all(&items);
     }
     let assemblies = assembly::decode(top.get("assemblies").as_ref(), top.get("instances").as_ref(), &mut objects);
     let objects = objects.finish();

@@ -2,10 +2,10 @@
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use std::rc::Rc;
 use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
+use rayon::prelude::*;
 
 use super::closed;
 use super::decode::{Fields, Item, list};
@@ -29,6 +29,8 @@ pub struct Objects<'s, 'a> {
     pub media: &'s mut Media<'a>,
     /// `None` where the file is wrong, which has been said.
     meshes: HashMap<PathBuf, Option<Loaded>>,
+    /// Meshes that have been read and not been asked for yet.
+    ahead: HashMap<PathBuf, Result<Loaded, Box<Problem>>>,
     scene: Vec<Object>,
     /// Whose part the next object is.
     assembly: Option<AssemblyId>,
@@ -41,7 +43,7 @@ pub struct Objects<'s, 'a> {
 enum Loaded {
     Mesh(Format, Arc<Mesh>),
     /// Of which each object may have another node.
-    Gltf(Rc<gltf::File>),
+    Gltf(Arc<gltf::File>),
 }
 
 /// What all pieces of one object share. An outer `None` is a mistake that has been said; the rest of the object is
@@ -77,11 +79,29 @@ enum Covering {
 
 impl<'s, 'a> Objects<'s, 'a> {
     pub fn new(spectra: &'s mut Spectra<'a>, materials: &'s mut Materials<'a>, media: &'s mut Media<'a>) -> Self {
-        Objects { spectra, materials, media, meshes: HashMap::new(), scene: Vec::new(), assembly: None, bodies: 0 }
+        let (meshes, ahead) = (HashMap::new(), HashMap::new());
+        Objects { spectra, materials, media, meshes, ahead, scene: Vec::new(), assembly: None, bodies: 0 }
     }
 
-    /// Decodes one entry of `[[objects]]`.
-    pub fn add(&mut self, item: &Item<'a>) {
+    /// Decodes entries of `[[objects]]`, whose meshes are read by all cores at once.
+    pub fn add_all(&mut self, items: &[Item<'a>]) {
+        self.read_ahead(items);
+        items.iter().for_each(|item| self.add(item));
+    }
+
+    fn read_ahead(&mut self, items: &[Item<'a>]) {
+        let path = |item: &Item| match &item.member("mesh")?.node.value {
+            Value::String(name) => Some(item.cx.path(name)),
+            _ => None,
+        };
+        let mut paths: Vec<PathBuf> = items.iter().filter_map(path).collect();
+        paths.sort();
+        paths.dedup();
+        paths.retain(|path| !self.meshes.contains_key(path));
+        self.ahead = paths.into_par_iter().map(|path| (path.clone(), load(&path))).collect();
+    }
+
+    fn add(&mut self, item: &Item<'a>) {
         let Some(fields) = item.table(&keys::OBJECT) else { return };
         let shape = fields.exactly_one("shape");
         let group = fields.get("group");
@@ -139,12 +159,12 @@ impl<'s, 'a> Objects<'s, 'a> {
         self.place(&fields, name, (local, attributes), covering, &common);
     }
 
-    /// Decodes one entry of an assembly's objects.
-    pub fn add_to(&mut self, assembly: AssemblyId, item: &Item<'a>) {
+    /// Decodes the objects of an assembly.
+    pub fn add_to(&mut self, assembly: AssemblyId, items: &[Item<'a>]) {
         self.assembly = Some(assembly);
-        self.add(item);
+        self.add_all(items);
         self.assembly = None;
-        if let Some(interior) = item.member("interior") {
+        for interior in items.iter().filter_map(|item| item.member("interior")) {
             interior.error_help(
                 "is not supported within assemblies yet: nothing that is placed several times holds matter",
                 "remove it, or write the object as one of `[[objects]]`",
@@ -263,7 +283,7 @@ impl<'s, 'a> Objects<'s, 'a> {
             None => {
                 let loaded = match item.data() {
                     Some(data) => data.mesh().map(|mesh| Loaded::Mesh(Format::Memory, mesh)),
-                    None => load(&path),
+                    None => self.ahead.remove(&path).unwrap_or_else(|| load(&path)),
                 };
                 let loaded = match loaded {
                     Ok(loaded) => Some(loaded),
@@ -525,7 +545,7 @@ fn word_of_materials(format: Format) -> &'static str {
 fn load(path: &Path) -> Result<Loaded, Box<Problem>> {
     let bytes = mesh::content(path)?;
     Ok(match Format::of(path, &bytes) {
-        Format::Gltf => Loaded::Gltf(Rc::new(gltf::parse(&bytes, path)?)),
+        Format::Gltf => Loaded::Gltf(Arc::new(gltf::parse(&bytes, path)?)),
         format => Loaded::Mesh(format, Arc::new(mesh::parse(format, &bytes, path)?)),
     })
 }

@@ -212,17 +212,10 @@ impl DielectricAlbedo {
 impl SideAlbedo {
     /// `eta`: the index on the far side over that on this side.
     fn new(alpha: f64, eta: f64, lattice: &Lattice) -> Self {
-        let mut side =
-            SideAlbedo { reflected: [0.0; COSINES], loss: [0.0; COSINES], mean_reflected: 0.0, mean_loss: 0.0 };
-        for i in 0..COSINES {
-            let z = cosine_at(i, alpha);
-            let o = DVec3::new((1.0 - z * z).max(0.0).sqrt(), 0.0, z);
-            let albedo = boundary(alpha, o, lattice, eta);
-            (side.reflected[i], side.loss[i]) = (albedo.x, 1.0 - albedo.x - albedo.y);
-        }
-        side.mean_reflected = mean(&side.reflected, alpha);
-        side.mean_loss = mean(&side.loss, alpha);
-        side
+        let albedos = boundaries(alpha, eta, lattice);
+        let (reflected, loss) = (albedos.map(|albedo| albedo.x), albedos.map(|albedo| 1.0 - albedo.x - albedo.y));
+        let (mean_reflected, mean_loss) = (mean(&reflected, alpha), mean(&loss, alpha));
+        SideAlbedo { reflected, loss, mean_reflected, mean_loss }
     }
 }
 
@@ -245,11 +238,7 @@ impl CoatAlbedo {
     pub fn new(alpha: f64, range: [f64; 2]) -> Self {
         let lattice = Lattice::new(LATTICE);
         let of_index = |eta: f64| {
-            let at = |i: usize| {
-                let z = cosine_at(i, alpha);
-                boundary(alpha, DVec3::new((1.0 - z * z).max(0.0).sqrt(), 0.0, z), &lattice, eta).x
-            };
-            let reflected = std::array::from_fn(at);
+            let reflected = boundaries(alpha, eta, &lattice).map(|albedo| albedo.x);
             (reflected, mean(&reflected, alpha))
         };
         CoatAlbedo { alpha, reflected: ByIndex::new(range, of_index) }
@@ -350,6 +339,16 @@ fn boundary(alpha: f64, o: DVec3, lattice: &Lattice, eta: f64) -> DVec2 {
         let transmitted = if square <= 0.0 || i.z >= 0.0 { 0.0 } else { (1.0 - f) / (1.0 + lambda(alpha, i)) };
         DVec2::new(reflected, transmitted)
     })
+}
+
+/// [`boundary`] at each node of the cosine.
+fn boundaries(alpha: f64, eta: f64, lattice: &Lattice) -> [DVec2; COSINES] {
+    let at = |i: usize| {
+        let z = cosine_at(i, alpha);
+        boundary(alpha, DVec3::new((1.0 - z * z).max(0.0).sqrt(), 0.0, z), lattice, eta)
+    };
+    let albedos: Vec<DVec2> = (0..COSINES).into_par_iter().map(at).collect();
+    std::array::from_fn(|i| albedos[i])
 }
 
 /// (1 + Λo) / (1 + Λo + Λi), also where Λo is infinite.
