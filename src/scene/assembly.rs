@@ -11,7 +11,7 @@ use super::keys;
 use super::object::Objects;
 use super::spectrum::report_in_file;
 use super::transform;
-use super::{Assembly, AssemblyId, Object, Scene, Shape};
+use super::{Assembly, AssemblyId, Interior, Object, Scene, Shape};
 use crate::error::Problem;
 use crate::format::mesh;
 use crate::format::table;
@@ -334,5 +334,6 @@ fn copy(object: &Object, to_world: &DAffine3) -> Object {
     }
     // Who placed it has looked whether it can be.
     let shape = transform::apply(to_world, object.shape.clone()).unwrap_or_else(|_| object.shape.clone());
-    Object { shape, attributes, assembly: None, ..object.clone() }
+    let interior = object.interior.map(|own| Interior { to_grid: own.to_grid * to_world.inverse(), ..own });
+    Object { shape, attributes, interior, assembly: None, ..object.clone() }
 }

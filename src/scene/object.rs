@@ -164,12 +164,6 @@ impl<'s, 'a> Objects<'s, 'a> {
         self.assembly = Some(assembly);
         self.add_all(items);
         self.assembly = None;
-        for interior in items.iter().filter_map(|item| item.member("interior")) {
-            interior.error_help(
-                "is not supported within assemblies yet: nothing that is placed several times holds matter",
-                "remove it, or write the object as one of `[[objects]]`",
-            );
-        }
     }
 
     /// Adds an object that is already decoded.
@@ -237,7 +231,10 @@ impl<'s, 'a> Objects<'s, 'a> {
     /// What `interior` says of an object whose shape, in its own space, is `local`.
     fn filling(&mut self, fields: &Fields<'a>, local: &Shape) -> Option<Option<Filling>> {
         let item = fields.get("interior")?;
-        let medium = self.media.take(&item, self.spectra);
+        let medium = match self.assembly {
+            None => self.media.take(&item, self.spectra),
+            Some(_) => self.media.take_placed(&item, self.spectra),
+        };
         if let Some(opening) = closed::opening(local) {
             item.error_help(
                 format!("fills closed shapes only, but {opening}"),

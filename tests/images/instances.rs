@@ -30,6 +30,7 @@ fn room_with(thing: &str) -> Scene {
         .diffuse(room(DVec3::new(-1.0, -1.0, -1.0), DVec3::new(1.0, 1.0, 3.0)), table(&[400.0, 700.0], &[0.3, 0.7]))
         .lamp(quad(DVec3::new(-0.5, 0.9, -0.5), DVec3::X, DVec3::Z), table(&[400.0, 700.0], &[4.0, 2.0]), Sides::Both);
     let blue = || table(&[400.0, 700.0], &[0.8, 0.2]);
+    let absorbing = || table(&[400.0, 700.0], &[3.0, 1.0]);
     let stretched = places(DVec3::new(1.0, 0.4, 0.7));
     let similar = places(DVec3::ONE);
     let ball = icosphere(DVec3::ZERO, 0.8, 1);
@@ -67,6 +68,18 @@ fn room_with(thing: &str) -> Scene {
             .placed(1, stretched)
             .medium(table(&[400.0, 700.0], &[0.2, 0.5]), None, Field::Constant(1.0))
             .outer(),
+        "gas" => b.gas(absorbing()).null(cuboid(DVec3::splat(-0.5), DVec3::splat(0.5))).placed(1, stretched),
+        "fog" => {
+            let phase = b.henyey_greenstein(0.6);
+            let b = b.gas(0.1).scattering(table(&[400.0, 700.0], &[2.0, 5.0]), phase);
+            // Seen from within one of them.
+            let around_camera = DAffine3::from_translation(DVec3::new(0.0, 0.1, 2.7));
+            b.null(sphere(DVec3::ZERO, 0.6)).placed(1, similar.into_iter().chain([around_camera]).collect())
+        }
+        "filled glass" => {
+            let b = b.gas(absorbing()).dielectric(cuboid(DVec3::splat(-0.5), DVec3::splat(0.5)), 1.5, 0.0).filled();
+            b.placed(1, stretched)
+        }
         _ => unreachable!("{thing}"),
     }
     .build()
@@ -134,8 +147,20 @@ fn tube(from: DVec3, to: DVec3, radius: f64) -> Shape {
     Shape::Cylinder { from, to, radius }
 }
 
-const THINGS: [&str; 9] =
-    ["boxes", "normals", "coordinates", "tangents", "masks", "leaves", "glass", "round", "in gas"];
+const THINGS: [&str; 12] = [
+    "boxes",
+    "normals",
+    "coordinates",
+    "tangents",
+    "masks",
+    "leaves",
+    "glass",
+    "round",
+    "in gas",
+    "gas",
+    "fog",
+    "filled glass",
+];
 
 /// The reference copies what is placed.
 #[test]

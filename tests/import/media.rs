@@ -63,3 +63,26 @@ fn media_of_pbrt_fill_what_is_closed() {
     let error = spectile::import::import(&path, &folder.path().join("out")).expect_err("no such medium").to_string();
     assert!(error.contains("no medium is named \"smoke\""), "{error}");
 }
+
+/// What is placed several times keeps what is in it.
+#[test]
+fn media_of_groups_are_placed() {
+    let group = r#"<shape type="shapegroup" id="drops"><shape type="cube"><bsdf type="null"/><ref name="interior" id="fog"/></shape></shape>
+        <shape type="instance"><ref id="drops"/></shape>
+        <shape type="instance"><ref id="drops"/><transform name="to_world"><translate x="9"/></transform></shape></scene>"#;
+    let (_folder, path) = written("scene.xml", &MITSUBA.replace("</scene>", group));
+    let (_other, of_pbrt) = written(
+        "scene.pbrt",
+        &format!(
+            "{PBRT}ObjectBegin \"drop\" MediumInterface \"fog\" \"\" Material \"interface\" Shape \"sphere\" ObjectEnd\n\
+             ObjectInstance \"drop\" Translate 9 0 0 ObjectInstance \"drop\"\n"
+        ),
+    );
+    for path in [path, of_pbrt] {
+        let found = import(&path);
+        let [assembly] = &found.scene.assemblies[..] else { panic!("{}", found.toml) };
+        let own: Vec<_> = found.scene.objects.iter().filter(|object| object.assembly.is_some()).collect();
+        assert_eq!((assembly.instances.len(), own.len()), (2, 1), "{}", found.toml);
+        assert!(own[0].material.is_none() && own[0].interior.is_some(), "{}", found.toml);
+    }
+}

@@ -98,6 +98,25 @@ fn what_is_placed_nowhere_is_left_out() {
     assert_ne!(scene.digest, good(&with("[[instances]]\nassembly = \"tree\""), &[], &[]).digest);
 }
 
+/// Matter in what is placed is there with each instance, and fills it as it fills its copies.
+#[test]
+fn interiors_are_placed_too() {
+    let drop = "[[assemblies.tree.objects]]\nsphere = { center = [1, 0, 0], radius = 1 }\ninterior = \"water\"\n\
+        [media.water]\nabsorption = 0.5\n[[instances]]\nassembly = \"tree\"\ntransform = { scale = 2, translate = [0, 3, 0] }\n";
+    let scene = good(&with(drop), &[], &[]);
+    let own = scene.objects.last().unwrap();
+    assert_eq!((own.assembly, own.material, own.interior.unwrap().medium), (Some(0), None, 0));
+    let copies = scene.copied();
+    let copy = copies.objects.last().unwrap();
+    assert_eq!(copy.interior.unwrap().body, own.interior.unwrap().body);
+    // The box of the placed ball is the unit cube.
+    for (world, grid) in
+        [(DVec3::new(0.0, 1.0, -2.0), DVec3::ZERO), (DVec3::new(4.0, 5.0, 0.0), DVec3::new(1.0, 1.0, 0.5))]
+    {
+        assert_close(copy.interior.unwrap().to_grid.transform_point3(world), grid);
+    }
+}
+
 #[test]
 fn what_is_refused() {
     let check = |instance: &str, files: &[(&str, &str)], key: &str, words: &[&str]| {
@@ -130,10 +149,6 @@ fn what_is_refused() {
     let round = with("[[assemblies.tree.objects]]\nsphere = { center = [0, 0, 0], radius = 1 }\nmaterial = \"soot\"\n");
     let stretched = format!("{round}[[instances]]\nassembly = \"tree\"\ntransform = {{ scale = [1, 1, 2] }} #!");
     check_wrong(&stretched, &[], "round", "instances.0.transform", &["keep the shape of a sphere"]);
-    let filled =
-        with("[[assemblies.tree.objects]]\ncube = { min = [0, 0, 0], max = [1, 1, 1] }\ninterior = \"air\" #!\n");
-    let filled = format!("{filled}[media.air]\nabsorption = 1.0\n[[instances]]\nassembly = \"tree\"\n");
-    check_wrong(&filled, &[], "interior", "assemblies.tree.objects.2.interior", &["within assemblies"]);
     let empty = format!("{BASE}[assemblies.tree]\nobjects = [] #!\n[[instances]]\nassembly = \"tree\"");
     assert!(super::parse_with(&empty, &[], &[]).is_err_and(|e| e.to_string().contains("has no objects")));
 }

@@ -128,6 +128,17 @@ fn cross_sections_count_the_molecules_of_the_gas() {
     assert!(error.to_string().contains("p / (k T)"), "{error}");
 }
 
+/// A grid has one box; a ball that is placed somewhere is there as often as it is placed.
+#[test]
+fn grids_fill_one_box() {
+    let text = "[media.gas]\nabsorption = 1\ndensity = { grid = \"d.zarr\" }\n[[assemblies.balls.objects]]\n\
+        sphere = { center = [0, 0, 0], radius = 1 }\ninterior = \"gas\"\n[[instances]]\nassembly = \"balls\"\n";
+    let error = with_grids(&format!("{BASE}{text}")).unwrap_err().to_string();
+    assert!(error.contains("assemblies.balls.objects.0.interior") && error.contains("every instance"), "{error}");
+    let numbers = with_grids(&format!("{BASE}{text}").replace("{ grid = \"d.zarr\" }", "2")).unwrap();
+    assert_eq!(numbers.assemblies.len(), 1);
+}
+
 #[test]
 fn species_resolve_with_what_they_do_not_cover() {
     let media = "[media.gas]\nspecies = [{ table = \"gas.csv\", fraction = 0.25 }, { table = \"gas.csv\", fraction = 0.5 }]\npressure = 2.0\ntemperature = 650";

@@ -4,16 +4,17 @@ use glam::{DAffine3, DVec3};
 
 use crate::device::accel::Accel;
 use crate::device::part::{Part, Place, Records, SceneBuffer};
-use crate::device::parts::crossings::{meet, place_on};
+use crate::device::parts::crossings::Surfaces;
 use crate::device::parts::origins::{Cut, Origins};
 use crate::device::parts::surfaces::{Needed, wavelength};
 use crate::device::text::{Module, module};
 use crate::device::words::{
-    NONE, NULL_BOUNDARY, Primitive, VOLUME_EMITS, VOLUME_GRID, VOLUME_SCATTERS, VOLUME_WORDS, VOLUMES_HEAD,
+    KIND_INSTANCE, NONE, NULL_BOUNDARY, Primitive, VOLUME_EMITS, VOLUME_GRID, VOLUME_SCATTERS, VOLUME_WORDS,
+    VOLUMES_HEAD,
 };
 use crate::scene::{
-    Absorber, Bsdf, Component, Field, Interior, Line, MaterialId, Medium, MediumId, Projection, Scene, SpectrumId,
-    box_around_all,
+    Absorber, AssemblyId, Bsdf, Component, Field, Interior, Line, MaterialId, Medium, MediumId, Object, Projection,
+    Scene, SpectrumId, box_around, box_around_all,
 };
 use crate::spectral::{Curve, planck};
 use crate::{Error, Result};
@@ -206,6 +207,17 @@ struct Volume<'a> {
     index: Option<Curve>,
 }
 
+impl Volume<'_> {
+    /// How often it is in the scene.
+    fn times(&self, scene: &Scene) -> usize {
+        let Some(interior) = self.interior else { return 1 };
+        let mut assemblies: Vec<Option<AssemblyId>> = of_body(scene, &interior).map(|object| object.assembly).collect();
+        assemblies.dedup();
+        let times = |assembly: Option<AssemblyId>| assembly.map_or(1, |of| scene.assemblies[of].instances.len());
+        assemblies.into_iter().map(times).sum()
+    }
+}
+
 impl Media {
     /// `None` where the scene has no media. Errors: more volumes than numbers, or around the camera than a path can hold.
     pub fn new(scene: &Scene, accel: &Accel) -> Result<Option<Media>> {
@@ -238,13 +250,20 @@ impl Media {
             let message = format!("{} interiors with media, at most {MOST_VOLUMES} are supported", volumes.len());
             return Err(Error::input(&scene.file, message));
         }
-        let boundary = |&object: &u32| {
+        let boundary = |(primitive, &object): (&Primitive, &u32)| {
+            // What bounds is in it.
+            if primitive.tag >> 24 == KIND_INSTANCE {
+                return 0;
+            }
             let null = scene.objects[object as usize].material.is_none();
             of_object[object as usize] | if null { NULL_BOUNDARY } else { 0 }
         };
+        let boundaries: Vec<u32> = accel.primitives.iter().zip(&accel.objects).map(boundary).collect();
+        let surfaces = Surfaces::new(scene, accel, &boundaries);
+        let bodies: usize = volumes.iter().map(|volume| volume.times(scene)).sum();
         let mut media = Media {
             volumes: vec![0; HEAD],
-            boundaries: accel.objects.iter().map(boundary).collect(),
+            boundaries,
             spectra: Vec::new(),
             outer,
             camera_is_cut: false,
@@ -253,7 +272,7 @@ impl Media {
             most_kinds: 0,
             most_terms: 1,
             most_listed: 0,
-            stretches: (2 * volumes.len() as u32 + 1).clamp(4, MOST_STRETCHES),
+            stretches: (2 * bodies + 1).clamp(4, MOST_STRETCHES as usize) as u32,
             cells: 0,
             marched: 0,
             places: Vec::new(),
@@ -265,7 +284,7 @@ impl Media {
         media.volumes.resize(HEAD + WORDS * volumes.len(), 0);
         media.volumes[0] = (1.0 / accel.space.scale as f32).to_bits();
         let within: Vec<Option<Curve>> = (0..volumes.len())
-            .map(|i| product_of_indices(scene, &volumes, &media.bodies_around(i as u32 + 1, &accel.primitives)))
+            .map(|i| product_of_indices(scene, &volumes, &media.bodies_around(i as u32 + 1, &surfaces)))
             .collect();
         for (index, (volume, within)) in volumes.iter_mut().zip(within).enumerate() {
             volume.index = within;
@@ -276,7 +295,7 @@ impl Media {
                 extent: extent(scene, accel, volume.interior.as_ref()),
             });
         }
-        media.place_camera(scene, accel)?;
+        media.place_camera(scene, accel, &surfaces)?;
         Ok(Some(media))
     }
 
@@ -497,7 +516,7 @@ impl Media {
 
     /// Notes the volumes around the camera, the innermost in the low byte; where boundaries cut its lens or window, those around a
     /// place there, from which devices find those of each ray.
-    fn place_camera(&mut self, scene: &Scene, accel: &Accel) -> Result<()> {
+    fn place_camera(&mut self, scene: &Scene, accel: &Accel, surfaces: &Surfaces) -> Result<()> {
         let mut place = (scene.camera.position - accel.space.center) * accel.space.scale;
         if let Projection::Pushbroom { lines, .. } = &scene.camera.projection {
             // Any place of the track does, to which straight ways lead from all others; one that is on no boundary that a model is likely to have.
@@ -505,16 +524,17 @@ impl Media {
             let middle = Line::at(lines, 0.5 + SHARE * (lines.len() as f64 - 1.0)).position;
             place = self.start_everywhere((middle - accel.space.center) * accel.space.scale);
         } else if let Some(origins) = Origins::of(scene, &accel.space) {
-            let boundaries =
-                accel.primitives.iter().zip(&self.boundaries).filter(|(_, boundary)| **boundary & 0xff != 0);
-            let cuts: Vec<Cut> = boundaries.filter_map(|(primitive, _)| origins.cut(primitive)).collect();
+            let mut cuts: Vec<Cut> = Vec::new();
+            surfaces.each(|primitive, _| cuts.extend(origins.cut(primitive)));
             if !cuts.is_empty() {
                 place = self.start_everywhere(origins.place_apart_from(&cuts));
             }
         }
-        let Some(around) = self.around(place, &accel.primitives) else {
+        let around = self.around(place, surfaces);
+        if around.len() > 8 {
             return Err(Error::input(&scene.file, "the camera is inside more than 8 nested media"));
-        };
+        }
+        let around = around.iter().rev().fold(0, |word, &n| word << 8 | u64::from(n));
         self.volumes[1..3].copy_from_slice(&[around as u32, (around >> 32) as u32]);
         Ok(())
     }
@@ -529,45 +549,16 @@ impl Media {
     }
 
     /// Volume `number` and those around it, as they are at one place of its surface; the innermost first.
-    fn bodies_around(&self, number: u32, primitives: &[Primitive]) -> Vec<u32> {
-        let own = primitives.iter().zip(&self.boundaries).find(|(_, boundary)| **boundary & 0xff == number);
-        let around = own.map(|(primitive, _)| self.list_around(place_on(primitive), primitives)).unwrap_or_default();
+    fn bodies_around(&self, number: u32, surfaces: &Surfaces) -> Vec<u32> {
+        let around = surfaces.place_on(number).map(|place| self.around(place, surfaces)).unwrap_or_default();
         let outer = around.into_iter().filter(|other| *other != number);
         std::iter::once(number).chain(outer).collect()
     }
 
-    /// The volumes around a point in device units; `None` where they are more than a path can hold.
-    fn around(&self, point: DVec3, primitives: &[Primitive]) -> Option<u64> {
-        let around = self.list_around(point, primitives);
-        (around.len() <= 8).then(|| around.iter().rev().fold(0, |word, &n| word << 8 | u64::from(n)))
-    }
-
     /// The volumes around a point in device units, the innermost first.
-    fn list_around(&self, point: DVec3, primitives: &[Primitive]) -> Vec<u32> {
-        // No edge of a model is likely to lie in this direction.
-        let direction = DVec3::new(0.367_879_441, 0.577_215_664, 0.728_913_7).normalize();
-        let mut crossings: Vec<(f64, u32, bool)> = Vec::new();
-        for (primitive, boundary) in primitives.iter().zip(&self.boundaries) {
-            let number = boundary & 0xff;
-            if number != 0 {
-                meet(primitive, point, direction, &mut |t, leaving| crossings.push((t, number, leaving)));
-            }
-        }
-        crossings.sort_by(|a, b| a.0.total_cmp(&b.0));
-        // What is left before it is entered is around the point; what is left first is innermost.
-        let mut around: Vec<u32> = Vec::new();
-        let mut entered: Vec<u32> = Vec::new();
-        for (_, number, leaving) in crossings {
-            if !leaving {
-                entered.push(number);
-            } else if let Some(at) = entered.iter().rposition(|n| *n == number) {
-                entered.remove(at);
-            } else {
-                around.push(number);
-            }
-        }
-        around.extend((self.outer != NONE).then(|| self.outer + 1));
-        around
+    fn around(&self, point: DVec3, surfaces: &Surfaces) -> Vec<u32> {
+        let outer = (self.outer != NONE).then(|| self.outer + 1);
+        surfaces.bodies_around(point).into_iter().chain(outer).collect()
     }
 }
 
@@ -602,8 +593,17 @@ fn source(scene: &Scene, kelvin: f64, index: Option<&Curve>) -> Curve {
 /// How far an interior reaches, in metres from end to end; without one, all space, as far as the scene.
 pub fn extent(scene: &Scene, accel: &Accel, interior: Option<&Interior>) -> f64 {
     let Some(interior) = interior else { return 2.0 * accel.space.radius / accel.space.scale };
-    let of_body = scene.objects.iter().filter(|o| o.interior.is_some_and(|i| i.body == interior.body));
-    box_around_all(of_body.map(|object| object.shape.bounds())).map_or(0.0, |[low, high]| (high - low).length())
+    let Some(own) = box_around_all(of_body(scene, interior).map(|object| object.shape.bounds())) else { return 0.0 };
+    let reach = |[low, high]: [DVec3; 2]| (high - low).length();
+    let placed = of_body(scene, interior).filter_map(|object| object.assembly);
+    let placed = placed.flat_map(|assembly| &scene.assemblies[assembly].instances);
+    placed.map(|to_world| reach(box_around(to_world, own))).reduce(f64::max).unwrap_or(reach(own))
+}
+
+/// The objects that together are the surface of a body.
+fn of_body<'a>(scene: &'a Scene, interior: &Interior) -> impl Iterator<Item = &'a Object> {
+    let body = interior.body;
+    scene.objects.iter().filter(move |object| object.interior.is_some_and(|of| of.body == body))
 }
 
 /// Spectra and factors whose sum is the absorption of a medium, m⁻¹, at a temperature and the density of each kind of matter.

@@ -107,7 +107,7 @@ impl<'n> Importer<'n, '_> {
             object.comments.insert(0, values::shown(id));
         }
         let boundary = Boundary::of(self.scene, material.as_deref());
-        let is_filled = self.fill(&plugin, &mut object, boundary, depth.is_some())?;
+        let is_filled = self.fill(&plugin, &mut object, boundary)?;
         match material {
             Some(material) => object.set("material", text::quoted(&material)),
             None if is_filled => {}
@@ -131,15 +131,11 @@ impl<'n> Importer<'n, '_> {
     }
 
     /// Gives a shape the medium of its `interior`, if it has one; whether it did.
-    fn fill(&mut self, plugin: &Plugin<'n>, object: &mut Section, boundary: Boundary, is_placed: bool) -> Result<bool> {
+    fn fill(&mut self, plugin: &Plugin<'n>, object: &mut Section, boundary: Boundary) -> Result<bool> {
         if plugin.get("exterior").is_some() {
             self.scene.report.left_out(plugin.place(), "the `exterior` medium of a shape");
         }
         let Some(node) = plugin.get("interior") else { return Ok(false) };
-        if is_placed {
-            self.scene.report.left_out(plugin.place(), "the `interior` medium of a shape in a group");
-            return Ok(false);
-        }
         match self.medium(node)? {
             Some(name) => Ok(media::fill(self.scene, object, &name, boundary, plugin.place())),
             None => Ok(false),

@@ -482,10 +482,7 @@ impl Importer<'_> {
         if let Some(alpha) = alpha {
             look = self.masked(look, alpha, at);
         }
-        let mut kept = Kept { form, to_world, look, emission, inside: self.state.inside.clone(), line: at.line };
-        if self.open.is_some() && kept.inside.take().is_some() {
-            self.scene.report.left_out(at.place(), "the medium in a shape of an object");
-        }
+        let kept = Kept { form, to_world, look, emission, inside: self.state.inside.clone(), line: at.line };
         match &mut self.open {
             Some((_, shapes)) => shapes.push(kept),
             None => self.place(kept, at)?,

@@ -132,8 +132,9 @@ material = "ball"
 [[instances]]
 assembly = "tree"
 "#],
-    notes: "Within assemblies objects have no `interior` yet. What emits does so in every place, with the same radiance \
-            whatever its size: each instance is one light of those that paths aim at.",
+    notes: "What emits does so in every place, with the same radiance whatever its size: each instance is one light of those \
+            that paths aim at. An `interior` fills every instance, with as much per metre of the world whatever its size; its \
+            medium has no grids, and where instances overlap it is there once.",
 };
 
 pub static INSTANCE: Section = Section {
