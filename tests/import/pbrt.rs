@@ -151,6 +151,35 @@ Material "interface" Shape "sphere""#,
 }
 
 /// What is no RGB is scaled to luminance 1; power is spread over what shines.
+/// What `zmin`, `zmax`, `phimax` and `innerradius` leave: areas of zones, rings and sectors, within what 128 segments a turn cut off.
+#[test]
+fn parts_of_round_shapes() {
+    let found = imported(
+        r#"Shape "sphere" "float radius" 2 "float zmin" 0 "float zmax" 1 "float phimax" 180
+        Shape "disk" "float radius" 2 "float innerradius" 1 "float phimax" 90
+        Shape "cylinder" "float radius" 2 "float phimax" 90
+        Shape "sphere" "float radius" 2 "float zmin" -2 "float zmax" 3 "float phimax" 400
+        Shape "disk" "float phimax" 0"#,
+    );
+    let pi = std::f64::consts::PI;
+    assert_eq!(found.scene.objects.len(), 4, "{}", found.toml);
+    for (object, (area, [low, high])) in found.scene.objects.iter().zip([
+        (2.0 * pi * 2.0 * 0.5, [DVec3::new(-2.0, 0.0, 0.0), DVec3::new(2.0, 2.0, 1.0)]),
+        (pi * (4.0 - 1.0) / 4.0, [DVec3::ZERO, DVec3::new(2.0, 2.0, 0.0)]),
+        (2.0 * pi * 2.0 * 2.0 / 4.0, [DVec3::new(0.0, 0.0, -1.0), DVec3::new(2.0, 2.0, 1.0)]),
+    ]) {
+        let Shape::Mesh(mesh) = &object.shape else { panic!("{}", object.name) };
+        let corners = mesh.triangles.iter().map(|t| t.map(|i| mesh.positions[i as usize]));
+        let found: f64 = corners.map(|[a, b, c]| 0.5 * (b - a).cross(c - a).length()).sum();
+        // Chords across π / 128 of an angle in two directions.
+        assert!((found / area - 1.0).abs() < 1e-3 && found < area, "{}: {found}, {area}", object.name);
+        let bounds = object.shape.bounds();
+        assert!(bounds[0].distance(low) < 1e-6 && bounds[1].distance(high) < 1e-6, "{}: {bounds:?}", object.name);
+    }
+    assert!(matches!(found.scene.objects[3].shape, Shape::Sphere { .. }));
+    assert!(found.page.contains("a `disk` of which no part is there"), "{}", found.page);
+}
+
 #[test]
 fn lights_and_their_scales() {
     let found = imported(

@@ -1,5 +1,7 @@
 //! Shapes of pbrt.
 
+use std::f64::consts::{PI, TAU};
+
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 
 use super::token::{At, Parameters, shown};
@@ -106,19 +108,27 @@ impl Importer<'_> {
             let radius = parameters.number("radius")?.unwrap_or(1.0);
             if radius > 0.0 { Ok(radius) } else { Err(at.problem("`radius` must be above 0").into()) }
         };
-        let partly = |names: &[&str]| names.iter().any(|name| parameters.get(name).is_some());
+        // How much of a turn around its axis a round shape goes.
+        let turn = || -> Result<f64> { Ok(parameters.number("phimax")?.unwrap_or(360.0).clamp(0.0, 360.0) / 360.0) };
+        let around = |turn: f64| (f64::from(AROUND) * turn).ceil() as u32;
         let mesh = match kind {
             "sphere" => {
-                let radius = radius()?;
-                if partly(&["zmin", "zmax", "phimax"]) {
-                    self.scene.report.approximated(at.place(), "a part of a sphere as the whole");
-                }
-                if round && !reversed {
+                let (radius, turn) = (radius()?, turn()?);
+                let end = |name: &str, whole: f64| -> Result<f64> {
+                    Ok((parameters.number(name)?.unwrap_or(whole) / radius).clamp(-1.0, 1.0))
+                };
+                let (one, other) = (end("zmin", -radius)?, end("zmax", radius)?);
+                let (low, high) = (one.min(other).acos(), one.max(other).acos());
+                if round && !reversed && turn == 1.0 && low - high == PI {
                     return Ok(Some(Form::Sphere { radius }));
                 }
+                if turn == 0.0 || low == high {
+                    return Ok(self.empty(kind, at));
+                }
                 self.tessellated(at);
-                Mesh::grid(AROUND, AROUND / 2, |u, v| {
-                    let (azimuth, polar) = (std::f64::consts::TAU * u, std::f64::consts::PI * (1.0 - v));
+                let rows = (f64::from(AROUND) * (low - high) / TAU).ceil() as u32;
+                Mesh::grid(around(turn), rows, |u, v| {
+                    let (azimuth, polar) = (TAU * turn * u, low + v * (high - low));
                     let p = DVec3::new(polar.sin() * azimuth.cos(), polar.sin() * azimuth.sin(), polar.cos());
                     (radius * p, p, DVec2::new(u, v))
                 })
@@ -126,15 +136,16 @@ impl Importer<'_> {
             "disk" => {
                 let (radius, height) = (radius()?, parameters.number("height")?.unwrap_or(0.0));
                 let inner = parameters.number("innerradius")?.unwrap_or(0.0);
-                if parameters.get("phimax").is_some() {
-                    self.scene.report.approximated(at.place(), "a part of a disk as the whole");
-                }
-                if round && inner == 0.0 {
+                let turn = turn()?;
+                if round && inner == 0.0 && turn == 1.0 {
                     return Ok(Some(Form::Disk { height, radius, reversed }));
                 }
+                if turn == 0.0 || inner >= radius {
+                    return Ok(self.empty(kind, at));
+                }
                 self.tessellated(at);
-                Mesh::grid(AROUND, 1, |u, v| {
-                    let azimuth = std::f64::consts::TAU * u;
+                Mesh::grid(around(turn), 1, |u, v| {
+                    let azimuth = TAU * turn * u;
                     let r = radius + v * (inner - radius);
                     (DVec3::new(r * azimuth.cos(), r * azimuth.sin(), height), DVec3::Z, DVec2::new(u, v))
                 })
@@ -146,15 +157,16 @@ impl Importer<'_> {
                 if high <= low {
                     return Err(at.problem("`zmax` must be above `zmin`").into());
                 }
-                if parameters.get("phimax").is_some() {
-                    self.scene.report.approximated(at.place(), "a part of a cylinder as the whole");
-                }
-                if round && !reversed {
+                let turn = turn()?;
+                if round && !reversed && turn == 1.0 {
                     return Ok(Some(Form::Cylinder { radius, low, high }));
                 }
+                if turn == 0.0 {
+                    return Ok(self.empty(kind, at));
+                }
                 self.tessellated(at);
-                Mesh::grid(AROUND, 1, |u, v| {
-                    let azimuth = std::f64::consts::TAU * u;
+                Mesh::grid(around(turn), 1, |u, v| {
+                    let azimuth = TAU * turn * u;
                     let normal = DVec3::new(azimuth.cos(), azimuth.sin(), 0.0);
                     (radius * normal + DVec3::Z * (low + v * (high - low)), normal, DVec2::new(u, v))
                 })
@@ -205,6 +217,12 @@ impl Importer<'_> {
         let name = format!("{kind}-{}", at.line);
         let area = area(&mesh);
         Ok(Some(Form::Mesh { path: mesh.write(self.scene, &name)?, area }))
+    }
+
+    /// No shape, which is said.
+    fn empty(&mut self, kind: &str, at: &At) -> Option<Form> {
+        self.scene.report.left_out(at.place(), format!("a `{kind}` of which no part is there"));
+        None
     }
 
     fn tessellated(&mut self, at: &At) {
