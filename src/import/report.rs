@@ -1,6 +1,6 @@
 //! What became of everything in a scene: `IMPORT.md`.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -44,8 +44,10 @@ pub enum Fate {
 /// Everything that is to be said.
 #[derive(Debug, Default)]
 pub struct Report {
-    translated: BTreeMap<String, Vec<Place>>,
-    said: BTreeMap<(Fate, String), Vec<Place>>,
+    /// The first places, and how many there are.
+    translated: BTreeMap<String, (Vec<Place>, usize)>,
+    /// Each place once, however often it was come to.
+    said: BTreeMap<(Fate, String), BTreeSet<Place>>,
 }
 
 /// Places of one thing that are listed.
@@ -53,14 +55,15 @@ const MOST_PLACES: usize = 24;
 
 impl Report {
     pub fn translated(&mut self, what: impl Into<String>, place: Place) {
-        self.translated.entry(what.into()).or_default().push(place);
+        let (listed, count) = self.translated.entry(what.into()).or_default();
+        *count += 1;
+        if listed.len() < MOST_PLACES {
+            listed.push(place);
+        }
     }
 
     pub fn say(&mut self, fate: Fate, place: Option<Place>, what: impl Into<String>) {
-        let places = self.said.entry((fate, what.into())).or_default();
-        if let Some(place) = place.filter(|place| !places.contains(place)) {
-            places.push(place);
-        }
+        self.said.entry((fate, what.into())).or_default().extend(place);
     }
 
     pub fn approximated(&mut self, place: Place, what: impl Into<String>) {
@@ -91,7 +94,7 @@ impl Report {
 
     /// Things that are exactly as they were.
     pub fn translations(&self) -> usize {
-        self.translated.values().map(Vec::len).sum()
+        self.translated.values().map(|(_, count)| count).sum()
     }
 
     /// The page, for the scene in `source`.
@@ -110,24 +113,48 @@ impl Report {
                 let _ = writeln!(page, "{none}");
             }
             for ((_, what), places) in self.said.iter().filter(|((of, _), _)| *of == fate) {
-                let _ = writeln!(page, "- {what}{}", shown(places));
+                let _ = writeln!(page, "- {what}{}", shown(places, places.len()));
             }
         }
         let _ = write!(page, "\n## Translated\n\n");
-        for (what, places) in &self.translated {
-            let _ = writeln!(page, "- {what}{}", shown(places));
+        for (what, (listed, count)) in &self.translated {
+            let _ = writeln!(page, "- {what}{}", shown(listed, *count));
         }
         page
     }
 }
 
-fn shown(places: &[Place]) -> String {
-    if places.is_empty() {
+/// The first of `count` places.
+fn shown<'p>(places: impl IntoIterator<Item = &'p Place>, count: usize) -> String {
+    if count == 0 {
         return String::new();
     }
-    let mut list: Vec<String> = places.iter().take(MOST_PLACES).map(Place::shown).collect();
-    if places.len() > MOST_PLACES {
-        list.push(format!("and {} more", places.len() - MOST_PLACES));
+    let mut list: Vec<String> = places.into_iter().take(MOST_PLACES).map(Place::shown).collect();
+    if count > MOST_PLACES {
+        list.push(format!("and {} more", count - MOST_PLACES));
     }
     format!(" ({})", list.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A place that is come to several times is one, whatever was said between.
+    #[test]
+    fn places_are_listed_once_and_counted() {
+        let mut report = Report::default();
+        let at = |line| Place::line(Path::new("a/scene.xml"), line);
+        for line in (1..=30).chain(1..=30) {
+            report.left_out(at(line), "hair");
+            report.translated("sphere", at(line));
+        }
+        let page = report.page(Path::new("a/scene.xml"));
+        assert_eq!((report.count(Fate::LeftOut), report.translations()), (1, 60));
+        assert!(
+            page.contains("- hair (scene.xml:1, scene.xml:2, ") && page.contains("scene.xml:24, and 6 more)"),
+            "{page}"
+        );
+        assert!(page.contains("- sphere (scene.xml:1, ") && page.contains("scene.xml:24, and 36 more)"), "{page}");
+    }
 }
