@@ -114,7 +114,7 @@ pub(super) fn source<'a>(item: &Item<'a>, needed: Option<[f64; 2]>) -> Option<So
 
 pub(super) fn file(item: &Item, column: Option<Item>, unit: Option<Item>, needed: Option<[f64; 2]>) -> Option<Data> {
     if let Some(data) = item.data() {
-        for key in [column, unit].into_iter().flatten() {
+        if let Some(key) = column.or(unit) {
             key.error_help("goes with the names of files only", "remove it");
             return None;
         }
