@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeGuard
 
 from . import _spectile, _work
@@ -22,6 +22,8 @@ _MATRIX = tuple(f"m{row}{column}" for row in range(3) for column in range(4))
 _FILES = ("mesh", "file", "map", "table", "responses", "nk")
 # Tables of items under names of the user's own, which mean nothing by themselves.
 _NAMED = ("materials", "spectra", "media", "assemblies")
+# What CF's attributes do to the numbers that they stand beside, and where they do nothing.
+_PACKED = {"scale_factor": 1.0, "add_offset": 0.0}
 # Far beyond any scene.
 _DEEPEST = 60
 # Nanometres in one unit of a wavelength; words also in the plural, and as the British spell them.
@@ -143,8 +145,10 @@ def _overrides(overrides: Mapping[str, Any] | None) -> list[tuple[str, str]]:
     for key, value in (overrides or {}).items():
         path = tuple(str(key).split("."))
         # Spectra in all forms that scenes take.
-        pairs = None if path[-1] in _PAIRS else reader.samples(value, path)
-        found.append((key, _work.toml(value if pairs is None else {"samples": pairs})))
+        spectrum = None if path[-1] in _PAIRS else reader.spectrum(value, path)
+        if spectrum is not None:
+            value = {"samples": spectrum.plain(reader)}
+        found.append((key, _work.toml(value)))
     return found
 
 
@@ -177,6 +181,46 @@ def is_array(value: Any) -> TypeGuard[Any]:
     return getattr(value, "ndim", 0) > 0 and hasattr(value, "__array__")
 
 
+def _said(value: Any, *keys: str) -> list[str]:
+    """What attributes of an array say, without what says nothing."""
+    attributes = getattr(value, "attrs", None)
+    found = [attributes.get(key) for key in keys] if isinstance(attributes, Mapping) else []
+    return [text for text in (" ".join(said.split()) for said in found if isinstance(said, str)) if text]
+
+
+class Spectrum:
+    """Wavelengths and values, both [n], and what they are called as in the header of a file: `axis`, or `""`; values by several names, or
+    none."""
+
+    def __init__(self, path: tuple[str, ...], nm: Any, values: Any, axis: str = "", names: Sequence[str] = ()) -> None:
+        self.path, self.axis, self.names = path, axis, [*names]
+        self.pairs = [[float(x), float(y)] for x, y in zip(nm.tolist(), values.tolist(), strict=True)]
+
+    @property
+    def header(self) -> list[str]:
+        return [self.axis or "wavelength (nm)", *(self.names or ["value"])]
+
+    @property
+    def is_plain(self) -> bool:
+        return not (self.axis or self.names)
+
+    def plain(self, reader: _Reader) -> list[list[float]]:
+        """[nm, value] of a spectrum that is written where nothing is known of what it is to be."""
+        if not self.is_plain:
+            message = f"calls its numbers `{(self.names or [self.axis])[0]}`, which is not heeded here"
+            raise reader.mistake(self.path, message, "give them alone, as a pair of arrays: nm, and the unit that docs/scene.md names")
+        return self.pairs
+
+    def table(self) -> dict[str, Any]:
+        """As a scene has it."""
+        import numpy
+
+        if self.is_plain:
+            return {"samples": self.pairs}
+        name = f"{_spelt(self.path)} (array {len(self.pairs)})"
+        return {"file": _spectile.spectrum(name, self.header, numpy.array(self.pairs))}
+
+
 class _Reader:
     """Makes of a scene what the library takes: dicts, lists, scalars, and numbers where a file would be."""
 
@@ -199,7 +243,7 @@ class _Reader:
         if key in _COLUMNS and value is not None and not isinstance(value, os.PathLike):
             return self.columns(value, path)
         if isinstance(value, Mapping) and not _of_numbers(value):
-            return self.mesh(value, path) if key == "mesh" else self.mapping(value, path)
+            return self.mesh(value, path) if key == "mesh" else self.labelled(self.mapping(value, path), path)
         if hasattr(value, "magnitude") and hasattr(value, "units"):
             message = f"has a unit of its own, {value.units}, which is not converted here"
             raise self.mistake(path, message, "give `.magnitude` in the unit that docs/scene.md names")
@@ -208,9 +252,10 @@ class _Reader:
         if key in _FILES and is_array(value):
             help = "a mesh is a mapping of vertices and faces" if key == "mesh" else "give the name of a file"
             raise self.mistake(path, "must not be an array", help)
-        samples = None if key in _PAIRS else self.samples(value, path)
-        if samples is not None:
-            return {"samples": samples}
+        # As `samples` beside a `scale`: what has a name or a unit of its own may be told to be meant as it is.
+        spectrum = None if key in _PAIRS and not hasattr(value, "attrs") else self.spectrum(value, path)
+        if spectrum is not None:
+            return spectrum.table()
         if is_array(value):
             return self.array(value, path, "iuf").tolist()
         if hasattr(value, "item") and getattr(value, "ndim", None) == 0:
@@ -219,10 +264,20 @@ class _Reader:
             return [self.value(item, (*path, str(i))) for i, item in enumerate(value)]
         return os.fspath(value) if isinstance(value, os.PathLike) else value
 
+    def labelled(self, table: dict[str, Any], path: tuple[str, ...]) -> dict[str, Any]:
+        """A table whose `samples` are an array that is a spectrum by itself, with what that is in their place."""
+        spectrum = None if path in [(name,) for name in _NAMED] else table.get("samples")
+        return {**{k: v for k, v in table.items() if k != "samples"}, **spectrum} if isinstance(spectrum, dict) else table
+
     def array(self, value: Any, path: tuple[str, ...], kinds: str) -> Any:
         """As numpy's, of one of some kinds of number."""
         import numpy
 
+        attributes = getattr(value, "attrs", None)
+        for key, neutral in _PACKED.items() if isinstance(attributes, Mapping) else ():
+            if key in attributes and attributes[key] != neutral:
+                message = f"has the attribute `{key}` = {attributes[key]}, which is not applied here"
+                raise self.mistake(path, message, "decode it, as xarray.decode_cf does, or remove the attribute")
         for holder in (value, getattr(value, "data", None)):
             unit = getattr(holder, "units", None) if hasattr(holder, "magnitude") else None
             if unit is not None:
@@ -236,8 +291,9 @@ class _Reader:
             raise self.mistake(path, f"must hold {wanted}, but is of type {array.dtype}", "convert it first")
         return array
 
-    def samples(self, value: Any, path: tuple[str, ...]) -> list[list[float]] | None:
-        """[nm, value] of what is a spectrum by itself; None where nothing says that it is."""
+    def spectrum(self, value: Any, path: tuple[str, ...]) -> Spectrum | None:
+        """What is a spectrum by itself; None where nothing says that it is."""
+        axis, names = "", []
         if isinstance(value, Mapping):
             if not _of_numbers(value):
                 return None
@@ -249,16 +305,18 @@ class _Reader:
             unit = written if len(written) < 3 else written.lower().removesuffix("s").replace("metre", "meter")
             if unit not in _NM:
                 raise self.mistake(path, f"has wavelengths in `{written}`", f"convert them to one of {', '.join(_NM)}")
-            if str(value.attrs.get("units", "")).strip().lower() in ("%", "percent"):
-                raise self.mistake(path, "has values in per cent", "divide them by 100, and remove their `units`")
             if value.dims != ("wavelength",):
                 message = f"has the dimensions {', '.join(map(str, value.dims)) or 'none'}, but a spectrum has `wavelength` alone"
                 raise self.mistake(path, message, "choose one, as with .isel(x=0, y=0)")
-            nm, values = self.array(value.coords["wavelength"].data, path, "iuf") * _NM[unit], value.data
+            nm = self.array(value.coords["wavelength"], path, "iuf") * _NM[unit]
+            values = self.array(value, path, "iuf")
+            words = re.findall("[a-z]+", " ".join(_said(value.coords["wavelength"], "long_name", "standard_name")).lower())
+            axis, names = "wavelength in air (nm)" if "air" in words else "", self.names(value)
         elif hasattr(value, "index") and hasattr(value, "to_numpy") and not callable(value.index):
             if value.ndim != 1:
                 raise self.mistake(path, "must not be a table", "choose one column of it")
             nm, values = value.index.to_numpy(), value.to_numpy()  # pandas
+            axis, names = value.index.name if isinstance(value.index.name, str) else "", self.names(value)
         elif isinstance(value, tuple) and len(value) == 2 and all(is_array(part) or isinstance(part, list) for part in value):
             nm, values = value
         elif "wavelength" in getattr(value, "dims", ()):
@@ -272,7 +330,14 @@ class _Reader:
         if nm.ndim != 1 or nm.shape != values.shape:
             message = f"has wavelengths of the shape {list(nm.shape)} and values of {list(values.shape)}"
             raise self.mistake(path, message, "a spectrum has one value for each wavelength")
-        return [[float(x), float(y)] for x, y in zip(nm.tolist(), values.tolist(), strict=True)]
+        return Spectrum(path, nm, values, axis, names)
+
+    def names(self, value: Any) -> list[str]:
+        """What an array calls its numbers, the first with its unit, as in the header of a file."""
+        names = [*_said(value, "long_name", "standard_name"), *([value.name] if isinstance(value.name, str) and value.name else [])]
+        for unit in _said(value, "units"):
+            names[:1] = [f"{re.sub(r'[([].*', '', names[0] if names else '').strip() or 'value'} ({unit})"]
+        return names
 
     def once(self, parts: tuple[Any, ...], make: Callable[[], Any]) -> Any:
         key = tuple(id(part) for part in parts)
@@ -295,10 +360,32 @@ class _Reader:
             with numpy.errstate(over="ignore"):
                 # What is too large becomes infinite, and is refused as that.
                 array = numpy.require(self.array(ordered, path, kinds), numpy.float32, "A")
+            if path[-1] == "grid" and array.ndim == 3:
+                array = array[self.upward(ordered, path, axes)]
             shape = " x ".join(str(n) for n in array.shape)
-            return _spectile.numbers(f"{_spelt(path)} (array {shape})", array)
+            units, names = _said(value, "units"), _said(value, "standard_name", "long_name", "quantity")
+            if isinstance(getattr(value, "name", None), str):
+                names.append(value.name)
+            return _spectile.numbers(f"{_spelt(path)} (array {shape})", array, units[0] if units else None, names)
 
         return self.once((value,), make)
+
+    def upward(self, value: Any, path: tuple[str, ...], axes: tuple[str, ...]) -> tuple[slice, ...]:
+        """What turns round the axes along which coordinates of a grid descend, as in Zarr arrays."""
+        import numpy
+
+        turned = []
+        for axis in axes:
+            places, down = numpy.zeros(0), False
+            if axis in getattr(value, "coords", ()):
+                coordinate = value.coords[axis]
+                places, down = self.array(coordinate, path, "iuf").astype(float), "down" in _said(coordinate, "positive")
+            steps = numpy.diff(places)
+            if steps.size and not (steps[0] != 0 and numpy.allclose(steps, steps.mean(), rtol=1e-3, atol=0)):
+                message = f"has coordinates along {axis} that are not evenly spaced"
+                raise self.mistake(path, message, "resample it: the voxels of a grid have one size")
+            turned.append(slice(None, None, -1) if steps.size and (steps[0] < 0) != down else slice(None))
+        return tuple(turned)
 
     def columns(self, value: Any, path: tuple[str, ...]) -> Any:
         """Placements: numbers by name, or an array that says by its shape what it holds."""

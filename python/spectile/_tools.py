@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from . import _spectile, _work
 from ._errors import CheckFailed, NoDevice, UsageError
-from ._scene import Scene, _overrides, _Reader, taken
+from ._scene import Scene, Spectrum, _overrides, _Reader, taken
 
 if TYPE_CHECKING:
     import xarray
@@ -235,9 +235,11 @@ def relight(
         twice = sorted(set(named) & set(spectra or {}))
         if twice:
             raise UsageError(f"relight: `{twice[0]}` is given twice, by itself and in `spectra`")
-        for name, spectrum in {**(spectra or {}), **named}.items():
-            samples = reader.samples(spectrum, (str(name),))
-            value = spectrum if samples is None else {"samples": samples}
+        for i, (name, given) in enumerate({**(spectra or {}), **named}.items()):
+            spectrum = reader.spectrum(given, (str(name),))
+            value = given if spectrum is None else {"samples": spectrum.pairs}
+            if spectrum is not None and not spectrum.is_plain:
+                value = {"file": _write_spectrum(os.path.join(folder, f"spectrum-{i}.csv"), spectrum)}
             arguments.append(f"--set=spectra.{_work.toml(str(name))}={_work.toml(value)}")
         for name, kelvin in (temperatures or {}).items():
             arguments.append(f"--set=materials.{_work.toml(str(name))}.temperature={_work.toml(kelvin)}")
@@ -277,10 +279,19 @@ def _write_responses(file: str, responses: Any) -> None:
         rows = csv.writer(text)
         rows.writerow(["band", "wavelength_nm", "response"])
         for name, spectrum in bands.items():
-            samples = reader.samples(spectrum, (str(name),))
-            if samples is None:
+            found = reader.spectrum(spectrum, (str(name),))
+            if found is None:
                 raise UsageError(f"the response of band {name!r} is no spectrum; give an array [n, 2] of nm and response")
-            rows.writerows([str(name), repr(nm), repr(value)] for nm, value in samples)
+            rows.writerows([str(name), repr(nm), repr(value)] for nm, value in found.pairs)
+
+
+def _write_spectrum(file: str, spectrum: Spectrum) -> str:
+    """A CSV file of what an array says of its spectrum; gives its name back."""
+    with open(file, "w", newline="", encoding="utf-8") as text:
+        rows = csv.writer(text)
+        rows.writerow(spectrum.header[:2])
+        rows.writerows([repr(nm), repr(value)] for nm, value in spectrum.pairs)
+    return file
 
 
 def illuminant(name: str, scale: float = 1.0) -> dict[str, Any]:

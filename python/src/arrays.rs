@@ -7,7 +7,7 @@ use pyo3::buffer::{Element, PyBuffer};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyAny;
-use spectile::scene::arrays::{self as scene, Corners, Mesh, Table};
+use spectile::scene::arrays::{self as scene, Corners, Mesh, Table, Words};
 
 /// Numbers that stand in a scene where a file would be named.
 #[pyclass(frozen)]
@@ -20,11 +20,22 @@ impl Data {
     }
 }
 
-/// A picture or a grid: float32 in any number of dimensions. `name` is what messages call it.
+/// A picture or a grid: float32 in any number of dimensions. `name` is what messages call it; `units` and `names` are what the array says
+/// of its numbers.
 #[pyfunction]
-pub fn numbers(name: String, array: &Bound<'_, PyAny>) -> PyResult<Data> {
+#[pyo3(signature = (name, array, units=None, names=Vec::new()))]
+pub fn numbers(name: String, array: &Bound<'_, PyAny>, units: Option<String>, names: Vec<String>) -> PyResult<Data> {
     let (shape, values) = floats(array, &name)?;
-    Ok(Data(Arc::new(scene::Data::Numbers { name, shape, values: Arc::new(values) })))
+    let words = Words { units, names };
+    Ok(Data(Arc::new(scene::Data::Numbers { name, shape, values: Arc::new(values), words })))
+}
+
+/// A spectrum: float64 [n, 2]. `header` is what its columns are called, as in a file; all names after the second are of the values too.
+#[pyfunction]
+pub fn spectrum(name: String, header: Vec<String>, array: &Bound<'_, PyAny>) -> PyResult<Data> {
+    let pairs = rows::<f64, 2>(array, "array", "[n, 2]")?;
+    let [axis, names @ ..] = &header[..] else { return Err(PyValueError::new_err("the header is empty")) };
+    Ok(Data(Arc::new(scene::Data::of_spectrum(name, axis, names, &pairs))))
 }
 
 /// Numbers by name: float64 [row, column].

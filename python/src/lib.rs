@@ -87,7 +87,7 @@ mod _spectile {
     #[pymodule_export]
     use super::{Draft, program, read_scene, tone};
     #[pymodule_export]
-    use crate::arrays::{Data, mesh, numbers, table};
+    use crate::arrays::{Data, mesh, numbers, spectrum, table};
     #[pymodule_export]
     use crate::task::Task;
 

@@ -302,6 +302,86 @@ def test_wrong_arrays_are_refused_by_key(change, key, words):
     assert caught.value.key == key and words in str(caught.value), str(caught.value)
 
 
+def labelled(values, nm=PAINT[:, 0], name=None, **attributes):
+    return xarray.DataArray(values, coords={"wavelength": nm}, dims="wavelength", attrs=attributes, name=name)
+
+
+def refused(scene):
+    with pytest.raises(sp.SceneError) as caught:
+        scene.check()
+    return str(caught.value)
+
+
+def test_what_arrays_say_of_their_values_counts_as_in_files():
+    paint = PAINT[:, 1]
+    series = [pandas.Series(100 * paint, index=PAINT[:, 0], name="Reflectance (%)")] if (pandas := optional("pandas")) else []
+    for percent in [labelled(100 * paint, units="%"), labelled(100 * paint, name="paint", long_name="% reflectance"), *series]:
+        scene = ball()
+        scene["spectra"]["paint"] = percent
+        # 100 times a number, and a hundredth of that, is it but for the last bit.
+        assert scene.check() | {"digest": ""} == ball().check() | {"digest": ""}
+    # Powers of two, so that no bit differs.
+    nm = numpy.array([256.0, 512.0, 1024.0])
+    plain = ball(environment={"radiance": (nm, numpy.array([1.0, 2.0, 3.0]))})
+    for units, factor in [("W m-2 sr-1 nm-1", 1.0), ("mW m-2 sr-1 nm-1", 1e3), ("W/m^2/sr/um", 1e3), ("uW cm-2 sr-1 nm-1", 1e2)]:
+        scene = ball(environment={"radiance": labelled(factor * numpy.array([1.0, 2.0, 3.0]), nm, "L", units=units)})
+        assert scene.digest == plain.digest, units
+    for array, words in [
+        (labelled(paint, units="W m-2"), "not that of a reflectance"),
+        (labelled(paint, long_name="leaf transmittance"), "calls its values `leaf transmittance`, a transmittance"),
+        (labelled(paint, name="log10_reflectance"), "logarithms"),
+    ]:
+        scene = ball()
+        scene["spectra"]["paint"] = array
+        assert words in refused(scene)
+    # What is meant as it is, says so.
+    scene["spectra"]["paint"] = {"samples": labelled(paint, long_name="leaf transmittance"), "scale": 1}
+    assert any("times `scale`" in warning for warning in scene.check()["warnings"])
+    air = ball()
+    air["spectra"]["paint"] = labelled(paint, xarray.DataArray(PAINT[:, 0], dims="wavelength", attrs={"long_name": "wavelength in air"}))
+    assert any("converted to vacuum" in warning for warning in air.check()["warnings"])
+    with pytest.raises(sp.SceneError, match="`reflectance .%.`, which is not heeded here"):
+        ball().check({"spectra.paint": labelled(100 * paint, name="reflectance", units="%")})
+
+
+def optional(name):
+    try:
+        return __import__(name)
+    except ImportError:
+        return None
+
+
+def test_what_grids_and_textures_say_of_their_numbers_counts():
+    def heat(grid):
+        body = {"cube": {"min": [-0.1, -0.1, 1.2], "max": [0.1, 0.1, 1.4]}, "interior": "gas"}
+        scene = ball(media={"gas": {"absorption": 0.5, "temperature": {"grid": grid}}})
+        scene["objects"].append(body)
+        return scene
+
+    # 0.25 K steps are exact in floats of 32 bits.
+    kelvin = numpy.arange(8.0).reshape(2, 2, 2) / 4 + 300.15
+    dims = ("z", "y", "x")
+    plain = heat(kelvin.astype("f4"))
+    celsius = xarray.DataArray(kelvin - 273.15, dims=dims, attrs={"units": "degC"})
+    assert heat(celsius).check()["digest"] == plain.digest
+    assert any("converted to K" in warning for warning in heat(celsius).check()["warnings"])
+    named = xarray.DataArray(kelvin - 273.15, dims=dims, attrs={"long_name": "Temperature (C)"})
+    assert heat(named).digest == plain.digest
+    # Heights that descend, and depths that ascend, are turned round.
+    down = xarray.DataArray(kelvin[::-1], dims=dims, coords={"z": [1.5, 0.5]})
+    depth = xarray.DataArray(kelvin[::-1], dims=dims, coords={"z": ("z", [0.5, 1.5], {"positive": "down"})})
+    assert heat(down).digest == heat(depth).digest == plain.digest
+    uneven = xarray.DataArray(numpy.repeat(kelvin, 2, 0)[:3], dims=dims, coords={"z": [0.0, 1.0, 3.0]})
+    assert "not evenly spaced" in refused(heat(uneven))
+    assert "is in `Pa`" in refused(heat(celsius.assign_attrs(units="Pa")))
+    picture = xarray.DataArray(numpy.full((2, 2), 0.5), dims=("y", "x"), attrs={"units": "%"})
+    scene = ball()
+    scene["materials"]["ball"] = {"diffuse": {"reflectance": {"texture": picture}}}
+    assert "gives its numbers in `%`" in refused(scene)
+    scene["materials"]["ball"] = {"black": {"temperature": {"texture": (picture + 26.65).assign_attrs(units="degC")}}}
+    assert any("converted to K" in warning for warning in scene.check()["warnings"])
+
+
 def test_what_is_masked_infinite_or_has_a_unit_is_refused():
     masked = numpy.ma.masked_less(PAINT, 390)
 
@@ -309,9 +389,9 @@ def test_what_is_masked_infinite_or_has_a_unit_is_refused():
         magnitude, units, ndim = PAINT, "um", 2
 
     nm, values = PAINT.T
-    percent = xarray.DataArray(values, coords={"wavelength": nm}, dims="wavelength", attrs={"units": "%"})
+    packed = xarray.DataArray(values, coords={"wavelength": nm}, dims="wavelength", attrs={"scale_factor": 1e-4})
     bare = xarray.DataArray(values, dims="wavelength")
-    cases = [(masked, "masked"), (Quantity(), "unit of its own"), (percent, "per cent"), (bare, "no coordinate `wavelength`")]
+    cases = [(masked, "masked"), (Quantity(), "unit of its own"), (packed, "attribute `scale_factor`"), (bare, "no coordinate `wavelength`")]
     try:
         import pint
     except ImportError:

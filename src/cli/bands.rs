@@ -51,8 +51,14 @@ impl Bands {
                 continue;
             }
             match *item {
-                Some(Item::One(k)) if k < count => bands.push(k),
-                Some(Item::Range(from, to)) if from < to && to <= count => bands.extend(from..to),
+                Some(Item::One(k)) if k < count => {
+                    notes.extend(wavelengths_too(channels, text, [k, k]));
+                    bands.push(k);
+                }
+                Some(Item::Range(from, to)) if from < to && to <= count => {
+                    notes.extend(wavelengths_too(channels, text, [from, to]));
+                    bands.extend(from..to);
+                }
                 Some(Item::One(_) | Item::Range(..)) => {
                     return Err(format!("--bands {}: the bands of this cube are 0..{count}", self.text));
                 }
@@ -84,6 +90,18 @@ impl Bands {
 }
 
 const FORMS: &str = "bands are names, numbers from 0 and ranges, or wavelengths with nm or um, such as B4, 3, 0..10, 550nm or 8um..14um";
+
+/// What to say of the numbers `ends`, written as `text`, where bands have them as wavelengths too.
+fn wavelengths_too(channels: &Channels, text: &str, ends: [usize; 2]) -> Option<String> {
+    let holds = |end: usize| channels.bounds.iter().any(|[from, to]| (*from..=*to).contains(&(end as f64)));
+    let first = channels.centre(ends[0]);
+    // Of cubes whose numbers are their wavelengths there is nothing to say.
+    let is_both = ends.into_iter().all(holds) && (first - ends[0] as f64).abs() > 1.0;
+    is_both.then(|| {
+        let meant = text.replace("..", "nm..");
+        format!("--bands: {text} counts bands, from 0, and begins at {first:.2} nm; wavelengths are written {meant}nm")
+    })
+}
 
 /// The channel with its centre nearest to `nm`, and what to say where it does not hold that wavelength.
 fn nearest(channels: &Channels, nm: f64) -> Result<(usize, Option<String>), String> {
@@ -162,6 +180,15 @@ mod tests {
         assert_eq!(resolve("430nm,0.76um"), Ok(vec![0, 7]));
         assert_eq!(resolve("475nm..575 nm"), Ok(vec![1, 2, 3]));
         assert_eq!(resolve("0.5um..0.6µm"), Ok(vec![2, 3]));
+        // 400 to 700 nm in a thousand bands: 425 is the number of one, and the wavelength of another.
+        let channels = Channels::equal(400.0, 700.0, 1000);
+        let told = |text: &str| Bands::parse(text).and_then(|bands| bands.resolve(&channels)).expect("bands").notes;
+        assert_eq!(
+            told("425"),
+            ["--bands: 425 counts bands, from 0, and begins at 527.65 nm; wavelengths are written 425nm"]
+        );
+        assert!(told("400..500")[0].ends_with("wavelengths are written 400nm..500nm"));
+        assert_eq!(told("7,0..10,300..500,425nm"), Vec::<String>::new());
     }
 
     #[test]

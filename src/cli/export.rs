@@ -91,7 +91,8 @@ pub struct Args {
     /// Of a cube that was rendered with --layers, into ENVI, OpenEXR or CSV: a band for each number, named depth, normal.x and so on.
     /// Where nothing is seen it is NaN (-9999 in ENVI, empty in CSV). A cube is a Zarr store already, and holds them as arrays.
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = super::render::parse_layer)]
-    #[arg(conflicts_with_all = ["bands", "temperature", "reflectance", "xyz", "standard_error", "integrated", "blocks", "statistics"])]
+    #[arg(conflicts_with_all = ["bands", "temperature", "reflectance", "xyz", "standard_error", "integrated", "blocks", "statistics", "exr_split",
+                           "exr_strict_units"])]
     pub layers: Vec<Layer>,
 
     /// X, Y and Z instead of the bands, for the standard observer of this year

@@ -1,11 +1,15 @@
 //! Numbers in memory where a scene file would name a file: what a mesh, a picture or a grid says, without one.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::error::Problem;
+use crate::format::csv_table;
 use crate::format::image::{Colours, Format, Image, Plane, Transfer};
 use crate::format::mesh::{self, Part};
+use crate::format::said::Said;
+use crate::format::text::{self, SpectrumTable};
+use crate::format::unit::{self, Stated};
 use crate::format::volume::{MAX_VOXELS, Volume};
 
 /// What stands in the place of a file. Each has a name, for messages, that no other of the same scene has.
@@ -16,6 +20,7 @@ pub enum Data {
         name: String,
         shape: Vec<usize>,
         values: Arc<Vec<f32>>,
+        words: Words,
     },
     /// As a file of them would be read, or what is wrong with it.
     Mesh {
@@ -23,6 +28,20 @@ pub enum Data {
         read: Result<Arc<mesh::Mesh>, Box<Problem>>,
     },
     Table(Table),
+    /// A spectrum that says more of itself than its numbers: as a file of it would be read, or what is wrong with it.
+    Spectrum {
+        name: String,
+        read: Result<SpectrumTable, Box<Problem>>,
+    },
+}
+
+/// What an array says of its numbers.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Words {
+    /// Their unit.
+    pub units: Option<String>,
+    /// What it calls them.
+    pub names: Vec<String>,
 }
 
 /// Columns of numbers, each under its name.
@@ -60,7 +79,7 @@ pub enum Corners<const N: usize> {
 impl Data {
     pub fn name(&self) -> &str {
         match self {
-            Data::Numbers { name, .. } | Data::Mesh { name, .. } => name,
+            Data::Numbers { name, .. } | Data::Mesh { name, .. } | Data::Spectrum { name, .. } => name,
             Data::Table(table) => &table.name,
         }
     }
@@ -71,6 +90,7 @@ impl Data {
             Data::Numbers { .. } => "an array",
             Data::Mesh { .. } => "a mesh",
             Data::Table(_) => "a table",
+            Data::Spectrum { .. } => "a spectrum",
         }
     }
 
@@ -90,7 +110,7 @@ impl Data {
     /// Where it is none: what is wrong with the numbers as a whole.
     pub fn image(&self) -> Result<Image, Box<Problem>> {
         const HELP: &str = "give [y, x] or [y, x, channel], rows from the top";
-        let Data::Numbers { shape, values, .. } = self else {
+        let Data::Numbers { shape, values, words, .. } = self else {
             return Err(self.no("a picture", HELP));
         };
         let [height, width, channels] = match shape[..] {
@@ -114,16 +134,18 @@ impl Data {
         };
         let colours = Colours { transfer: Transfer::Linear, primaries: None, foreign: None };
         let planes = (0..channels).map(plane).collect();
-        Ok(Image { format: Format::Memory, size: [width, height], planes, colours, units: None })
+        let of_name = || words.names.iter().find_map(|name| unit::of_temperature(name));
+        let units = words.units.clone().or_else(of_name);
+        Ok(Image { format: Format::Memory, size: [width, height], planes, colours, units })
     }
 
-    /// As voxels, of the unit that the scene expects.
+    /// As voxels.
     ///
     /// # Errors
     /// Where it is none: what is wrong with the numbers as a whole.
     pub fn volume(&self) -> Result<Volume, Box<Problem>> {
         const HELP: &str = "give [z, y, x]";
-        let Data::Numbers { shape, values, .. } = self else {
+        let Data::Numbers { shape, values, words, .. } = self else {
             return Err(self.no("a grid", HELP));
         };
         let [z, y, x] = shape[..] else {
@@ -137,8 +159,8 @@ impl Data {
         Ok(Volume {
             size: [x, y, z].map(|n| n as u32),
             values: Arc::clone(values),
-            unit: None,
-            said: Vec::new(),
+            unit: words.units.as_ref().map(|text| (text.clone(), unit::parse(text))),
+            said: words.names.clone(),
             told: Vec::new(),
             notes: Vec::new(),
         })
@@ -153,6 +175,33 @@ impl Data {
             Data::Mesh { read, .. } => read.clone(),
             _ => Err(self.no("a mesh", MESH_HELP)),
         }
+    }
+
+    /// As a file of one spectrum.
+    ///
+    /// # Errors
+    /// Where it is none: what is wrong with it.
+    pub fn spectrum(&self) -> Result<SpectrumTable, Box<Problem>> {
+        match self {
+            Data::Spectrum { read, .. } => read.clone(),
+            _ => Err(self.no("a spectrum", "give wavelengths and values")),
+        }
+    }
+
+    /// A spectrum of `pairs`, called `name`: places on an axis and values. What the `axis` and the values are called counts as in the
+    /// header of a table: the first of `names` that says a unit, and the first that says a quantity.
+    pub fn of_spectrum(name: String, axis: &str, names: &[String], pairs: &[[f64; 2]]) -> Data {
+        let mut table = csv_table::Table::new([axis, names.first().map_or("value", String::as_str)]);
+        pairs.iter().for_each(|pair| table.row(pair.map(|number| format!("{number:?}"))));
+        let read = text::parse_spectrum(table.finish().as_bytes(), Path::new(&name), None);
+        let read = read.map(|table| SpectrumTable {
+            unit: table.unit.or_else(|| names.iter().find_map(|name| Stated::in_name(name))),
+            said: table.said.or_else(|| names.iter().find_map(|name| Some((Said::in_name(name)?, name.clone())))),
+            // Arrays have no lines.
+            line: Vec::new(),
+            ..table
+        });
+        Data::Spectrum { read: read.map_err(|problem| Box::new(Problem { line: None, ..*problem })), name }
     }
 
     /// As columns of numbers.

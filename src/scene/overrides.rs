@@ -5,6 +5,7 @@ use std::path::Path;
 use super::context::Context;
 use super::keys::{self, Section};
 use super::tree::{self, Entry, Node, Origin, Value};
+use super::words::did_you_mean;
 use crate::{Error, Result as Checked};
 
 /// `text`, a document of TOML or a part of a scene, written anew with `overrides` in it; unchanged where there are none.
@@ -41,8 +42,12 @@ fn value(node: &Value) -> toml::Value {
     }
 }
 
-/// Applies every override to `root`, in order; mistakes are recorded in `cx`.
+/// Sections of things under names of the user's own, which only other parts of a scene make use of.
+const NAMED: [&str; 2] = ["spectra", "media"];
+
+/// Applies every override to `root`, in order; mistakes are recorded in `cx`, and what changes nothing is told of.
 pub fn apply(cx: &Context<'_>, root: &mut Vec<Entry>, overrides: &[(String, String)]) {
+    let known = NAMED.map(|section| names_in(root, section));
     for (index, (key, value)) in overrides.iter().enumerate() {
         let origin = Origin::Set(index);
         let Some(path) = parse_key(key) else {
@@ -61,6 +66,37 @@ pub fn apply(cx: &Context<'_>, root: &mut Vec<Entry>, overrides: &[(String, Stri
         if let Err((message, help)) = set_in_table(root, &[], &path, node, &origin) {
             cx.error(&origin, key, message, Some(help));
         }
+    }
+    for (key, value) in overrides {
+        let path = parse_key(key).unwrap_or_default();
+        let [section, name, ..] = &path[..] else { continue };
+        let Some(known) = NAMED.iter().position(|of| of == section).map(|at| &known[at]) else { continue };
+        if known.contains(name) || root.iter().any(|entry| is_named(&entry.node, name)) {
+            continue;
+        }
+        let hint = did_you_mean(name, known.iter().map(String::as_str)).map(|hint| format!(" ({hint})"));
+        cx.warn(format!(
+            "--set {key}={value} changes nothing: the scene names no `{name}` anywhere{}",
+            hint.unwrap_or_default()
+        ));
+    }
+}
+
+/// What stands in a section, by name.
+fn names_in(root: &[Entry], section: &str) -> Vec<String> {
+    match root.iter().find(|entry| entry.key == section).map(|entry| &entry.node.value) {
+        Some(Value::Table(entries)) => entries.iter().map(|entry| entry.key.clone()).collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// Whether a value in the tree is this text.
+fn is_named(node: &Node, name: &str) -> bool {
+    match &node.value {
+        Value::String(text) => text == name,
+        Value::Array(items) => items.iter().any(|item| is_named(item, name)),
+        Value::Table(entries) => entries.iter().any(|entry| is_named(&entry.node, name)),
+        _ => false,
     }
 }
 

@@ -131,6 +131,8 @@ pub fn parse_sensor(text: &str, file: &Path, channels: &Channels, seen: Seen) ->
     Ok(SensorModel { warnings, ..model })
 }
 
+const PITCH: &str = "greater than 0 and at most 0.1 (m), such as 15e-6";
+
 fn decode<'a>(cx: &'a Context<'a>, root: &'a [tree::Entry], channels: &Channels, seen: Seen) -> Option<SensorModel> {
     let top = Fields::root(cx, root, &keys::SENSOR);
     let mut spectra = Spectra::new(cx, top.get("spectra"), Some(channels.clone()));
@@ -148,7 +150,8 @@ fn decode<'a>(cx: &'a Context<'a>, root: &'a [tree::Entry], channels: &Channels,
             },
         );
     let oversampling = detector.get("oversampling").map_or(Some(1), |item| item.whole(1..=64));
-    let pitch = detector.get("pitch").map(|item| item.positive());
+    // In metres: 15 is one in micrometres.
+    let pitch = detector.get("pitch").map(|_| number(&detector, "pitch", 0.0, |v| v > 0.0 && v <= 0.1, PITCH));
     let fill_factor = number(&detector, "fill_factor", 1.0, |v| v > 0.0 && v <= 1.0, "greater than 0 and at most 1");
     let bits = detector.require("bits", "bits = 12").and_then(|item| item.whole(1..=24));
     let offset = number(&detector, "offset", 0.0, |v| v >= 0.0, "0 or greater");
@@ -431,7 +434,7 @@ fn bands(top: &Fields) -> Option<Option<Vec<(String, Response)>>> {
 
 /// The response in a file of one, or the one that is called like the band.
 fn band_response(top: &Fields, item: &Item, name: &str) -> Option<Response> {
-    let read = response::read_responses(&item.cx.path(item.text()?));
+    let read = response::read_shares(&item.cx.path(item.text()?));
     let read = read.map_err(|problem| report_in_file(item, *problem)).ok()?;
     read.warnings.into_iter().for_each(|warning| top.warn(warning));
     let mut named = read.named;

@@ -575,6 +575,17 @@ impl<'a> Spectra<'a> {
         match measure.to(quantity.kind()) {
             Some(Density::Plain(1.0)) => {}
             Some(density) => {
+                // Who knows the unit may have meant to convert it.
+                let scale = table.source.scale;
+                if let Density::Plain(factor) = density
+                    && (scale / factor - 1.0).abs() < 1e-9
+                {
+                    warnings.push(format!(
+                        "{path} says `{}`, which is applied, and `scale` = {scale} besides: together {factor:e} twice (leave `scale` out \
+                         where it is meant for the unit)",
+                        shown(text)
+                    ));
+                }
                 value.iter_mut().zip(table.nm).for_each(|(value, nm)| *value = density.apply(*value, *nm));
             }
             // What is relative has no unit.

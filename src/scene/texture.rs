@@ -16,6 +16,7 @@ use super::{Placement, SMOOTH, Texture, TextureFilter, TextureId, TextureKind};
 use crate::format::image::{self, Format, Image, Plane, Rgb};
 use crate::format::noise::{self, Range};
 use crate::format::primaries::{self, White};
+use crate::format::table::shown;
 use crate::format::unit;
 use crate::spectral::{Curve, upsample};
 
@@ -237,6 +238,15 @@ impl Textures {
                 read
             }
         }?;
+        if let Some(units) = image.units.as_deref().filter(|_| kind != Use::Number(Number::Temperature))
+            && unit::parse(units).is_none_or(|measure| !measure.is_number() || measure.factor != 1.0)
+        {
+            file.error_help(
+                format!("{name} gives its numbers in `{}`, and is to have numbers without a unit", shown(units)),
+                "write them so, and remove the attribute",
+            );
+            return None;
+        }
         let known = |known: &&Checked| known.path == path && known.kind == kind;
         if let Some(same) = self.checked.iter().position(|other| known(&other) && other.placement == placement) {
             return Some(same);

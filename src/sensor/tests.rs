@@ -182,6 +182,7 @@ fn wrong_models_are_refused_by_name() {
         ("quantum_efficiency = 0.8", "quantum_efficiency = 1.8", "detector.quantum_efficiency", "1"),
         ("to = 5000", "to = 2000", "bands.0", "no interval"),
         ("pitch = 15e-6", "pich = 15e-6", "detector.pich", "unknown key"),
+        ("pitch = 15e-6", "pitch = 15", "detector.pitch", "at most 0.1 (m)"),
     ] {
         let error = parsed(&MWIR.replace(from, to), &channels).expect_err(to);
         let Error::Input(problems) = error else { panic!("{to}: {error}") };

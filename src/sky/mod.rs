@@ -135,6 +135,14 @@ impl Atmosphere {
         number("--aerosol", self.aerosol_depth, [0.0, 5.0], "")?;
         number("--aerosol-height", self.aerosol_height, [0.1, 10.0], " km")?;
         number("--ozone", self.ozone, [0.0, 1000.0], " Dobson units")?;
+        // SPCTRAL2, SMARTS and others have it in atm-cm.
+        if self.ozone > 0.0 && self.ozone < 1.0 {
+            return Err(Error::Usage(format!(
+                "--ozone is {} Dobson units, which no sky has: that many atm-cm are {} (or write 0 for none)",
+                self.ozone,
+                (self.ozone * 1e6).round() / 1e3
+            )));
+        }
         number("--water", self.water, [0.0, 10.0], " cm")?;
         number("--ground-temperature", self.ground_temperature, [150.0, 400.0], " K")?;
         match self.albedo {

@@ -427,6 +427,21 @@ fn bands_by_files_and_efficiencies_that_end() {
     let output = make("x.zarr", &model("[[bands]]\nname = \"blue\"\nresponse = \"two.csv\"\n"));
     let stderr = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.code() == Some(2) && stderr.contains("none of them called \"blue\": green, red"), "{stderr}");
+    // They multiply a quantum efficiency: percent are told from shares, another efficiency is one, and amperes a watt are none.
+    for (head, value, words) in [
+        ("response", "100", "must be a share of light, in [0, 1], but is 100"),
+        ("Responsivity (A/W)", "0.3", "no share of light"),
+    ] {
+        fs::write(path.join("one.csv"), format!("nm,{head}\n400,{value}\n500,{value}\n")).expect("written");
+        let output = make("x.zarr", &model(bands));
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.code() == Some(2) && stderr.contains(words), "{stderr}");
+    }
+    for (name, head, value) in [("percent.zarr", "response (%)", "100"), ("photons.zarr", "QE", "1")] {
+        fs::write(path.join("one.csv"), format!("nm,{head}\n400,{value}\n500,{value}\n")).expect("written");
+        assert!(make(name, &model(bands)).status.success());
+        assert_eq!(counts(&path.join(name), SIZE), by_file, "{head}");
+    }
     let table = "quantum_efficiency = { samples = [[400, 0.5], [620, 0.5]] }";
     let output = make("qe.zarr", &MODEL.replace("quantum_efficiency = 0.5", table));
     let stderr = String::from_utf8_lossy(&output.stderr);

@@ -1,5 +1,7 @@
 //! `camera.latlong` makes environment maps: what it sees, used as a sky, is seen again.
 
+use spectile::cube::Cube;
+
 use super::Place;
 
 const ROOM: &str = r#"
@@ -93,4 +95,45 @@ fn a_furnace_is_even() {
     // A film of another shape is seldom meant.
     let output = place.run(&["plan", "scene.toml", "--set", "film.width=30"]);
     assert!(crate::binary::text(&output.stderr).contains("twice as wide as high"));
+}
+
+/// An OpenEXR file of what a sensor saw, as a sky under the same sensor. A band that is even comes back as it is. Of another one the file
+/// says the response, and it is even over the width at half of its height: of 600 to 700 nm with edges of 20 nm that is 610 to 690 nm.
+/// The response has 75 of its integral of 80 nm there; 2.5 below, where the sky is linear from the one band, 1 at 500 nm, to the other, 4
+/// at 610; and 2.5 above, where it is 0. Of N samples each is there or not, so that their mean is off by 4 √(p (1 - p) / N), p = 2.5/80,
+/// and hardly by what is below.
+#[test]
+fn what_a_sensor_saw_comes_back_from_openexr() {
+    let place = Place::of(&format!(
+        "{ROOM}\n[environment]\nradiance = {{ samples = [[300, 1], [550, 1], [550, 4], [900, 4]] }}\n"
+    ));
+    let responses = "nm,even,edged\n400,1,\n500,1,\n600,,0\n620,,1\n680,,1\n700,,0\n";
+    std::fs::write(place.path().join("s.csv"), responses).expect("written");
+    let sensor = ["--set", "channels.responses=s.csv"];
+    let seen = place.render("seen.zarr", &[&["--spp", "1"][..], &sensor].concat());
+    let pixels = |cube: &Cube| -> Vec<[f64; 2]> {
+        let places = (0..16).flat_map(|y| (0..32).map(move |x| (x, y)));
+        let found = places.map(|(x, y)| cube.spectrum(x, y).expect("read").expect("there"));
+        found.map(|found| [0, 1].map(|k| f64::from(found[k]))).collect()
+    };
+    let mean = |pixels: &[[f64; 2]]| pixels.iter().map(|pixel| pixel[1]).sum::<f64>() / pixels.len() as f64;
+    let [low, high] = [f64::min, f64::max].map(|of| pixels(&seen).iter().map(|pixel| pixel[1]).fold(4.0, of));
+    assert!((mean(&pixels(&seen)) - 4.0).abs() < 1e-3, "{low} to {high}");
+    place.success(&["export", "seen.zarr", "-o", "seen.exr"]);
+    let sky = "\n[environment]\nmap = \"seen.exr\"\nup = [0.2, 0.3, 1]\nrotate_degrees = 35\n";
+    std::fs::write(place.path().join("scene.toml"), format!("{ROOM}{sky}")).expect("written");
+    let again = pixels(&place.render("again.zarr", &[&["--spp", "64"][..], &sensor].concat()));
+    // The integral from 600 to 610 nm of (nm - 600) / 20 times 1 + 3 (nm - 500) / 110.
+    let below = ((1.0 + 300.0 / 110.0) * 50.0 + 3.0 / 110.0 * 1000.0 / 3.0) / 20.0;
+    let (expected, share): (f64, f64) = ((4.0 * 75.0 + below) / 80.0, 2.5 / 80.0);
+    let bound = 4.0 * 4.0 * (share * (1.0 - share) / (again.len() * 64) as f64).sqrt();
+    let found = mean(&again);
+    println!("{found} of {expected} ± {bound}");
+    assert!(again.iter().all(|pixel| (pixel[0] - 1.0).abs() < 1e-6), "{again:?}");
+    assert!((found - expected).abs() < bound, "{found}");
+    // Where the file has the band, it has all of its radiance; beyond the last none.
+    let within = ["--spp", "1", "--set", "channels.intervals=[[400, 500], [610.5, 689.5], [691, 699]]"];
+    let within = place.render("within.zarr", &within).spectrum(7, 7).expect("read").expect("there");
+    assert!((within[0] - 1.0).abs() < 1e-6 && within[2] == 0.0, "{within:?}");
+    assert!((low - 1e-5..high + 1e-5).contains(&f64::from(within[1])), "{within:?}");
 }

@@ -243,6 +243,7 @@ fn what_no_clear_sky_has_is_refused() {
         (&["--sun-elevation", "40", "--aerosol", "-1"], "--aerosol is -1"),
         (&["--sun-elevation", "40", "--aerosol-type", "desert"], "rural, urban, maritime, tropospheric"),
         (&["--sun-elevation", "40", "--ozone", "3000"], "Dobson"),
+        (&["--sun-elevation", "40", "--ozone", "0.344"], "that many atm-cm are 344"),
         (&["--sun-elevation", "40", "--water", "nan"], "--water is NaN"),
         (&["--sun-elevation", "40", "--albedo", "1.5"], "--albedo is 1.5"),
         (&["--sun-elevation", "40", "--albedo", "none.csv"], "no file that can be read"),

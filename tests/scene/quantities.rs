@@ -114,3 +114,16 @@ fn common_headers_are_applied_or_refused() {
         check(file, content, column, quantity, expected);
     }
 }
+
+/// A header's unit is applied, and so is the scene's `scale`: where that is the same factor it is seldom meant.
+#[test]
+fn a_scale_that_is_the_units_factor_is_told_of() {
+    let told = |content: &str, quantity: &str, scale: &str| {
+        let scene = scene("a.csv", "", quantity).replacen("\"a.csv\"", &format!("\"a.csv\", scale = {scale}"), 1);
+        good(&scene, &[("a.csv", content)], &[]).warnings.iter().any(|warning| warning.contains("twice"))
+    };
+    let percent = "nm,Reflectance (%)\n400,50\n600,50\n";
+    assert!(told(percent, "reflectance", "0.01"));
+    assert!(!told(percent, "reflectance", "0.5") && !told("nm,R\n400,50\n600,50\n", "reflectance", "0.01"));
+    assert!(told("nm,L (W/m2/sr/um)\n400,50\n600,50\n", "radiance", "1e-3"));
+}

@@ -264,7 +264,8 @@ fn warnings_are_said_once_and_name_the_interval() {
     let held = ("spectra.grey", "{ samples = [[0.4, 0.1], [0.7, 0.8]], outside = \"hold\" }");
     assert_eq!(good(BASE, &[], &[held]).warnings, Vec::<String>::new());
     let unused = ("spectra.other", "{ samples = [[450, 0.1], [650, 0.8]] }");
-    assert!(good(BASE, &[], &[unused]).warnings.is_empty());
+    let warnings = good(BASE, &[], &[unused]).warnings;
+    assert!(warnings.len() == 1 && warnings[0].contains("changes nothing"), "{warnings:?}");
     let rgb = [("spectra.grey", "{ rgb = [0.9, 0.1, 0.1] }"), ("channels.equal.to", "2000")];
     let warnings = good(BASE, &[], &rgb).warnings;
     assert!(warnings.len() == 1 && warnings[0].contains("830-2000 nm"), "{warnings:?}");

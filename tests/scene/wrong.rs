@@ -444,6 +444,17 @@ fn overrides_replace_and_their_mistakes_name_them() {
     assert_eq!(scene.spectra[0].curve, Curve::Constant(0.75));
     assert!(matches!(scene.objects[1].shape, Shape::Sphere { radius: 2.0, .. }));
     assert_eq!(good(BASE, &[], &[("channels.intervals", "[[400, 500]]")]).channels.bounds, [[400.0, 500.0]]);
+    // What nothing makes use of is told of, where the command line brings it.
+    let told = |set: &[(&str, &str)]| {
+        let found = good(BASE, &[], set).warnings;
+        found.into_iter().filter(|warning| warning.contains("changes nothing")).collect::<Vec<_>>()
+    };
+    let stray = told(&[("spectra.lam", "0.5"), ("media.air.absorption", "1.0")]);
+    assert!(
+        stray.len() == 2 && stray[0].contains("--set spectra.lam=0.5") && stray[0].contains("no `lam`"),
+        "{stray:?}"
+    );
+    assert_eq!(told(&[("spectra.grey", "0.5"), ("materials.white.diffuse.reflectance", "grey")]), Vec::<String>::new());
 
     let intervals = changed("equal = { from = 400.0, to = 700.0, count = 3 }", "intervals = [[400, 500]]");
     for (text, set, key, words) in [

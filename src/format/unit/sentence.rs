@@ -8,7 +8,7 @@ use super::{FACTORS, Measure};
 pub(super) fn is_logarithm(text: &str) -> bool {
     let lower = text.to_lowercase();
     let all: Vec<&str> = words(&lower).collect();
-    let always = ["log10", "ln", "db", "decibel", "decibels", "absorbance", "kubelka"];
+    let always = ["log10", "ln", "db", "dbm", "decibel", "decibels", "absorbance", "kubelka"];
     if is_function(&lower) || all.iter().any(|word| word.strip_suffix("log").is_some_and(|n| n.parse::<u8>().is_ok())) {
         return true;
     }
@@ -108,6 +108,7 @@ pub(super) fn is_without_its_marks(text: &str) -> bool {
 /// Whether a text is percent and nothing else than what of: `%`, `%R`, `R%`, `% Refl`, `percent`. Of a mixture it is not: `wt%`.
 pub(super) fn is_percent_of(text: &str) -> bool {
     let lower = text.trim().to_lowercase().replace("per cent", "percent").replace(['_', '.', '(', ')'], " ");
+    let lower = lower.strip_prefix("in ").unwrap_or(&lower);
     let rest = PERCENT.iter().find_map(|mark| {
         let lower = lower.trim();
         let at_end = lower.strip_suffix(mark).filter(|rest| *mark == "%" || rest.is_empty() || rest.ends_with(' '));
@@ -170,6 +171,35 @@ fn is_percent_among(lower: &str) -> bool {
             || (PERCENT.contains(&pair[0]) && is_of(pair[1]) && pair[0] == all[0])
     });
     of_first || of_word
+}
+
+/// Whether a name says that its values are relative to something that it leaves open: `Relative intensity`, `normalized radiance`,
+/// `rel. units`, `QE, relative`.
+pub(super) fn is_relative(text: &str) -> bool {
+    const RELATIVE: [&str; 8] =
+        ["relative", "rel", "normalized", "normalised", "norm", "relativ", "relatif", "arbitrary"];
+    const OF: [&str; 14] = [
+        "spd",
+        "spectral",
+        "spectrum",
+        "power",
+        "intensity",
+        "energy",
+        "flux",
+        "output",
+        "signal",
+        "sensitivity",
+        "response",
+        "qe",
+        "efficiency",
+        "units",
+    ];
+    let lower = text.to_lowercase();
+    let all: Vec<&str> = words(&lower).collect();
+    // The relative standard deviation of a radiance is said to be one elsewhere.
+    let is_at_end = |word: &&&str| RELATIVE.contains(*word);
+    let is_of = |word: &&str| is_quantity(word) || OF.contains(word);
+    [all.first(), all.last()].iter().flatten().any(is_at_end) && all.iter().any(is_of)
 }
 
 /// Whether a name says that its values are multiplied by something: `reflectance x 10000`, `R (x1e4)`, `R*100`.

@@ -6,10 +6,10 @@ use super::places::{
 };
 use super::sentence::{
     begins_with_factor, has_arithmetic, has_factor, is_logarithm, is_percent, is_percent_of, is_power_of_ten,
-    is_up_to_hundred, is_without_its_marks,
+    is_relative, is_up_to_hundred, is_without_its_marks,
 };
 use super::spelling::{is_quantity, plain, words};
-use super::{KELVIN, Measure, is_celsius, parse, speaks_of_percent, states_a_factor};
+use super::{KELVIN, LUMEN, Measure, is_celsius, parse, speaks_of_percent, states_a_factor};
 
 const PERCENT: Meaning = Meaning::Unit(Measure { factor: 0.01, ..Measure::ONE });
 
@@ -123,11 +123,16 @@ impl Stated {
         }
         // Nothing but a unit, and one that no name is like: photons/s/m2/nm/sr.
         let is_long = |measure: &Measure| measure.powers.iter().filter(|power| **power != 0).count() > 2;
-        if let Some(measure) = parse(text).filter(|measure| is_long(measure) || measure.is_spectral_power()) {
+        let is_seen = |measure: &Measure| measure.powers[LUMEN] != 0 && text.len() > 2;
+        let is_unit = |measure: &Measure| is_long(measure) || measure.is_spectral_power() || is_seen(measure);
+        if let Some(measure) = parse(text).filter(is_unit) {
             return stated(Meaning::Unit(measure), true);
         }
         if let Some(measure) = spectral_power_at_end(text) {
             return stated(Meaning::Unit(measure), true);
+        }
+        if text.ends_with('\u{2030}') {
+            return stated(Meaning::Unit(Measure { factor: 1e-3, ..Measure::ONE }), true);
         }
         // Spectrophotometers write %R and %T.
         match is_percent(text) {
@@ -150,6 +155,6 @@ impl Stated {
         if let Some(measure) = text.rsplit_once(", ").and_then(|(_, after)| parse(after)) {
             return stated(Meaning::Unit(measure), false);
         }
-        None
+        if is_relative(text) { stated(Meaning::Unknown, true) } else { None }
     }
 }

@@ -309,6 +309,12 @@ fn units_in_names_of_columns() {
         ("clay 10 percent", Meaning::Unknown),
         ("radiance (W/m2/sr/furlong)", Meaning::Unknown),
         ("radiance (a.u.)", Meaning::Unknown),
+        ("Relative intensity", Meaning::Unknown),
+        ("normalized radiance", Meaning::Unknown),
+        ("Relative SPD", Meaning::Unknown),
+        ("QE, relative", Meaning::Unknown),
+        ("rel. units", Meaning::Unknown),
+        ("Power (dBm)", Meaning::Logarithm),
         ("L_mW_furlong_nm", Meaning::Unknown),
         ("reflectance x 10000", Meaning::Factor),
         ("R (x1e4)", Meaning::Factor),
@@ -572,5 +578,24 @@ fn what_was_done_to_values_is_seen_in_their_names() {
     }
     for name in ["Sample 1 (%R)", "Sample 1 (% Refl)", "Sample 1 (R%)", "Sample 1 %T"] {
         assert!(Stated::in_name(name).is_some_and(|stated| stated.is_percent()), "{name}");
+    }
+}
+
+/// Shares in words and signs, what an eye sees, and what is relative only in part.
+#[test]
+fn shares_and_lumens_in_names() {
+    let factor = |name: &str| match Stated::in_name(name).map(|stated| stated.meaning) {
+        Some(Meaning::Unit(measure)) if measure.is_number() => Some(measure.factor),
+        _ => None,
+    };
+    for (name, expected) in [("Reflectance (in %)", 0.01), ("R [in percent]", 0.01), ("Reflectance \u{2030}", 1e-3)] {
+        assert_eq!(factor(name), Some(expected), "{name}");
+    }
+    for name in ["lm/nm", "cd/m2", "lux"] {
+        let stated = Stated::in_name(name);
+        assert!(matches!(stated, Some(Stated { meaning: Meaning::Unit(_), .. })), "{name}: {stated:?}");
+    }
+    for name in ["relative humidity", "normal", "Reflectance relative_azimuth 30", "lm", "oak, rel"] {
+        assert_eq!(Stated::in_name(name), None, "{name}");
     }
 }

@@ -51,7 +51,8 @@ pub static DETECTOR: Section = section(
         Key::default("kind", Choice(&["photon", "thermal"]), "\"photon\"", "What it counts."),
         Key::required("pitch", Number, "Side of a square pixel.")
             .unless("`focal_length` on a cube that tells its camera's angle")
-            .unit("m"),
+            .unit("m")
+            .range("(0, 0.1]"),
         Key::default("oversampling", Whole, "1", "Pixels of the cube, along each axis, that make one of the detector.")
             .range("[1, 64]"),
         Key::default("fill_factor", Number, "1.0", "Share of a pixel that is sensitive.").range("(0, 1]"),

@@ -113,6 +113,19 @@ pub(super) fn source<'a>(item: &Item<'a>, needed: Option<[f64; 2]>) -> Option<So
 }
 
 pub(super) fn file(item: &Item, column: Option<Item>, unit: Option<Item>, needed: Option<[f64; 2]>) -> Option<Data> {
+    if let Some(data) = item.data() {
+        if let Some(key) = column.or(unit) {
+            key.error_help("goes with the names of files only", "remove it");
+            return None;
+        }
+        return match data.spectrum() {
+            Ok(table) => Some(table_data(table, PathBuf::from(data.name()))),
+            Err(problem) => {
+                report_in_file(item, *problem);
+                None
+            }
+        };
+    }
     let path = item.cx.path(item.text()?);
     let column = match &column {
         None => Column::Only,
