@@ -36,6 +36,7 @@ mod runs;
 mod sensor;
 mod state;
 mod store;
+mod tile_files;
 mod verify;
 mod view;
 mod weights;
