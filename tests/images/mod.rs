@@ -4,6 +4,7 @@ mod against_reference;
 mod convergence;
 mod evaluators;
 mod factored;
+mod remainder;
 mod instances;
 mod invariance;
 mod leaves;
