@@ -383,7 +383,10 @@ impl Plan<'_> {
             "factored",
             &match &self.prepared.obstacles[..] {
                 [] => "the scene separates: render --factored keeps weights, so that spectra and channels can be changed afterwards".to_owned(),
-                obstacles => format!("the scene does not separate (render --factored): {}", obstacles.join(", ")),
+                obstacles => format!(
+                    "the scene separates in part: render --factored keeps weights, and a remainder in channels, which cannot be changed, of {}",
+                    obstacles.join(", ")
+                ),
             },
         );
         if self.args.verbose {

@@ -109,7 +109,10 @@ pub(super) fn arrays(header: &Header, layout: Layout) -> Vec<(&'static str, Valu
         Array { codecs: channel_fastest(layout), attributes, ..array }.chunked(&[channels, tile_height, tile_width])
     };
     if header.has_remainder() {
-        arrays.push(("remainder", of_channels("the part of the mean spectral radiance that weights of products do not hold")));
+        arrays.push((
+            "remainder",
+            of_channels("the part of the mean spectral radiance that weights of products do not hold"),
+        ));
     }
     if header.has_uncertainty() {
         let (name, of) = match (header.is_factored(), header.has_remainder()) {

@@ -381,11 +381,8 @@ mod tests {
     fn remainders_have_records_of_their_own() {
         let shape = Shape { has_remainder: true, ..SHAPE };
         let remainder = OfRemainder { spread: vec![1.0; 3], sum: vec![2.0, 3.0, 4.0], of_all: vec![5.0, 6.0, 7.0] };
-        let with = Record {
-            checksums: [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13],
-            remainder: Some(remainder),
-            ..record(64)
-        };
+        let with =
+            Record { checksums: [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13], remainder: Some(remainder), ..record(64) };
         let bytes = with.encode(shape);
         assert_eq!(bytes.len(), shape.bytes());
         assert_eq!(Record::decode(&bytes, 7, shape), Some(with));

@@ -64,8 +64,7 @@ impl TileArray {
     /// Those of cubes of all kinds.
     pub fn all() -> impl Iterator<Item = TileArray> {
         let layers = Layer::ALL.map(TileArray::Layer);
-        let factored =
-            [TileArray::Weights, TileArray::Products, TileArray::Remainder, TileArray::RemainderError];
+        let factored = [TileArray::Weights, TileArray::Products, TileArray::Remainder, TileArray::RemainderError];
         TileArray::ALL.into_iter().chain(factored).chain(layers)
     }
 

@@ -33,10 +33,7 @@ pub(super) enum Unit<'a> {
     /// [tile_h][tile_w][K].
     Radiance(&'a [f32]),
     /// Of a tile that has none: [tile_w][tile_h][K], and standard errors.
-    Columns {
-        values: &'a [f32],
-        errors: Option<&'a [f32]>,
-    },
+    Columns { values: &'a [f32], errors: Option<&'a [f32]> },
     /// And of what does not separate [tile_h][tile_w][K], in cubes that have it.
     Weights(Weights, Option<&'a [f32]>),
 }
@@ -48,7 +45,8 @@ impl Unit<'_> {
                 !header.is_factored() && unit.len() == header.grid().tile_pixels() * header.channels.len()
             }
             Unit::Weights(unit, remainder) => {
-                let values = if header.has_remainder() { header.grid().tile_pixels() * header.channels.len() } else { 0 };
+                let values =
+                    if header.has_remainder() { header.grid().tile_pixels() * header.channels.len() } else { 0 };
                 header.is_factored()
                     && unit.pixels() == header.grid().tile_pixels()
                     && remainder.map_or(0, <[f32]>::len) == values

@@ -5,8 +5,8 @@ use std::ops::Deref;
 
 use crate::device::example::Exhibit;
 use crate::device::parts::{
-    attributes, camera, geometry, heat, instances, layers, lights, media, opacity, paths, remainder, roughness, scattering,
-    sky, spectra, surfaces, textures,
+    attributes, camera, geometry, heat, instances, layers, lights, media, opacity, paths, remainder, roughness,
+    scattering, sky, spectra, surfaces, textures,
 };
 use crate::device::prepared::Prepared;
 use crate::device::text::{Defines, Module};

@@ -322,8 +322,7 @@ impl Pool {
         let sums = self.prepared.integration.as_ref().map(|integration| integration.sums(collected.means()));
         let means: &[f32] = sums.as_deref().unwrap_or(collected.means());
         if self.prepared.separable.is_some() {
-            let merged =
-                self.merge_weights(collected, means, oldest, [n_before, samples], post.mergers.as_deref())?;
+            let merged = self.merge_weights(collected, means, oldest, [n_before, samples], post.mergers.as_deref())?;
             return if merged { self.report_merged(began, n_before + samples, collected.idle_s, post) } else { Ok(()) };
         }
         let units = means.chunks(means.len() / collected.units.len());

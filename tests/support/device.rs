@@ -104,7 +104,8 @@ pub fn render_paths_of_weights(scene: &Scene, epochs: u32, samples: u32, setting
 /// Of a factored render as it came back, the weights of all pixels, and the sum of what does not separate over pixels and channels.
 pub fn parts_of(scene: &Scene, samples: u32, settings: Settings) -> (usize, f64) {
     let prepared = Prepared::new(&scene.clone().factored(), settings.seed).expect("a scene that fits");
-    let mut worker = Worker::new(device(settings), Arc::new(prepared), settings.tile, settings.budget).expect("a worker");
+    let mut worker =
+        Worker::new(device(settings), Arc::new(prepared), settings.tile, settings.budget).expect("a worker");
     let [x0, y0, x1, y1] = scene.film.crop;
     worker.submit(&[[x0, y0, x1.min(x0 + settings.tile[0]), y1.min(y0 + settings.tile[1])]], 0, samples).expect("work");
     let collected = worker.collect().expect("results").expect("a unit");
