@@ -13,11 +13,13 @@ pub struct RemainderShare {
 }
 
 impl RemainderShare {
-    pub(super) fn none(channels: usize) -> RemainderShare {
+    /// Of nothing yet.
+    pub fn none(channels: usize) -> RemainderShare {
         RemainderShare { sum: vec![0.0; channels], of_all: vec![0.0; channels] }
     }
 
-    pub(super) fn add(&mut self, sum: &[f64], of_all: &[f64]) {
+    /// Adds sums over some pixels, per channel.
+    pub fn add(&mut self, sum: &[f64], of_all: &[f64]) {
         self.sum.iter_mut().zip(sum).for_each(|(total, more)| *total += more);
         self.of_all.iter_mut().zip(of_all).for_each(|(total, more)| *total += more);
     }
