@@ -339,7 +339,9 @@ impl Plan<'_> {
         let bounces = self.scene.integrator.max_bounces;
         let obstacles = self.prepared.obstacles.join(", ");
         if bounces > MOST_FACTORS {
-            return format!("not with paths of {bounces} bounces (integrator.max_bounces; render --factored takes {MOST_FACTORS})");
+            return format!(
+                "not with paths of {bounces} bounces (integrator.max_bounces; render --factored takes {MOST_FACTORS})"
+            );
         }
         if obstacles.is_empty() {
             return "the scene separates: render --factored keeps weights, so that spectra and channels can be changed afterwards".into();
