@@ -33,7 +33,8 @@ emission = "other"
     )
 }
 
-const TILES_OF_8: &[&str] = &["--size", "16x16", "--tile", "8", "--spp", "128", "--factored", "--uncertainty"];
+const TILES_OF_8: &[&str] = &["--size", "16x16", "--tile", "8", "--factored", "--uncertainty"];
+const SPP: &[&str] = &["--spp", "128"];
 
 fn values(cube: &Cube) -> Vec<f32> {
     let [width, height] = cube.header().size;
@@ -44,24 +45,25 @@ fn values(cube: &Cube) -> Vec<f32> {
 #[test]
 fn remainders_go_on_where_they_were() {
     let place = Place::of(&scene());
-    let straight = arrays(&place.render("straight.zarr", TILES_OF_8));
+    let straight = arrays(&place.render("straight.zarr", &[TILES_OF_8, SPP].concat()));
     for name in ["weights/c/1/1/0/0", "remainder/c/0/1/1", "remainder_standard_error/c/0/1/1"] {
         assert!(straight.contains_key(name), "{name}: {:?}", straight.keys());
     }
     for tiles in ["0..1", "1..4"] {
-        place.render("tiles.zarr", &[TILES_OF_8, &["--tiles", tiles]].concat());
+        place.render("tiles.zarr", &[TILES_OF_8, SPP, &["--tiles", tiles]].concat());
     }
     assert!(arrays(&place.cube("tiles.zarr")) == straight, "by tiles");
     place.render("cube.zarr", &[TILES_OF_8, &["--spp", "2"]].concat());
     let again = ["render", "scene.toml", "-o", "cube.zarr", "--resume"];
     for (after_ms, devices) in [(600, "1"), (1100, "2")] {
-        let mut child: Running = place.start("cube.zarr", &[TILES_OF_8, &["--resume", "--devices", devices]].concat());
+        let mut child: Running =
+            place.start("cube.zarr", &[TILES_OF_8, SPP, &["--resume", "--devices", devices]].concat());
         std::thread::sleep(std::time::Duration::from_millis(after_ms));
         // It may have ended by itself.
         let _ = child.0.kill();
         child.0.wait().expect("ended");
     }
-    place.success(&[&again[..], TILES_OF_8, &["--devices", "2"]].concat());
+    place.success(&[&again[..], TILES_OF_8, SPP, &["--devices", "2"]].concat());
     assert!(arrays(&place.cube("cube.zarr")) == straight, "after kills");
 
     let file = place.path().join("cube.zarr/remainder/c/0/1/1");
@@ -70,7 +72,7 @@ fn remainders_go_on_where_they_were() {
     fs::write(&file, &bytes).expect("written");
     let output = place.run(&["info", "cube.zarr", "--verify"]);
     assert!(text(&output.stdout).contains("remainder/c/0/1/1 is not what was written"), "{}", text(&output.stdout));
-    let (_, stderr) = place.success(&[&again[..], TILES_OF_8].concat());
+    let (_, stderr) = place.success(&[&again[..], TILES_OF_8, SPP].concat());
     assert!(stderr.contains("rendered again"), "{stderr}");
     assert!(arrays(&place.cube("cube.zarr")) == straight, "mended");
 }
