@@ -197,6 +197,7 @@ def relight(
     temperatures: Mapping[str, float] | None = None,
     channels: Mapping[str, Any] | None = None,
     responses: Any = None,
+    without_remainder: bool = False,
     overwrite: bool = False,
     **named: Any,
 ) -> Cube:
@@ -207,6 +208,7 @@ def relight(
         `relight(cube, lamp=illuminant("A"))`.
     temperatures: of materials by name, K. channels: as in a scene, such as {"equal": {"from": 400, "to": 700, "count": 30}}.
     responses: channels that are bands of a sensor, as `sensor` takes them.
+    without_remainder: leave out what does not separate, which else is as it was rendered, and known only in unions of its channels.
     out: the cube to make; None for a temporary one.
 
     >>> from spectile import render
@@ -232,6 +234,7 @@ def relight(
     path = os.path.join(folder, "relit.zarr") if out is None else os.fspath(out)
     try:
         arguments = ["relight", f"--output={path}", *_work.option("overwrite", bool(overwrite))]
+        arguments += _work.option("without-remainder", bool(without_remainder))
         twice = sorted(set(named) & set(spectra or {}))
         if twice:
             raise UsageError(f"relight: `{twice[0]}` is given twice, by itself and in `spectra`")

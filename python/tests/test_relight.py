@@ -72,3 +72,22 @@ def test_what_cannot_be_changed_is_refused(weights, tmp_path):
     plain = sp.render(ball(), tmp_path / "plain.zarr", spp=1)
     with pytest.raises(sp.UsageError, match="holds radiance"):
         sp.relight(plain)
+
+
+def test_what_does_not_separate_is_kept_in_channels(tmp_path):
+    scene = ball()
+    scene["materials"]["shiny"] = {"plastic": {"reflectance": 0.5, "eta": 1.5, "roughness": 0.2}}
+    scene["objects"][0]["material"] = "shiny"
+    cube = sp.render(scene, tmp_path / "cube.zarr", spp=16, factored=True)
+    remainder = cube["remainder"]
+    assert remainder.dims == ("wavelength", "y", "x") and remainder.attrs["units"] == "W m-2 sr-1 nm-1"
+    whole = sp.relight(cube)
+    with pytest.warns(sp.SpectileWarning, match="is left out"):
+        without = sp.relight(cube, without_remainder=True)
+    assert float(remainder.max()) > 0
+    assert numpy.allclose(whole.radiance.values, without.radiance.values + remainder.values, rtol=1e-6)
+    other = {"equal": {"from": 400, "to": 700, "count": 5}}
+    with pytest.raises(sp.UsageError, match="is no union of channels"):
+        sp.relight(cube, channels=other)
+    with pytest.warns(sp.SpectileWarning, match="is left out"):
+        assert sp.relight(cube, channels=other, without_remainder=True).sizes["wavelength"] == 5

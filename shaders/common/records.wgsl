@@ -20,8 +20,23 @@
     // What is seen before scattering lies before this record; the rest roulette has a say in.
     let first_behind = first_record + seen_records;
 #endif
+#if REMAINDER
+    // What there was before the last record, and whether what that added is no business of channels.
+    var mixed = Mixed(false, false, false, true);
+    var is_weighed = false;
+#repeat VECTORS v
+    var remainder_$v = vec4<f32>(0.0);
+#end
+#endif
     for (var r = first_record; r < first_record + used; r += 1u) {
         let record = records[r];
+#if REMAINDER
+#repeat VECTORS v
+        radiance_$v = select(radiance_$v, remainder_$v, is_weighed);
+        remainder_$v = radiance_$v;
+#end
+        is_weighed = !is_of_remainder(record, &mixed);
+#endif
 #if THINS
         // To be tried alone.
         if (r == first_behind) {
@@ -227,3 +242,8 @@
 #end
 #endif
     }
+#if REMAINDER
+#repeat VECTORS v
+    radiance_$v = select(radiance_$v, remainder_$v, is_weighed);
+#end
+#endif

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use super::Output;
 use super::tile_states::{TileStates, list};
-use crate::cube::{Choices, Cube, FACTORED, LAYERS, Progress, Verification};
+use crate::cube::{Choices, Cube, FACTORED, LAYERS, Progress, RemainderShare, Verification};
 use crate::files::shown;
 use crate::scene::{Evaluation, Evaluator};
 use crate::spectral::Channels;
@@ -94,7 +94,8 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     let work = TileStates::of(&cube, &samples)?;
     let lost = cube.lost(&samples);
     let choices = Choices::read(cube.path())?;
-    let found = Found { progress: Progress::of(&samples), estimate, work, verified, lost, choices, cube };
+    let remainder = cube.remainder_share()?;
+    let found = Found { progress: Progress::of(&samples), estimate, work, verified, lost, choices, remainder, cube };
     output.event("done", found.facts())?;
     output.text(&found.describe())?;
     match &found.verified {
@@ -114,6 +115,8 @@ struct Found {
     lost: Vec<Range<u32>>,
     /// What was decided before it was rendered, where something was.
     choices: Option<Choices>,
+    /// How much of it does not separate, of a factored cube that has such a thing.
+    remainder: Option<RemainderShare>,
 }
 
 /// Says how the tiles stand, again and again until all are done.
@@ -192,6 +195,7 @@ impl Found {
             "uncertainty": header.has_uncertainty(),
             "layers": self.layers(),
             "choices": self.choices,
+            "remainder_share": self.remainder.as_ref().map(RemainderShare::of_channels),
             "preview": shows(cube),
             "attributes": header.attributes,
             "channels": each.collect::<Vec<_>>(),
@@ -280,6 +284,14 @@ impl Found {
                 if names.is_empty() { "(none has a name)".to_owned() } else { names.join(", ") }
             );
             row("factored", what);
+        }
+        if header.has_remainder() {
+            let share = match &self.remainder {
+                Some(_) if progress.samples[1] == 0 => "nothing is rendered yet".to_owned(),
+                Some(share) => share.describe(cube.channels()),
+                None => "an unknown share of the radiance: this is a copy".to_owned(),
+            };
+            row("remainder", format!("{share}; relight does not change {}", header.remainder().join(", ")));
         }
         // What has a line of its own above.
         let is_told = |name: &str| name == LAYERS || (header.is_factored() && name == FACTORED);

@@ -9,11 +9,12 @@ use super::Output;
 use super::progress::short;
 use super::render::parse_layer;
 use super::scene::SceneArgs;
-use crate::cube::{Choices, Header, Layer};
+use crate::cube::{Choices, Header, Layer, RemainderShare};
 use crate::device::evaluator::EvaluateShape;
 use crate::device::facts;
 use crate::device::part::OnDevice;
 use crate::device::prepared::Prepared;
+use crate::device::separable::MOST_FACTORS;
 use crate::device::windows::Windows;
 use crate::files::{format_bytes, shown};
 use crate::gpu::adapter::{Gpu, Selection};
@@ -65,7 +66,8 @@ pub struct Args {
 
     /// Decide by samples what `render` decides before it begins: which paths are worth evaluating
     ///
-    /// Where `integrator.evaluation` asks for it. Without this, the plan is that of evaluating all paths.
+    /// Where `integrator.evaluation` asks for it. Without this, the plan is that of evaluating all paths. Samples also tell how much of the
+    /// picture `render --factored` would keep in a remainder.
     #[arg(long)]
     pub pilot: bool,
 
@@ -98,8 +100,8 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     };
     let evaluator = plan::evaluator(&scene, None, gpus.first().is_some_and(|gpu| gpu.is_software))?;
     let prepared = Prepared::for_evaluator(&scene, 0, evaluator)?;
-    let (prepared, choices) = match args.pilot {
-        false => (Arc::new(prepared), None),
+    let (prepared, choices, remainder) = match args.pilot {
+        false => (Arc::new(prepared), None, None),
         true if gpus.is_empty() => return Err(Error::NoDevice("--pilot follows paths, and there is no device".into())),
         true => {
             let mut pilot = Pilot {
@@ -109,7 +111,10 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
                 interrupt: &Arc::default(),
                 warn: &mut |what| warn(output, &what),
             };
-            pilot.decide(prepared, None)?
+            let (prepared, choices) = pilot.decide(prepared, None)?;
+            let is_deep = scene.integrator.max_bounces > MOST_FACTORS;
+            let remainder = if is_deep { None } else { pilot.remainder()? };
+            (prepared, choices, remainder)
         }
     };
     let stop = StopRule { samples: Some(args.spp), ..StopRule::default() };
@@ -123,7 +128,8 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         Some(m) => m.waves,
         None => plan::waves_without_device(&prepared, tile, budget)?,
     };
-    let plan = Plan { args, scene: &scene, samples, prepared: &prepared, choices, header, layer_disk, waves, measured };
+    let prepared = &*prepared;
+    let plan = Plan { args, scene: &scene, samples, prepared, choices, remainder, header, layer_disk, waves, measured };
     output.event("done", plan.facts())?;
     output.text(&plan.describe())
 }
@@ -228,6 +234,8 @@ struct Plan<'a> {
     prepared: &'a Prepared,
     /// What the pilot decided, if it was asked.
     choices: Option<Choices>,
+    /// What it says of the picture that does not separate.
+    remainder: Option<RemainderShare>,
     header: Header,
     /// Of the cube's bytes on disk, those of its layers.
     layer_disk: u64,
@@ -289,6 +297,7 @@ impl Plan<'_> {
             "features": features.collect::<Vec<_>>(),
             "spectra": facts::table_bounds(self.prepared),
             "factored_obstacles": self.prepared.obstacles,
+            "remainder_share": self.remainder.as_ref().map(RemainderShare::of_channels),
             "storage_buffers": self.storage_buffers(),
             "primitives": self.prepared.accel.primitives.len() - self.prepared.accel.instances,
             "instances": self.prepared.accel.instances,
@@ -323,6 +332,28 @@ impl Plan<'_> {
         let kernels = scene.kernels(EvaluateShape::of(self.prepared, true));
         // Texts that do not parse are refused where they are compiled.
         kernels.all().filter_map(|source| storage_buffers(source).ok()).max().unwrap_or(0)
+    }
+
+    /// What `render --factored` makes of the scene.
+    fn describe_factored(&self) -> String {
+        let bounces = self.scene.integrator.max_bounces;
+        let obstacles = self.prepared.obstacles.join(", ");
+        if bounces > MOST_FACTORS {
+            return format!(
+                "not with paths of {bounces} bounces (integrator.max_bounces; render --factored takes {MOST_FACTORS})"
+            );
+        }
+        if obstacles.is_empty() {
+            return "the scene separates: render --factored keeps weights, so that spectra and channels can be changed afterwards".into();
+        }
+        let share = match &self.remainder {
+            Some(share) => format!("about {}", share.describe(&self.scene.channels)),
+            None => "--pilot says how much".into(),
+        };
+        format!(
+            "the scene separates in part: render --factored keeps weights, and in channels a remainder, which cannot be changed afterwards, \
+             of {obstacles}: {share}"
+        )
     }
 
     /// First what users ask: how long, how much memory and disk, what was chosen. Then what the scene needs, and what not.
@@ -379,13 +410,7 @@ impl Plan<'_> {
             text += &wrapped("left out", &format!("{} (--verbose says what each would cost)", names.join(", ")));
         }
         text += &self.describe_spectra();
-        text += &wrapped(
-            "factored",
-            &match &self.prepared.obstacles[..] {
-                [] => "the scene separates: render --factored keeps weights, so that spectra and channels can be changed afterwards".to_owned(),
-                obstacles => format!("the scene does not separate (render --factored): {}", obstacles.join(", ")),
-            },
-        );
+        text += &wrapped("factored", &self.describe_factored());
         if self.args.verbose {
             text += &format!("kernels   bind {} storage buffers at most\n", self.storage_buffers());
         }

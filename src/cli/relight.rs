@@ -7,9 +7,9 @@ use serde_json::json;
 use super::Output;
 use super::scene::parse_override;
 use super::sensor::refuse_itself;
-use crate::cube::{self, Cube, Existing};
+use crate::cube::{self, Cube, Existing, NewCube, Relighted};
 use crate::files::shown;
-use crate::scene::{self, NewChannels};
+use crate::scene::{self, NewChannels, Relit};
 use crate::{Error, Result};
 
 /// A cube under other lamps, paints, temperatures or channels, without rendering it again
@@ -23,6 +23,9 @@ use crate::{Error, Result};
 /// Geometry, which material is where, lights that were not there: all that needs paths is refused. The cube gets standard errors where
 /// CUBE was rendered with --uncertainty. Noise is that of the paths: where other lamps or paints give weight to paths that hardly
 /// mattered before, it is larger, which is told.
+///
+/// What of the scene does not separate (metals, glass, plastic, matter, maps …) is added as it was rendered, and how much of the picture
+/// that is is told. It is known in the channels that were rendered, so that others must be unions of these, or go without it.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = "\
 Examples:
@@ -45,6 +48,10 @@ pub struct Args {
     /// Channels that are the bands of a sensor, a CSV file: means weighted by each response, exact in wavelength
     #[arg(long, value_name = "S.csv")]
     pub responses: Option<PathBuf>,
+
+    /// Leave out what does not separate, so that any channels can be had; how much that is stands in the cube's attributes
+    #[arg(long)]
+    pub without_remainder: bool,
 
     /// The cube to make, a folder
     #[arg(short, long, value_name = "OUT.zarr")]
@@ -80,8 +87,15 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
     }
     let existing = if args.overwrite { Existing::Replace } else { Existing::Refuse };
     let found = super::progress::watched(output, |progress| {
-        cube::relight(&cube, &relit.basis, &relit.channels, &relit.changed, &args.output, existing, progress)
+        let new = NewCube {
+            basis: &relit.basis,
+            channels: &relit.channels,
+            changed: &relit.changed,
+            without_remainder: args.without_remainder,
+        };
+        cube::relight(&cube, new, &args.output, existing, progress)
     })?;
+    warn_of_remainder(&cube, &relit, args.without_remainder, &found, output)?;
     let known = found.error_estimate.iter().copied().filter(|error| !error.is_nan());
     let largest = known.fold(None, |most: Option<f64>, error| Some(most.map_or(error, |most| most.max(error))));
     let mut text = format!("{}: {} channels", args.output.display(), relit.channels.len());
@@ -100,9 +114,31 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
             "channels": relit.channels.len(),
             "changed": relit.changed,
             "error_estimate": largest,
+            "remainder_share": found.remainder.as_ref().map(|share| share.of_channels()),
             "entries_per_pixel": found.entries as f64 / found.pixels.max(1) as f64,
             "expand_s": found.expand_s,
         }),
     )?;
     output.text(&text)
+}
+
+/// Says what of the picture is not as it was asked for.
+fn warn_of_remainder(cube: &Cube, relit: &Relit, left_out: bool, found: &Relighted, output: &Output) -> Result<()> {
+    let words = cube.header().remainder();
+    if words.is_empty() {
+        return Ok(());
+    }
+    let words = words.join(", ");
+    match &found.remainder {
+        Some(share) if !relit.changed.is_empty() => output.warn(&format!(
+            "{}, does not separate and is as it was rendered: {words}",
+            share.describe(&relit.channels)
+        )),
+        None if left_out => {
+            let share = cube.remainder_share()?.map(|share| share.describe(cube.channels()));
+            let share = share.unwrap_or_else(|| "an unknown share of the radiance".to_owned());
+            output.warn(&format!("as rendered {share}, does not separate and is left out: {words}"))
+        }
+        _ => Ok(()),
+    }
 }

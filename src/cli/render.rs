@@ -86,10 +86,11 @@ pub struct Args {
 
     /// Keep weights of products of spectra instead of radiance, so that lamps, paints and channels can be changed afterwards
     ///
-    /// For scenes of diffuse, translucent and black surfaces, also blends and textures of endmembers, under lamps, lights, suns and
-    /// uniform skies: what a path brings is a number times one source spectrum times the spectra of what it met. The cube holds
-    /// these numbers; its size does not depend on the channels, nor is there noise from wavelengths. `spectile relight` makes
-    /// cubes of it, all else reads it as it is. docs/METHOD.md says how, `spectile plan` whether a scene separates.
+    /// By diffuse, translucent and black surfaces, also blends and textures of endmembers, under lamps, lights, suns and uniform
+    /// skies, what a path brings is a number times one source spectrum times the spectra of what it met. The cube holds these
+    /// numbers; their size does not depend on the channels, nor is there noise from wavelengths. What comes by anything else (metals,
+    /// glass, plastic, matter, maps …) is kept in channels beside them, as a remainder. `spectile relight` makes cubes of it, all
+    /// else reads it as it is. docs/METHOD.md says how, `spectile plan` whether a scene separates.
     #[arg(long)]
     pub factored: bool,
 

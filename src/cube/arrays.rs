@@ -102,16 +102,26 @@ pub(super) fn arrays(header: &Header, layout: Layout) -> Vec<(&'static str, Valu
         let [weights, products] = of_weights(header);
         arrays[0] = weights;
         arrays.push(products);
-    } else if header.has_uncertainty() {
-        let errors = Array {
-            codecs: channel_fastest(layout),
-            attributes: json!({
-                "long_name": "standard error of radiance, from the spread of equal epochs; NaN below two of them",
-                "units": radiance_units,
-            }),
-            ..Array::new("float32", &[channels, height, width], &["wavelength", "y", "x"])
+    }
+    let of_channels = |what: &str| {
+        let attributes = json!({ "long_name": what, "units": radiance_units });
+        let array = Array::new("float32", &[channels, height, width], &["wavelength", "y", "x"]);
+        Array { codecs: channel_fastest(layout), attributes, ..array }.chunked(&[channels, tile_height, tile_width])
+    };
+    if header.has_remainder() {
+        arrays.push((
+            "remainder",
+            of_channels("the part of the mean spectral radiance that weights of products do not hold"),
+        ));
+    }
+    if header.has_uncertainty() {
+        let (name, of) = match (header.is_factored(), header.has_remainder()) {
+            (false, _) => (Some("standard_error"), "radiance"),
+            (true, true) => (Some("remainder_standard_error"), "remainder"),
+            (true, false) => (None, ""),
         };
-        arrays.push(("standard_error", errors.chunked(&[channels, tile_height, tile_width])));
+        let what = format!("standard error of {of}, from the spread of equal epochs; NaN below two of them");
+        arrays.extend(name.map(|name| (name, of_channels(&what))));
     }
     let names = header.layer_names();
     for layer in header.layers() {

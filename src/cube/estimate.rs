@@ -147,6 +147,7 @@ mod tests {
             checksums: [0; TileArray::MOST],
             spread: vec![2.0, 0.0, 0.0],
             square: vec![9.0, 5.0, 0.0],
+            remainder: None,
         }
     }
 

@@ -2,8 +2,9 @@
 //!
 //! A record, little-endian: magic, tile, K, samples per pixel, index of the last epoch merged, suffix of the files aside, the tile's
 //! error at its last two looks (not in journals that older versions began, whose magic ends in 1),
-//! five 128-bit checksums (one per [`TileArray`], zero for one that the cube has not; in cubes with layers six more), per channel Σ M2 and Σ mean² for the error estimate, and the
-//! checksum of all that. Checksums are XXH3 (Y. Collet, xxHash), which finds damage and is no protection against intent.
+//! five 128-bit checksums (one per [`TileArray`], zero for one that the cube has not; in cubes with layers or a remainder six more, with a
+//! remainder two more still), per channel Σ M2 and Σ mean² for the error estimate (with a remainder also Σ M2, Σ and Σ of all of it), and
+//! the checksum of all that. Checksums are XXH3 (Y. Collet, xxHash), which finds damage and is no protection against intent.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Read, Seek, SeekFrom, Write};
@@ -12,6 +13,7 @@ use std::path::PathBuf;
 use super::checksums;
 use super::estimate::UNSEEN;
 use super::faults::step;
+use super::metadata::Header;
 use super::store::{Cube, TileArray};
 use crate::{Error, Result, files};
 
@@ -24,8 +26,8 @@ const HEAD_BYTES: usize = 32;
 const MAX_RECORDS: u64 = 16;
 
 /// The most that a journal takes.
-pub(super) fn most_bytes(channels: usize, has_layers: bool) -> u64 {
-    MAX_RECORDS * Shape { channels, has_layers, has_looks: true }.bytes() as u64
+pub(super) fn most_bytes(header: &Header) -> u64 {
+    MAX_RECORDS * Shape::of(header).bytes() as u64
 }
 
 /// What decides how long a record is.
@@ -33,10 +35,17 @@ pub(super) fn most_bytes(channels: usize, has_layers: bool) -> u64 {
 struct Shape {
     channels: usize,
     has_layers: bool,
+    has_remainder: bool,
     has_looks: bool,
 }
 
 impl Shape {
+    /// Of what is written now.
+    fn of(header: &Header) -> Shape {
+        let has_layers = !header.layers().is_empty();
+        Shape { channels: header.channels.len(), has_layers, has_remainder: header.has_remainder(), has_looks: true }
+    }
+
     fn magic(self) -> [u8; 8] {
         if self.has_looks { MAGIC } else { MAGIC_WITHOUT_LOOKS }
     }
@@ -48,7 +57,16 @@ impl Shape {
 
     /// Checksums of a record.
     fn files(self) -> usize {
-        if self.has_layers { TileArray::MOST } else { TileArray::WITHOUT_LAYERS }
+        match (self.has_remainder, self.has_layers) {
+            (true, _) => TileArray::MOST,
+            (false, true) => TileArray::WITHOUT_REMAINDER,
+            (false, false) => TileArray::WITHOUT_LAYERS,
+        }
+    }
+
+    /// Numbers of each channel.
+    fn sums(self) -> usize {
+        if self.has_remainder { 5 } else { 2 }
     }
 
     fn head_bytes(self) -> usize {
@@ -57,7 +75,7 @@ impl Shape {
 
     /// Bytes of a record.
     fn bytes(self) -> usize {
-        self.head_bytes() + 16 * self.channels + 16
+        self.head_bytes() + 8 * self.sums() * self.channels + 16
     }
 }
 
@@ -79,6 +97,24 @@ pub(super) struct Record {
     pub spread: Vec<f64>,
     /// Per channel: Σ over pixels of mean².
     pub square: Vec<f64>,
+    /// Of cubes with a remainder.
+    pub remainder: Option<OfRemainder>,
+}
+
+/// What a remainder is of a tile, per channel, sums over its pixels.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct OfRemainder {
+    /// As [`Record::spread`], of the remainder alone.
+    pub spread: Vec<f64>,
+    /// Σ of the remainder, and Σ of the radiance that it is a part of.
+    pub sum: Vec<f64>,
+    pub of_all: Vec<f64>,
+}
+
+impl OfRemainder {
+    fn all(&self) -> impl Iterator<Item = &f64> {
+        self.spread.iter().chain(&self.sum).chain(&self.of_all)
+    }
 }
 
 impl Record {
@@ -92,7 +128,8 @@ impl Record {
             bytes.extend(self.looks.iter().flat_map(|look| look.to_le_bytes()));
         }
         self.checksums[..shape.files()].iter().for_each(|sum| bytes.extend(sum.to_le_bytes()));
-        bytes.extend(self.spread.iter().chain(&self.square).flat_map(|v| v.to_le_bytes()));
+        let of_remainder = self.remainder.iter().flat_map(OfRemainder::all);
+        bytes.extend(self.spread.iter().chain(&self.square).chain(of_remainder).flat_map(|v| v.to_le_bytes()));
         let checksum = checksums::of(&bytes);
         bytes.extend(checksum.to_le_bytes());
         bytes
@@ -107,7 +144,7 @@ impl Record {
         let valid = head[..8] == shape.magic()
             && word(8) == tile
             && word(12) as usize == channels
-            && sums.len() == 16 * channels
+            && sums.len() == 8 * shape.sums() * channels
             && checksums::of(content).to_le_bytes() == *checksum;
         if !valid {
             return None;
@@ -115,7 +152,13 @@ impl Record {
         let sum_at =
             |i: usize| u128::from_le_bytes(head[shape.sums_at() + 16 * i..][..16].try_into().expect("sixteen bytes"));
         let mut spread: Vec<f64> = sums.as_chunks().0.iter().map(|b| f64::from_le_bytes(*b)).collect();
-        let square = spread.split_off(channels);
+        let mut square = spread.split_off(channels);
+        let remainder = shape.has_remainder.then(|| {
+            let mut spread = square.split_off(channels);
+            let mut sum = spread.split_off(channels);
+            let of_all = sum.split_off(channels);
+            OfRemainder { spread, sum, of_all }
+        });
         Some(Record {
             tile,
             samples: word(16),
@@ -125,6 +168,7 @@ impl Record {
             checksums: std::array::from_fn(|i| if i < shape.files() { sum_at(i) } else { 0 }),
             spread,
             square,
+            remainder,
         })
     }
 }
@@ -140,8 +184,7 @@ pub(super) struct Journal {
 impl Journal {
     pub fn of(cube: &Cube, tile: u32) -> Journal {
         let path = cube.journal_folder().join(tile.to_string());
-        let shape = Shape { channels: cube.channels().len(), has_layers: !cube.layers().is_empty(), has_looks: true };
-        Journal { path, tile, shape }
+        Journal { path, tile, shape: Shape::of(cube.header()) }
     }
 
     /// Of the records of a file that begins so: all of it is of one shape.
@@ -302,7 +345,7 @@ impl Journal {
 mod tests {
     use super::*;
 
-    const SHAPE: Shape = Shape { channels: 3, has_layers: false, has_looks: true };
+    const SHAPE: Shape = Shape { channels: 3, has_layers: false, has_remainder: false, has_looks: true };
 
     fn record(samples: u32) -> Record {
         Record {
@@ -311,9 +354,10 @@ mod tests {
             epoch: 8,
             suffix: u64::from(samples) << 32 | 5,
             looks: [0.25, f32::INFINITY],
-            checksums: [1, 2 << 100, 3, u128::MAX, 0, 0, 0, 0, 0, 0, 0],
+            checksums: [1, 2 << 100, 3, u128::MAX, 0, 0, 0, 0, 0, 0, 0, 0, 0],
             spread: vec![0.5, -0.0, 1e300],
             square: vec![9.0, 5.0, 0.0],
+            remainder: None,
         }
     }
 
@@ -330,6 +374,20 @@ mod tests {
             assert_eq!(Record::decode(&damaged, 7, SHAPE), None, "byte {i}");
             assert_eq!(Record::decode(&bytes[..i], 7, SHAPE), None, "cut at {i}");
         }
+    }
+
+    /// Cubes with a remainder have more files and sums, and no others' records.
+    #[test]
+    fn remainders_have_records_of_their_own() {
+        let shape = Shape { has_remainder: true, ..SHAPE };
+        let remainder = OfRemainder { spread: vec![1.0; 3], sum: vec![2.0, 3.0, 4.0], of_all: vec![5.0, 6.0, 7.0] };
+        let with =
+            Record { checksums: [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13], remainder: Some(remainder), ..record(64) };
+        let bytes = with.encode(shape);
+        assert_eq!(bytes.len(), shape.bytes());
+        assert_eq!(Record::decode(&bytes, 7, shape), Some(with));
+        assert_eq!(Record::decode(&bytes, 7, SHAPE), None);
+        assert_eq!(Record::decode(&record(64).encode(SHAPE), 7, shape), None);
     }
 
     #[test]

@@ -3,7 +3,6 @@
 use std::io::Write;
 
 use super::grid::Rect;
-use super::journal::Record;
 use super::map::Chunk;
 use super::metadata::Layout;
 use super::weights::Shape;
@@ -48,9 +47,11 @@ pub fn merge_bytes(header: &super::Header) -> u64 {
     let buffer = (BUFFER_BYTES as u64).max(4 * channels);
     // Error sums and a spectrum of squares: two f64 a channel as they were, and two as they become.
     let sums = 4 * 8 * channels;
-    // Of factored cubes: radiance of the tile before and after, and of the unit; what both files hold.
+    // Of factored cubes: radiance of the tile before and after, and of the unit; what both files hold. Of a remainder the same again, with
+    // standard errors.
     let shape = Shape::of(header);
-    let weights = 3 * header.chunk_bytes() + (shape.entries * (4 * shape.columns + 2 * shape.width)) as u64;
+    let chunks = if header.has_remainder() { 7 } else { 3 };
+    let weights = chunks * header.chunk_bytes() + (shape.entries * (4 * shape.columns + 2 * shape.width)) as u64;
     let weights = if header.is_factored() { weights } else { 0 };
     weights + buffer + sums + 12 * grid.tile_pixels() as u64 + (8 * blocks_y + 4 * blocks_x * blocks_y) * channels
 }
@@ -171,13 +172,14 @@ impl<'a> UnitPass<'a> {
 
     /// Per channel, Σ M2 and Σ mean² of the tile after this unit: Welford's M2 += δ² B / (B + 1), δ the distance of the
     /// new epoch from the mean of the B epochs before it. The portions of the first epoch are one epoch together.
-    pub fn sums(&mut self, old: Option<&Record>, epoch: u32) -> (Vec<f64>, Vec<f64>) {
+    /// `old`: the samples before, and their Σ M2.
+    pub fn sums(&mut self, old: Option<(u32, &[f64])>, epoch: u32) -> (Vec<f64>, Vec<f64>) {
         let mut spread = vec![0.0; self.channels];
-        if let Some(old) = old
-            && old.samples >= epoch
+        if let Some((samples, old)) = old
+            && samples >= epoch
         {
-            let before = f64::from(old.samples / epoch);
-            for ((spread, old), distance) in spread.iter_mut().zip(&old.spread).zip(&self.distance) {
+            let before = f64::from(samples / epoch);
+            for ((spread, old), distance) in spread.iter_mut().zip(old).zip(&self.distance) {
                 *spread = old + distance * (before / (before + 1.0));
             }
         }

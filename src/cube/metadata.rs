@@ -162,10 +162,25 @@ impl Header {
         serde_json::from_value(self.attributes.get(FACTORED)?.get("basis")?.clone()).ok()
     }
 
-    /// The same cube, with weights of products of spectra of `basis`, of so many factors at most, instead of radiance.
-    pub fn with_weights(mut self, basis: &Basis, most_factors: u32) -> Header {
-        self.attributes.insert(FACTORED.into(), json!({ "most_factors": most_factors, "basis": basis }));
+    /// The same cube, with weights of products of spectra of `basis`, of so many factors at most, instead of radiance; and where
+    /// something does not separate, which `remainder` has in words, a remainder in channels.
+    pub fn with_weights(mut self, basis: &Basis, most_factors: u32, remainder: &[String]) -> Header {
+        let mut factored = json!({ "most_factors": most_factors, "basis": basis });
+        if !remainder.is_empty() {
+            factored["remainder"] = json!(remainder);
+        }
+        self.attributes.insert(FACTORED.into(), factored);
         self
+    }
+
+    /// What of a factored cube's scene does not separate, in words: it lies in the array `remainder`.
+    pub fn remainder(&self) -> Vec<String> {
+        let written = self.attributes.get(FACTORED).and_then(|of| of.get("remainder"));
+        written.and_then(|words| serde_json::from_value(words.clone()).ok()).unwrap_or_default()
+    }
+
+    pub fn has_remainder(&self) -> bool {
+        self.attributes.get(FACTORED).is_some_and(|of| of.get("remainder").is_some())
     }
 
     /// The numbers of factors and of sources of a factored cube.
@@ -208,18 +223,24 @@ impl Header {
         let pixels = u64::from(self.tile[0]) * u64::from(self.tile[1]);
         let blocks = self.grid().tile_blocks().map(u64::from);
         let names = self.layer_names();
-        let journal = super::journal::most_bytes(self.channels.len(), !names.layers.is_empty());
+        let journal = super::journal::most_bytes(self);
         let errors = if self.has_uncertainty() { pixels * channels * 4 } else { 0 };
         let (radiance, errors) = match self.is_factored() {
             false => (pixels * channels * 4, errors),
             // With as many entries as are kept.
             true => (pixels * Shape::of(self).entry_bytes(), pixels * 16),
         };
+        let of_remainder = match (self.has_remainder(), self.has_uncertainty()) {
+            (false, _) => 0,
+            (true, false) => 1,
+            (true, true) => 2,
+        };
         let files = [radiance, errors, pixels * 12, blocks[0] * blocks[1] * channels * 4, 4, journal];
         // Each tile has a folder of `preview`, each row of tiles one of every array.
         let layers = self.layers();
         let in_layers = layers.iter().map(|layer| in_blocks(pixels * layer.pixel_bytes() as u64) + BLOCK_BYTES);
-        let tile = files.into_iter().map(in_blocks).sum::<u64>() + BLOCK_BYTES + in_layers.sum::<u64>();
+        let in_remainder = of_remainder * in_blocks(pixels * channels * 4);
+        let tile = files.into_iter().map(in_blocks).sum::<u64>() + BLOCK_BYTES + in_remainder + in_layers.sum::<u64>();
         // Each in the attributes of the group, of its array, and in the record; three arrays' metadata, and folders.
         let of_layers =
             names.objects.iter().chain(&names.materials).map(|name| 4 * name.len() as u64 + 64).sum::<u64>()
@@ -244,7 +265,8 @@ impl Header {
             + choices
             + in_blocks(coordinates)
             + in_blocks(of_layers)
-            + (5 + layers.len() as u64) * rows * BLOCK_BYTES;
+            + of_remainder * 3 * BLOCK_BYTES
+            + (5 + of_remainder + layers.len() as u64) * rows * BLOCK_BYTES;
         tile.saturating_mul(tiles).saturating_add(metadata)
     }
 

@@ -31,11 +31,13 @@ mod preview;
 mod protocol_tests;
 mod recover;
 mod relight;
+mod remainder;
 mod restore;
 mod runs;
 mod sensor;
 mod state;
 mod store;
+mod tile_files;
 mod verify;
 mod view;
 mod weights;
@@ -54,7 +56,8 @@ pub use metadata::{
     AFFINE, COUNTS_FORMAT, CRS, FACTORED, FORMAT, Header, LAYERS, PIXEL_TANGENT, SENSOR_FORMAT, plain_attributes,
 };
 pub use preview::reduction;
-pub use relight::{Relighted, relight};
+pub use relight::{NewCube, Relighted, relight};
+pub use remainder::RemainderShare;
 pub use runs::{Run, RunFile, RunState, SlurmTask, Stand, Work, node_name, now_s};
 pub use sensor::{Findings, integrate};
 pub use state::{CubeState, RegionMean, Seen, Window};

@@ -13,11 +13,14 @@ use super::faults::injected::{DIE, FULL, LOG};
 use super::journal::Journal;
 use super::*;
 use crate::cube_files::{Files, files};
-use crate::spectral::Channels;
+use crate::spectral::product::{Basis, Expression, Leaf, Product, Term};
+use crate::spectral::{Channels, Curve};
 use crate::{Error, Result};
 
 const CUBE: &str = "SPECTILE_TEST_CUBE";
 const EPOCHS: &str = "SPECTILE_TEST_EPOCHS";
+/// Set where the cube holds weights.
+const WEIGHTS: &str = "SPECTILE_TEST_WEIGHTS";
 /// Set where a damaged tile may be rendered again.
 const MAY_WARN: &str = "SPECTILE_TEST_MAY_WARN";
 
@@ -28,8 +31,16 @@ const BEFORE: u32 = 29;
 const AFTER: u32 = 32;
 const EPOCHS_PER_BATCH: u32 = 2;
 
-fn header() -> Header {
-    Header {
+/// What the cube holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Kind {
+    Radiance,
+    /// Weights, and a remainder.
+    Weights,
+}
+
+fn header(kind: Kind) -> Header {
+    let header = Header {
         size: [40, 8],
         origin: [0, 0],
         tile: [16, 8],
@@ -38,7 +49,23 @@ fn header() -> Header {
         attributes: serde_json::Map::new(),
     }
     .with_uncertainty()
-    .with_layers(&LayerNames::new(&LAYERS, vec!["objects.0".into()], Vec::new()))
+    .with_layers(&LayerNames::new(&LAYERS, vec!["objects.0".into()], Vec::new()));
+    match kind {
+        Kind::Radiance => header,
+        Kind::Weights => header.with_weights(&basis(), 2, &["matter".into()]),
+    }
+}
+
+/// A source and a factor.
+fn basis() -> Basis {
+    let leaf = |value: f64| Leaf {
+        name: value.to_string(),
+        is_named: false,
+        quantity: String::new(),
+        curve: Curve::Constant(value),
+    };
+    let of = |i: usize| Expression { scale: 1.0, terms: vec![Term::Spectrum(i)] };
+    Basis { spectra: vec![leaf(3.0), leaf(0.5)], sources: vec![of(0)], factors: vec![of(1)] }
 }
 
 const LAYERS: [Layer; 2] = [Layer::Normal, Layer::Object];
@@ -59,16 +86,33 @@ fn unit(tile: u32, epoch: u32) -> Vec<f32> {
     (0..16 * 8 * 5).map(value).collect()
 }
 
+/// And what it would have made of a unit's weights.
+fn weights(tile: u32, epoch: u32) -> Weights {
+    let product = |factors: &[u16]| Product { source: 0, factors: factors.into() };
+    let pixel = |i: u32| {
+        let weight = |k: u32| f64::from((i * 11 + tile * 7 + epoch * 29 + k) % 13) / 3.0;
+        [(product(&[]), weight(0)), (product(&[0]), weight(1)), (product(&[0, 0]), weight(2))].into_iter()
+    };
+    Weights::of_pixels((0..16 * 8).map(pixel))
+}
+
 /// Merges what is missing until every tile has `epochs` epochs, as a render would.
-fn work(path: &Path, epochs: u32, warn: &mut dyn FnMut(String)) -> Result<()> {
-    let cube = Writer::open(path, &header(), Existing::Resume, 0..TILES, warn)?;
+fn work(path: &Path, kind: Kind, epochs: u32, warn: &mut dyn FnMut(String)) -> Result<()> {
+    let cube = Writer::open(path, &header(kind), Existing::Resume, 0..TILES, warn)?;
     for epoch in 0..epochs {
         for tile in cube.tiles() {
             if epochs_in(cube.found()[tile as usize], 4) <= epoch {
                 if epoch == 0 {
                     cube.lay(tile, layers(cube.cube().grid(), tile));
                 }
-                cube.merge_unit(tile, samples_before(epoch, 4), epoch_samples(epoch, 4), &unit(tile, epoch))?;
+                let (before, samples) = (samples_before(epoch, 4), epoch_samples(epoch, 4));
+                let unit = unit(tile, epoch);
+                match kind {
+                    Kind::Radiance => cube.merge_unit(tile, before, samples, &unit)?,
+                    Kind::Weights => {
+                        cube.merge_weights(tile, before, samples, weights(tile, epoch), Some(&unit))?;
+                    }
+                }
             }
         }
         if epoch % EPOCHS_PER_BATCH == EPOCHS_PER_BATCH - 1 {
@@ -84,7 +128,8 @@ fn writer() {
     let Some(path) = std::env::var_os(CUBE) else { return };
     let epochs = std::env::var(EPOCHS).expect("epochs").parse().expect("a number");
     let mut warn = |what: String| assert!(std::env::var_os(MAY_WARN).is_some(), "{what}");
-    match work(Path::new(&path), epochs, &mut warn) {
+    let kind = if std::env::var_os(WEIGHTS).is_some() { Kind::Weights } else { Kind::Radiance };
+    match work(Path::new(&path), kind, epochs, &mut warn) {
         Ok(()) => {}
         // An orderly end: nothing waits, nothing panics.
         Err(Error::Storage { what, .. }) if std::env::var_os(FULL).is_some() => {
@@ -96,10 +141,13 @@ fn writer() {
 }
 
 /// A writer that works until every tile has `epochs`, with faults.
-fn start(path: &Path, epochs: u32, faults: &[(&str, String)]) -> ExitStatus {
+fn start(path: &Path, kind: Kind, epochs: u32, faults: &[(&str, String)]) -> ExitStatus {
     let mut command = Command::new(std::env::current_exe().expect("this test"));
     command.args(["--exact", "cube::protocol_tests::writer", "--nocapture", "-q"]);
     command.env(CUBE, path).env(EPOCHS, epochs.to_string());
+    if kind == Kind::Weights {
+        command.env(WEIGHTS, "1");
+    }
     command.envs(faults.iter().map(|(name, value)| (*name, value)));
     let output = command.output().expect("started");
     let killed = output.status.signal().is_some() || output.status.code() == Some(5);
@@ -139,17 +187,22 @@ impl Chance {
 /// A cube with [`BEFORE`] epochs, the bytes that [`AFTER`] must have, and a place for copies.
 struct Bench {
     folder: tempfile::TempDir,
+    kind: Kind,
     expected: Files,
 }
 
 impl Bench {
     fn new() -> Bench {
+        Bench::of(Kind::Radiance)
+    }
+
+    fn of(kind: Kind) -> Bench {
         let folder = tempfile::tempdir().expect("folder");
         let (base, straight) = (folder.path().join("base.zarr"), folder.path().join("straight.zarr"));
-        work(&base, BEFORE, &mut |what| panic!("{what}")).expect("a cube");
-        work(&straight, AFTER, &mut |what| panic!("{what}")).expect("a cube");
+        work(&base, kind, BEFORE, &mut |what| panic!("{what}")).expect("a cube");
+        work(&straight, kind, AFTER, &mut |what| panic!("{what}")).expect("a cube");
         let expected = arrays(&straight);
-        Bench { folder, expected }
+        Bench { folder, kind, expected }
     }
 
     fn base(&self) -> PathBuf {
@@ -169,7 +222,7 @@ impl Bench {
         let log = self.folder.path().join("steps");
         let _ = fs::remove_file(&log);
         let path = self.cube();
-        assert!(start(&path, epochs, &[(LOG, log.display().to_string())]).success());
+        assert!(start(&path, self.kind, epochs, &[(LOG, log.display().to_string())]).success());
         fs::read_to_string(log).expect("a log").lines().map(str::to_owned).collect()
     }
 
@@ -179,7 +232,7 @@ impl Bench {
         let least = samples_before(BEFORE, 4);
         assert!((0..TILES).all(|tile| cube.samples(tile).expect(what) >= least), "{what}");
         assert!((0..TILES).all(|tile| cube.chunk(tile).expect(what).is_some()), "{what}");
-        assert!(start(path, AFTER, &[]).success(), "{what}");
+        assert!(start(path, self.kind, AFTER, &[]).success(), "{what}");
         assert!(arrays(path) == self.expected, "{what}");
         let found = cube.verify().expect(what);
         assert!(found.damage.is_empty(), "{what}: {:?}", found.damage);
@@ -208,7 +261,20 @@ fn a_writer_may_die_between_any_two_steps() {
     }
     for (n, name) in steps.iter().enumerate() {
         let path = bench.cube();
-        assert_eq!(start(&path, AFTER, &die_at(n)).signal(), Some(6), "step {n}");
+        assert_eq!(start(&path, bench.kind, AFTER, &die_at(n)).signal(), Some(6), "step {n}");
+        bench.goes_on(&path, &format!("died at step {n}, {name}"));
+    }
+}
+
+/// So may one of weights and what does not separate, at any of the steps that it has more of, and all others.
+#[test]
+fn a_writer_of_two_parts_may_die_between_steps() {
+    let bench = Bench::of(Kind::Weights);
+    let steps = bench.steps(AFTER);
+    assert!(steps.len() > Bench::new().steps(AFTER).len(), "more files");
+    for (n, name) in steps.iter().enumerate().step_by(5) {
+        let path = bench.cube();
+        assert_eq!(start(&path, bench.kind, AFTER, &die_at(n)).signal(), Some(6), "step {n}");
         bench.goes_on(&path, &format!("died at step {n}, {name}"));
     }
 }
@@ -219,8 +285,8 @@ fn dies_twice(every: usize) {
     for n in (0..bench.steps(AFTER).len()).step_by(every) {
         for again in (n % every..30).step_by(every) {
             let path = bench.cube();
-            assert_eq!(start(&path, AFTER, &die_at(n)).signal(), Some(6));
-            start(&path, AFTER, &die_at(again));
+            assert_eq!(start(&path, bench.kind, AFTER, &die_at(n)).signal(), Some(6));
+            start(&path, bench.kind, AFTER, &die_at(again));
             bench.goes_on(&path, &format!("died at step {n} and then at {again}"));
         }
     }
@@ -242,7 +308,7 @@ fn a_disk_may_be_full_at_any_step() {
     let bench = Bench::new();
     for n in 0..bench.steps(AFTER).len() {
         let path = bench.cube();
-        assert_eq!(start(&path, AFTER, &[(FULL, n.to_string())]).code(), Some(5), "step {n}");
+        assert_eq!(start(&path, bench.kind, AFTER, &[(FULL, n.to_string())]).code(), Some(5), "step {n}");
         bench.goes_on(&path, &format!("full at step {n}"));
     }
 }
@@ -258,7 +324,7 @@ fn power_may_be_cut_between_any_two_steps() {
     for n in 0..steps.len() {
         let done = &steps[..=n];
         let path = bench.cube();
-        assert_eq!(start(&path, epochs, &die_at(n)).signal(), Some(6));
+        assert_eq!(start(&path, bench.kind, epochs, &die_at(n)).signal(), Some(6));
         let cube = Cube::open(&path).expect("a cube");
         let last = |name: &str| done.iter().rposition(|step| step == name);
         if last("folder aside synced").is_none() {
@@ -333,7 +399,7 @@ fn damaged_files_are_found_and_made_anew() {
             assert!(!damaged.verify().expect(&what).damage.is_empty(), "{what}");
 
             let mut warnings = Vec::new();
-            work(&path, AFTER, &mut |warning| warnings.push(warning)).expect(&what);
+            work(&path, bench.kind, AFTER, &mut |warning| warnings.push(warning)).expect(&what);
             assert!(arrays(&path) == bench.expected, "{what}");
             assert_eq!(damaged.verify().expect(&what).damage, Vec::<String>::new(), "{what}");
             // What is derived from sound radiance is made anew without a word; samples that are lost are mourned.
@@ -363,8 +429,10 @@ fn damaged_files_are_found_and_made_anew() {
 fn who_has_lost_its_lock_stops() {
     let bench = Bench::new();
     let path = bench.cube();
-    let open =
-        || Writer::open(&path, &header(), Existing::Resume, 0..TILES, &mut |what| panic!("{what}")).expect("a cube");
+    let open = || {
+        Writer::open(&path, &header(bench.kind), Existing::Resume, 0..TILES, &mut |what| panic!("{what}"))
+            .expect("a cube")
+    };
     let first = open();
     // A lock file that was removed locks nobody out any more.
     fs::remove_file(path.join(".spectile/lock")).expect("removed");

@@ -8,6 +8,7 @@ use serde_json::json;
 
 use super::create::{Aside, Existing};
 use super::metadata::{DERIVED, FACTORED, Header};
+use super::remainder::{RemainderShare, Unions, left_out};
 use super::store::Cube;
 use super::writer::Writer;
 use crate::Result;
@@ -16,6 +17,18 @@ use crate::spectral::product::{Basis, Expander};
 
 /// Tiles between commits.
 const TOGETHER: u32 = 64;
+
+/// The cube that is wanted of a factored one.
+#[derive(Debug, Clone, Copy)]
+pub struct NewCube<'a> {
+    /// What its products are made of, and in which channels.
+    pub basis: &'a Basis,
+    pub channels: &'a Channels,
+    /// What of it is not as it was rendered.
+    pub changed: &'a [String],
+    /// Without what does not separate.
+    pub without_remainder: bool,
+}
 
 /// What there is to say of a relit cube.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,6 +39,8 @@ pub struct Relighted {
     /// Entries of all pixels, and pixels that have some.
     pub entries: u64,
     pub pixels: u64,
+    /// How much of the picture does not separate and is as it was rendered, of a cube that has such a thing and where it is not left out.
+    pub remainder: Option<RemainderShare>,
     /// Seconds that threads spent multiplying weights by spectra, in all: without reading, standard errors and writing.
     pub expand_s: f64,
 }
@@ -38,32 +53,45 @@ struct Tile {
     errors: Vec<f32>,
     /// Per channel Σ variance and Σ mean².
     sums: Vec<[f64; 2]>,
+    /// Per channel Σ of the remainder, and of all radiance.
+    remainder: [Vec<f64>; 2],
     entries: u64,
     expand_s: f64,
 }
 
-/// Makes at `path` the cube that `cube`, a factored one, is in `channels` where its products are made of `basis`; `changed` says what of
-/// it is not as it was rendered. Standard errors are stored where the cube keeps eight groups of epochs. A few tiles at a time are in
-/// memory. `progress` is called with the tiles done, of all; an error of it ends the work, and nothing is left or replaced.
+/// Makes at `path` the cube that `cube`, a factored one, is where its products are made of another basis and in other channels. What does
+/// not separate is added as it was rendered. Standard errors are stored where the cube keeps eight groups of epochs. A few tiles at a
+/// time are in memory. `progress` is called with the tiles done, of all; an error of it ends the work, and nothing is left or replaced.
+///
+/// # Errors
+/// Channels in which what does not separate is not known, where it is not left out; what reading and writing cubes may end with.
 pub fn relight(
     cube: &Cube,
-    basis: &Basis,
-    channels: &Channels,
-    changed: &[String],
+    new: NewCube,
     path: &Path,
     existing: Existing,
     progress: &mut dyn FnMut(u64, u64) -> Result<()>,
 ) -> Result<Relighted> {
+    let NewCube { basis, channels, changed, without_remainder } = new;
+    let has_remainder = cube.header().has_remainder();
+    let unions = (has_remainder && !without_remainder).then(|| Unions::of(cube, channels)).transpose()?;
     let expander = Expander::new(basis, channels, cube.header().most_factors());
     let mut attributes = cube.header().attributes.clone();
     attributes.remove(FACTORED);
-    attributes.insert(DERIVED.into(), json!({ "relit": changed }));
+    let mut derived = json!({ "relit": changed });
+    if has_remainder {
+        let words = if without_remainder { "left_out" } else { "not_relit" };
+        derived[words] = json!(cube.header().remainder());
+        derived["remainder_share"] = json!(left_out(cube, channels)?);
+    }
+    attributes.insert(DERIVED.into(), derived);
     let header = Header { channels: channels.clone(), attributes, ..cube.header().clone() };
     let count = cube.grid().count();
     let aside = Aside::new(path, &header, existing)?;
     let writer = Writer::open(aside.path(), &header, Existing::Refuse, 0..count, &mut |_| {});
     let writer = writer.map_err(|error| aside.error(error))?;
     let mut sums = vec![[0.0f64; 2]; channels.len()];
+    let mut share = RemainderShare::none(channels.len());
     let (mut entries, mut pixels, mut expand_s) = (0, 0, 0.0);
     let at_once = 2 * rayon::current_num_threads() as u32;
     let mut since_commit = 0;
@@ -73,7 +101,7 @@ pub fn relight(
             .clone()
             .into_par_iter()
             .map(|tile| {
-                let made = expand(cube, &expander, tile)?;
+                let made = expand(cube, &expander, unions.as_ref(), tile)?;
                 if let Some(made) = &made {
                     if let Some(layers) = cube.tile_layers(tile)? {
                         writer.lay(tile, layers);
@@ -91,6 +119,7 @@ pub fn relight(
                 sum[0] += of_tile[0];
                 sum[1] += of_tile[1];
             });
+            share.add(&made.remainder[0], &made.remainder[1]);
             entries += made.entries;
             expand_s += made.expand_s;
             pixels += cube.grid().rect(made.tile).pixels();
@@ -107,27 +136,68 @@ pub fn relight(
     aside.put()?;
     let estimate = |[variance, square]: &[f64; 2]| if *square > 0.0 { (variance / square).sqrt() } else { 0.0 };
     let error_estimate = sums.iter().map(|sums| if sums[0].is_nan() { f64::NAN } else { estimate(sums) }).collect();
-    Ok(Relighted { error_estimate, entries, pixels, expand_s })
+    let remainder = unions.map(|_| share);
+    Ok(Relighted { error_estimate, entries, pixels, remainder, expand_s })
 }
 
 /// A tile under other spectra; `None` before its first unit.
-fn expand(cube: &Cube, expander: &Expander, tile: u32) -> Result<Option<Tile>> {
+fn expand(cube: &Cube, expander: &Expander, unions: Option<&Unions>, tile: u32) -> Result<Option<Tile>> {
     let samples = cube.samples(tile)?;
     let (Some(weights), 1..) = (cube.state().weights(tile)?, samples) else { return Ok(None) };
     let (size, rect, channels) = (cube.header().tile, cube.grid().rect(tile), expander.channels());
     let rows = expander.rows(&weights.products);
     let began = Instant::now();
-    let values = weights.expanded(&rows, channels, size, rect);
+    let mut values = weights.expanded(&rows, channels, size, rect);
     let expand_s = began.elapsed().as_secs_f64();
-    let errors = weights.standard_errors(&rows, channels, size, rect, &cube.groups(samples));
+    let mut errors = weights.standard_errors(&rows, channels, size, rect, &cube.groups(samples));
     let mut sums = vec![[0.0f64; 2]; channels];
+    let mut remainder = [vec![0.0; channels], vec![0.0; channels]];
+    if let Some(unions) = unions {
+        add_remainder(cube, tile, unions, &mut values, &mut errors, &mut remainder[0])?;
+    }
     for (values, errors) in
         values.chunks(channels).zip(errors.chunks(channels)).filter(|(values, _)| !values[0].is_nan())
     {
-        for ((sums, value), error) in sums.iter_mut().zip(values).zip(errors) {
-            sums[0] += f64::from(*error) * f64::from(*error);
-            sums[1] += f64::from(*value) * f64::from(*value);
+        for (k, (value, error)) in values.iter().zip(errors).enumerate() {
+            sums[k][0] += f64::from(*error) * f64::from(*error);
+            sums[k][1] += f64::from(*value) * f64::from(*value);
+            remainder[1][k] += f64::from(*value);
         }
     }
-    Ok(Some(Tile { tile, samples, values, errors, sums, entries: weights.len() as u64, expand_s }))
+    // Without errors of its pixels there are those of the tile.
+    if let Some(unions) = unions.filter(|_| !cube.header().has_uncertainty()) {
+        let deviations: Vec<f64> = match cube.remainder_variance(tile)? {
+            Some(variance) => variance.into_iter().map(f64::sqrt).collect(),
+            None => vec![f64::NAN; cube.channels().len()],
+        };
+        unions.each(&mut sums, &deviations, |sums, deviation| sums[0] = (sums[0].sqrt() + deviation).powi(2));
+    }
+    Ok(Some(Tile { tile, samples, values, errors, sums, remainder, entries: weights.len() as u64, expand_s }))
+}
+
+/// Adds what does not separate to the pixels of a tile, and its standard errors, if there are some, to theirs: at most they add up. Sums
+/// it per channel.
+fn add_remainder(
+    cube: &Cube,
+    tile: u32,
+    unions: &Unions,
+    values: &mut [f32],
+    errors: &mut [f32],
+    sum: &mut [f64],
+) -> Result<()> {
+    let (channels, rendered) = (sum.len(), cube.channels().len());
+    let Some(remainder) = cube.state().remainder(tile)? else { return Ok(()) };
+    for (pixel, remainder) in values.chunks_mut(channels).zip(remainder.values().chunks(rendered)) {
+        if remainder[0].is_nan() {
+            continue;
+        }
+        unions.each(pixel, remainder, |value, more| *value += more as f32);
+        unions.each(sum, remainder, |sum, more| *sum += more);
+    }
+    if let Some(more) = cube.state().remainder_errors(tile)? {
+        for (errors, more) in errors.chunks_mut(channels).zip(more.values().chunks(rendered)) {
+            unions.each(errors, more, |error, more| *error += more as f32);
+        }
+    }
+    Ok(())
 }

@@ -93,7 +93,7 @@ impl<'a> CubeState<'a> {
         offset: u64,
         values: &mut [T],
     ) -> Result<()> {
-        if matches!(part, TileArray::Radiance | TileArray::StandardError) {
+        if part.has_channels() {
             let expected = 4 * (self.cube.grid().tile_pixels() * self.cube.channels().len()) as u64;
             // What cannot be asked fails when it is read.
             let bytes = file.metadata().map_or(expected, |found| found.len());
@@ -153,7 +153,23 @@ impl<'a> CubeState<'a> {
         let Some(weights) = self.weights(tile)? else { return Ok(None) };
         let (size, channels, rect) = (self.cube.header().tile, self.cube.channels().len(), self.cube.grid().rect(tile));
         let rows = self.cube.expander()?.rows(&weights.products);
-        Ok(Some(Chunk::of(weights.expanded(&rows, channels, size, rect), rect, size, channels)))
+        let mut values = weights.expanded(&rows, channels, size, rect);
+        if let Some(remainder) = self.remainder(tile)? {
+            add(&mut values, remainder.values());
+        }
+        Ok(Some(Chunk::of(values, rect, size, channels)))
+    }
+
+    /// What of a tile's radiance does not separate, in factored cubes that have it.
+    pub fn remainder(&self, tile: u32) -> Result<Option<Chunk>> {
+        if self.cube.header().has_remainder() { self.chunk(TileArray::Remainder, tile) } else { Ok(None) }
+    }
+
+    /// The standard errors of that, where there are some.
+    pub(super) fn remainder_errors(&self, tile: u32) -> Result<Option<Chunk>> {
+        let header = self.cube.header();
+        let has = header.has_remainder() && header.has_uncertainty();
+        if has { self.chunk(TileArray::RemainderError, tile) } else { Ok(None) }
     }
 
     /// The K channels of a pixel, in one contiguous read; `None` before the first unit of its tile. The pixel must lie in
@@ -168,7 +184,14 @@ impl<'a> CubeState<'a> {
         if self.cube.header().is_factored() {
             let Some(weights) = self.weights(tile)? else { return Ok(None) };
             let pixel = ((y - rect.y0) * grid.tile[0] + x - rect.x0) as usize;
-            return Ok(Some(weights.spectrum(pixel, self.cube.expander()?)));
+            let mut spectrum = weights.spectrum(pixel, self.cube.expander()?);
+            if self.cube.header().has_remainder() {
+                let mut remainder = vec![0.0f32; channels];
+                let pixel = self.cube.layout().pixel(grid.tile, x - rect.x0, y - rect.y0) as u64;
+                self.read(TileArray::Remainder, tile, pixel * channels as u64 * 4, &mut remainder)?;
+                add(&mut spectrum, &remainder);
+            }
+            return Ok(Some(spectrum));
         }
         let pixel = self.cube.layout().pixel(grid.tile, x - rect.x0, y - rect.y0) as u64;
         let mut spectrum = vec![0.0f32; channels];
@@ -407,7 +430,11 @@ impl<'a> CubeState<'a> {
         let Some(weights) = cube.state().weights(tile)? else { return Ok(None) };
         let (size, channels, rect) = (cube.header().tile, cube.channels().len(), cube.grid().rect(tile));
         let rows = cube.expander()?.rows(&weights.products);
-        let errors = weights.standard_errors(&rows, channels, size, rect, &cube.groups(cube.samples(tile)?));
+        let mut errors = weights.standard_errors(&rows, channels, size, rect, &cube.groups(cube.samples(tile)?));
+        // Both parts come from the same paths, so that their errors belong together: at most they add up.
+        if let Some(more) = cube.state().remainder_errors(tile)? {
+            add(&mut errors, more.values());
+        }
         Ok(Some(Chunk::of(errors, rect, size, channels)))
     }
 
@@ -416,6 +443,11 @@ impl<'a> CubeState<'a> {
         let errors = self.standard_errors(self.cube.grid().tile_at(x, y))?;
         Ok(errors.map(|chunk| chunk.spectrum(x, y).to_vec()))
     }
+}
+
+/// Adds to values others that lie as they do.
+pub(super) fn add(values: &mut [f32], others: &[f32]) {
+    values.iter_mut().zip(others).for_each(|(value, other)| *value += other);
 }
 
 /// Weighted sums over blocks of `factor` x `factor` pixels.

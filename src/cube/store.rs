@@ -42,6 +42,9 @@ pub(super) enum TileArray {
     /// Instead of the radiance, and of the standard error, in factored cubes.
     Weights,
     Products,
+    /// What does not separate, in factored cubes that have it, and where standard errors are wanted its own.
+    Remainder,
+    RemainderError,
     /// Only in cubes that have it.
     Layer(Layer),
 }
@@ -53,14 +56,16 @@ impl TileArray {
     const FACTORED: [TileArray; 5] =
         [TileArray::Weights, TileArray::Samples, TileArray::Preview, TileArray::Overview, TileArray::Products];
 
-    /// Files of a tile at most, and at most without layers.
-    pub const MOST: usize = TileArray::WITHOUT_LAYERS + Layer::ALL.len();
+    /// Files of a tile at most, at most without remainder, and at most without layers.
+    pub const MOST: usize = TileArray::WITHOUT_REMAINDER + 2;
+    pub const WITHOUT_REMAINDER: usize = TileArray::WITHOUT_LAYERS + Layer::ALL.len();
     pub const WITHOUT_LAYERS: usize = TileArray::ALL.len();
 
     /// Those of cubes of all kinds.
     pub fn all() -> impl Iterator<Item = TileArray> {
         let layers = Layer::ALL.map(TileArray::Layer);
-        TileArray::ALL.into_iter().chain([TileArray::Weights, TileArray::Products]).chain(layers)
+        let factored = [TileArray::Weights, TileArray::Products, TileArray::Remainder, TileArray::RemainderError];
+        TileArray::ALL.into_iter().chain(factored).chain(layers)
     }
 
     /// Its place among a tile's files.
@@ -72,7 +77,15 @@ impl TileArray {
             TileArray::Overview => 3,
             TileArray::StandardError | TileArray::Products => 4,
             TileArray::Layer(layer) => TileArray::WITHOUT_LAYERS + layer as usize,
+            TileArray::Remainder => TileArray::WITHOUT_REMAINDER,
+            TileArray::RemainderError => TileArray::WITHOUT_REMAINDER + 1,
         }
+    }
+
+    /// Whether it has all channels of every pixel.
+    pub fn has_channels(self) -> bool {
+        use TileArray::{Radiance, Remainder, RemainderError, StandardError};
+        matches!(self, Radiance | StandardError | Remainder | RemainderError)
     }
 
     /// Whether it can be made anew from the others.
@@ -89,6 +102,8 @@ impl TileArray {
             TileArray::StandardError => "standard_error",
             TileArray::Weights => "weights",
             TileArray::Products => "products",
+            TileArray::Remainder => "remainder",
+            TileArray::RemainderError => "remainder_standard_error",
             TileArray::Layer(layer) => layer.name(),
         }
     }
@@ -204,7 +219,14 @@ impl Cube {
             (false, true) => &TileArray::ALL,
             (false, false) => &TileArray::ALL[..4],
         };
-        let parts = parts.iter().copied().chain(layers.iter().copied().map(TileArray::Layer)).collect();
+        let remainder = [TileArray::Remainder, TileArray::RemainderError];
+        let of_remainder = match (header.has_remainder(), header.has_uncertainty()) {
+            (false, _) => &[][..],
+            (true, false) => &remainder[..1],
+            (true, true) => &remainder,
+        };
+        let of_layers = layers.iter().copied().map(TileArray::Layer);
+        let parts = parts.iter().chain(of_remainder).copied().chain(of_layers).collect();
         Cube { path: path.to_owned(), header, layout, origin, projection, parts, layers, expander: OnceLock::new() }
     }
 
@@ -546,14 +568,13 @@ impl Cube {
         let [column, row] = self.grid().position(tile);
         let name = part.name();
         self.path.join(match part {
-            TileArray::Radiance | TileArray::Overview | TileArray::StandardError => {
-                format!("{name}/c/0/{row}/{column}")
-            }
             TileArray::Samples => format!("{name}/c/{row}/{column}"),
             TileArray::Preview => format!("{name}/c/{row}/{column}/0"),
             TileArray::Weights | TileArray::Products => format!("{name}/c/{row}/{column}/0/0"),
             TileArray::Layer(layer) if layer.axes().len() == 1 => format!("{name}/c/{row}/{column}"),
             TileArray::Layer(_) => format!("{name}/c/{row}/{column}/0"),
+            // Channels of pixels, or of blocks of them.
+            _ => format!("{name}/c/0/{row}/{column}"),
         })
     }
 

@@ -2,27 +2,25 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
-use std::io::Write;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::checksums::{self, Summing};
+use super::checksums;
 use super::choices::Brightness;
 use super::create::{Existing, open_or_create, open_same};
-use super::epochs::epochs_in;
 use super::estimate::{Floor, Totals, UNSEEN};
 use super::faults::step;
 use super::journal::{Journal, Record};
-use super::layer::{Layer, TileLayers};
+use super::layer::TileLayers;
 use super::lock::TileLock;
-use super::map::Chunk;
-use super::merge::{UnitPass, check_portion, write_standard_errors};
-use super::metadata::{Header, Layout};
+use super::merge::check_portion;
+use super::metadata::Header;
 use super::state::Window;
 use super::store::{Cube, TileArray};
-use super::weights::{Merging, Weights};
+use super::tile_files::{Aside, Base, Committed, Held, Pending, Unit, remove_aside};
+use super::weights::Weights;
 use super::{recover, restore};
 use crate::spectral::tone::Picture;
 use crate::{Error, Result, files};
@@ -73,48 +71,6 @@ impl State {
     fn check(&self) -> Result<()> {
         self.failed.as_ref().map_or(Ok(()), |(path, what)| Err(Error::storage(path, what)))
     }
-}
-
-/// A tile merged and not committed yet: its files lie aside.
-struct Pending {
-    record: Record,
-    /// Suffix of the record before it in the journal.
-    previous: Option<u64>,
-    held: Held,
-}
-
-/// What a unit is, as a device brings it back.
-enum Unit<'a> {
-    /// [tile_h][tile_w][K].
-    Radiance(&'a [f32]),
-    /// Of a tile that has none: [tile_w][tile_h][K], and standard errors.
-    Columns {
-        values: &'a [f32],
-        errors: Option<&'a [f32]>,
-    },
-    Weights(Weights),
-}
-
-impl Unit<'_> {
-    fn is_for(&self, header: &Header) -> bool {
-        match self {
-            Unit::Radiance(unit) | Unit::Columns { values: unit, .. } => {
-                !header.is_factored() && unit.len() == header.grid().tile_pixels() * header.channels.len()
-            }
-            Unit::Weights(unit) => header.is_factored() && unit.pixels() == header.grid().tile_pixels(),
-        }
-    }
-}
-
-/// What is at hand of a tile that was merged.
-enum Held {
-    Radiance {
-        mean: Chunk,
-        /// In cubes that have them.
-        errors: Option<Chunk>,
-    },
-    /// Nothing: they are read again.
-    Weights,
 }
 
 impl Writer {
@@ -238,9 +194,16 @@ impl Writer {
         self.merge(tile, n_before, n_unit, Unit::Radiance(unit), check_portion)
     }
 
-    /// As [`Writer::merge_unit`], the weights of a tile of a factored cube.
-    pub fn merge_weights(&self, tile: u32, n_before: u32, n_unit: u32, unit: Weights) -> Result<()> {
-        self.merge(tile, n_before, n_unit, Unit::Weights(unit), check_portion)
+    /// As [`Writer::merge_unit`], the weights of a tile of a factored cube, and where that has one the mean of what does not separate.
+    pub fn merge_weights(
+        &self,
+        tile: u32,
+        n_before: u32,
+        n_unit: u32,
+        unit: Weights,
+        remainder: Option<&[f32]>,
+    ) -> Result<()> {
+        self.merge(tile, n_before, n_unit, Unit::Weights(unit, remainder), check_portion)
     }
 
     /// Stores what was made of another cube's tile, with as many samples per pixel as that has, into one that has none.
@@ -299,9 +262,11 @@ impl Writer {
                 let errors = cube.header().has_uncertainty().then(|| mapped(TileArray::StandardError)).transpose()?;
                 (record, Held::Radiance { mean, errors })
             }
-            Unit::Weights(unit) => (aside.write_weights(base.as_ref(), samples, n_unit, unit)?, Held::Weights),
+            Unit::Weights(unit, remainder) => {
+                (aside.write_weights(base.as_ref(), samples, n_unit, unit, remainder)?, Held::Weights)
+            }
         };
-        record.checksums[TileArray::WITHOUT_LAYERS..].copy_from_slice(&layers);
+        record.checksums[TileArray::WITHOUT_LAYERS..TileArray::WITHOUT_REMAINDER].copy_from_slice(&layers);
         let (epoch, pixels) = (cube.header().epoch, cube.grid().rect(tile).pixels());
         record.looks = self.floor.get().map_or(seen, |floor| floor.looks(seen, &record, epoch, pixels));
         self.insert(aside, base, record, held);
@@ -458,231 +423,6 @@ impl Drop for Writer {
         // Left only by a render that ended with an error.
         let left = std::mem::take(&mut self.lock().open);
         left.iter().for_each(|(&tile, pending)| remove_aside(&self.cube, tile, pending.record.suffix));
-    }
-}
-
-/// What a unit is merged into.
-enum Base {
-    Committed(Box<Committed>),
-    Pending(Arc<Pending>),
-}
-
-/// A tile as its last commit left it.
-struct Committed {
-    record: Record,
-    held: Held,
-}
-
-impl Base {
-    fn record(&self) -> &Record {
-        match self {
-            Base::Committed(committed) => &committed.record,
-            Base::Pending(pending) => &pending.record,
-        }
-    }
-
-    fn held(&self) -> &Held {
-        match self {
-            Base::Committed(committed) => &committed.held,
-            Base::Pending(pending) => &pending.held,
-        }
-    }
-
-    fn chunk(&self) -> Option<&Chunk> {
-        match self.held() {
-            Held::Radiance { mean, .. } => Some(mean),
-            Held::Weights => None,
-        }
-    }
-
-    fn errors(&self) -> Option<&Chunk> {
-        match self.held() {
-            Held::Radiance { errors, .. } => errors.as_ref(),
-            Held::Weights => None,
-        }
-    }
-
-    /// Where a file of the tile is, and what it holds.
-    fn bytes(&self, cube: &Cube, part: TileArray) -> Result<(PathBuf, Vec<u8>)> {
-        let record = self.record();
-        let path = match self {
-            Base::Committed(_) => cube.part_path(part, record.tile),
-            Base::Pending(pending) => cube.aside_path(part, record.tile, pending.record.suffix),
-        };
-        // A commit may just have put it into its place.
-        let bytes = fs::read(&path).or_else(|_| fs::read(cube.part_path(part, record.tile)));
-        let bytes = bytes.map_err(|error| Error::storage(&path, format!("cannot be read: {error}")))?;
-        if checksums::of(&bytes) != record.checksums[part.place()] {
-            let what = "is damaged: it is not what the journal says; --resume puts it in order";
-            return Err(Error::storage(&path, what));
-        }
-        Ok((path, bytes))
-    }
-
-    /// The weights of a tile of a factored cube.
-    fn weights(&self, cube: &Cube) -> Result<Weights> {
-        let read = |part: TileArray| self.bytes(cube, part);
-        let ((path, weights), (products_path, products)) = (read(TileArray::Weights)?, read(TileArray::Products)?);
-        let weights = Weights::decode(cube.header(), [(&path, &weights), (&products_path, &products)])?;
-        weights.ok_or_else(|| Error::storage(&path, "is damaged: it does not belong to the products beside it"))
-    }
-}
-
-/// New files of a tile, under one suffix; removed again unless kept.
-struct Aside<'a> {
-    cube: &'a Cube,
-    tile: u32,
-    suffix: u64,
-    kept: bool,
-}
-
-impl<'a> Aside<'a> {
-    fn new(cube: &'a Cube, tile: u32) -> Self {
-        Aside { cube, tile, suffix: files::random_number(), kept: false }
-    }
-
-    fn path(&self, part: TileArray) -> PathBuf {
-        self.cube.aside_path(part, self.tile, self.suffix)
-    }
-
-    fn keep(mut self) {
-        self.kept = true;
-    }
-
-    /// Writes the tile's new files and says what they are.
-    fn write(&self, base: Option<&Base>, samples: u32, n_unit: u32, unit: &Unit) -> Result<Record> {
-        let (cube, tile) = (self.cube, self.tile);
-        let (unit, layout, known_errors) = match *unit {
-            Unit::Radiance(unit) => (unit, Layout::Rows, None),
-            Unit::Columns { values, errors } => (values, Layout::Columns, errors),
-            Unit::Weights(_) => return Err(Error::Internal("weights are no radiance".into())),
-        };
-        let mut pass = UnitPass::new(cube.grid(), cube.grid().rect(tile), cube.channels().len(), cube.projection());
-        let weight = f64::from(n_unit) / f64::from(samples);
-        let radiance =
-            self.file(TileArray::Radiance, |file| pass.run(base.and_then(Base::chunk), unit, layout, weight, file))?;
-        if let Some(k) = pass.square.iter().position(|v| !v.is_finite()) {
-            let what = format!("a unit of tile {tile} holds a value in channel {k} that is not finite");
-            return Err(Error::Internal(what));
-        }
-        let (spread, square) = pass.sums(base.map(Base::record), cube.header().epoch);
-        let samples_sum = self.file(TileArray::Samples, |file| file.write_all(&samples.to_le_bytes()))?;
-        let preview = self.file(TileArray::Preview, |file| file.write_all(bytemuck::cast_slice(&pass.preview)))?;
-        let overview = self.file(TileArray::Overview, |file| file.write_all(bytemuck::cast_slice(&pass.overview)))?;
-        let errors = match cube.header().has_uncertainty() {
-            false => 0,
-            true => self.file(TileArray::StandardError, |file| {
-                if let Some(errors) = known_errors {
-                    return file.write_all(bytemuck::cast_slice(errors));
-                }
-                let (grid, epochs) = (cube.grid(), samples / cube.header().epoch);
-                let old = base.and_then(|base| Some((base.chunk()?, base.errors()?)));
-                write_standard_errors(grid, grid.rect(tile), cube.channels().len(), epochs, old, unit, file)
-            })?,
-        };
-        Ok(Record {
-            tile,
-            samples,
-            epoch: epochs_in(samples, cube.header().epoch).saturating_sub(1),
-            suffix: self.suffix,
-            looks: UNSEEN,
-            checksums: checksums_of([radiance, samples_sum, preview, overview, errors]),
-            spread,
-            square,
-        })
-    }
-
-    /// The same of weights. All that is derived from radiance is derived from that which readers make of them.
-    fn write_weights(&self, base: Option<&Base>, samples: u32, n_unit: u32, unit: Weights) -> Result<Record> {
-        let (cube, tile) = (self.cube, self.tile);
-        let (grid, channels, epoch) = (cube.grid(), cube.channels().len(), cube.header().epoch);
-        let (size, rect) = (grid.tile, grid.rect(tile));
-        let pass = || UnitPass::new(grid, rect, channels, cube.projection());
-        let in_memory = |error| Error::storage(cube.path(), error);
-        let old = base.map(|base| base.weights(cube)).transpose()?;
-        let Merging { old, unit, merged, rows } = cube.merging(tile, old, samples - n_unit, unit, n_unit)?;
-        let radiance = |weights: &Weights| weights.expanded(&rows, channels, size, rect);
-        // How far the unit is from the mean before it, where that is one of whole epochs.
-        let mut distances = pass();
-        if let Some(old) = old.as_ref().filter(|_| samples - n_unit >= epoch) {
-            let before = Chunk::of(radiance(old), rect, size, channels);
-            let run = distances.run(Some(&before), &radiance(&unit), Layout::Columns, 1.0, &mut std::io::sink());
-            run.map_err(in_memory)?;
-        }
-        let mut all = pass();
-        all.run(None, &radiance(&merged), Layout::Columns, 1.0, &mut std::io::sink()).map_err(in_memory)?;
-        if let Some(k) = all.square.iter().position(|v| !v.is_finite()) {
-            let what = format!("a unit of tile {tile} holds a value in channel {k} that is not finite");
-            return Err(Error::Internal(what));
-        }
-        let mut all = all.with_distance(distances);
-        let (spread, square) = all.sums(base.map(Base::record), epoch);
-        let [of_weights, of_products] = merged.compacted().encode(cube.header()).map_err(in_memory)?;
-        let weights_sum = self.file(TileArray::Weights, |file| file.write_all(&of_weights))?;
-        let samples_sum = self.file(TileArray::Samples, |file| file.write_all(&samples.to_le_bytes()))?;
-        let preview = self.file(TileArray::Preview, |file| file.write_all(bytemuck::cast_slice(&all.preview)))?;
-        let overview = self.file(TileArray::Overview, |file| file.write_all(bytemuck::cast_slice(&all.overview)))?;
-        let products_sum = self.file(TileArray::Products, |file| file.write_all(&of_products))?;
-        Ok(Record {
-            tile,
-            samples,
-            epoch: epochs_in(samples, epoch).saturating_sub(1),
-            suffix: self.suffix,
-            looks: UNSEEN,
-            checksums: checksums_of([weights_sum, samples_sum, preview, overview, products_sum]),
-            spread,
-            square,
-        })
-    }
-
-    /// Writes the layers, those of the tile before or those that it begins with, and gives their checksums in the order of
-    /// [`Layer::ALL`].
-    fn write_layers(&self, base: Option<&Base>, laid: Option<&TileLayers>) -> Result<[u128; Layer::ALL.len()]> {
-        let mut checksums = [0; Layer::ALL.len()];
-        for &layer in self.cube.layers() {
-            let part = TileArray::Layer(layer);
-            let kept = base.map(|base| base.bytes(self.cube, part)).transpose()?.map(|(_, bytes)| bytes);
-            let bytes = kept.as_deref().or_else(|| laid?.of(layer));
-            let bytes = bytes.ok_or_else(|| {
-                Error::Internal(format!("tile {} begins without its layer `{}`", self.tile, layer.name()))
-            })?;
-            checksums[layer as usize] = self.file(part, |file| file.write_all(bytes))?;
-        }
-        Ok(checksums)
-    }
-
-    fn file(&self, part: TileArray, write: impl FnOnce(&mut Summing<File>) -> std::io::Result<()>) -> Result<u128> {
-        let path = self.path(part);
-        let write = || {
-            let mut file = Summing::new(File::create_new(&path)?);
-            step("file aside made")?;
-            write(&mut file)?;
-            step("file aside written")?;
-            Ok(file.checksum())
-        };
-        write().map_err(|error: std::io::Error| {
-            Error::storage(&self.cube.part_path(part, self.tile), format!("cannot be written: {error}"))
-        })
-    }
-}
-
-impl Drop for Aside<'_> {
-    fn drop(&mut self) {
-        if !self.kept {
-            remove_aside(self.cube, self.tile, self.suffix);
-        }
-    }
-}
-
-/// Of a tile whose layers, if it has any, are still to come.
-fn checksums_of(files: [u128; TileArray::WITHOUT_LAYERS]) -> [u128; TileArray::MOST] {
-    std::array::from_fn(|i| files.get(i).copied().unwrap_or(0))
-}
-
-fn remove_aside(cube: &Cube, tile: u32, suffix: u64) {
-    for &part in cube.parts() {
-        // Nobody reads such a file; one that cannot be removed now is removed when the tile is resumed.
-        let _ = fs::remove_file(cube.aside_path(part, tile, suffix));
     }
 }
 

@@ -77,7 +77,7 @@ pub struct Kernels {
     /// Chooses the paths that are evaluated, where it is not all of them.
     pub thin: Option<Source>,
     /// Leaves the means of a wave's pixels: it evaluates all saved paths, or folds what `update` made of them. None where records are
-    /// all that is wanted.
+    /// all that is wanted (factored renders of what separates).
     pub evaluate: Option<Source>,
     /// What rays of the host's choice meet, where there are layers: before a tile's first wave.
     pub first_hits: Option<Source>,
@@ -120,7 +120,7 @@ impl OnDevice<'_> {
                 Evaluator::DpeptPath => Some(evaluating(PATH)),
                 Evaluator::DpeptSpectral => Some(evaluating(SPECTRAL)),
                 Evaluator::Pt => Some(compose(&self.modules(FOLD_PATHS), &evaluate)),
-                Evaluator::Factored => None,
+                Evaluator::Factored => self.has_remainder().then(|| evaluating(PIXEL)),
             },
             first_hits: self.first_hits.then(|| self.around_tracing(FIRST_HITS)),
         }

@@ -5,8 +5,8 @@ use std::ops::Deref;
 
 use crate::device::example::Exhibit;
 use crate::device::parts::{
-    attributes, camera, geometry, heat, instances, layers, lights, media, opacity, paths, roughness, scattering, sky,
-    spectra, surfaces, textures,
+    attributes, camera, geometry, heat, instances, layers, lights, media, opacity, paths, remainder, roughness,
+    scattering, sky, spectra, surfaces, textures,
 };
 use crate::device::prepared::Prepared;
 use crate::device::text::{Defines, Module};
@@ -95,6 +95,7 @@ pub const PARTS: &[&Part] = &[
     &surfaces::DISPERSION,
     &surfaces::KNOTS_OF_ONE_CHANNEL,
     &paths::ROULETTE_ON_EVALUATION,
+    &remainder::REMAINDER,
     &geometry::WINDOWS,
     &spectra::BOUNCE_BY_BOUNCE,
     &spectra::LAYOUT,

@@ -119,7 +119,7 @@ pub struct Prepared {
     pub first_hits: bool,
     /// What records say of products of spectra, where those are kept instead of channels.
     pub separable: Option<Separable>,
-    /// What keeps the scene from being rendered so, in words.
+    /// What of the scene does not separate into those, in words.
     pub obstacles: Vec<String>,
 }
 
@@ -132,7 +132,9 @@ impl Prepared {
 
     /// As [`Prepared::new`], for the evaluator chosen.
     pub fn for_evaluator(scene: &Scene, seed: u64, evaluator: Evaluator) -> Result<Prepared> {
-        match Integration::of(&scene.channels).filter(|_| evaluator != Evaluator::Factored) {
+        // Weights have no channels.
+        let has_channels = || evaluator != Evaluator::Factored || separable::has_remainder(scene);
+        match Integration::of(&scene.channels).filter(|_| has_channels()) {
             None => Prepared::flatten(scene, seed, evaluator, None),
             Some(integration) => {
                 let inner = Scene { channels: integration.inner.clone(), ..scene.clone() };
@@ -165,9 +167,11 @@ impl Prepared {
         let environment = flux.as_ref().or(sky.as_ref().map(|sky| &sky.flux));
         let emitted = || Emitted::of(scene, &accel, &picks.lamps, environment).shares(scene, &accel);
         let needed = surfaces.as_ref().map_or(&[][..], |s| &s.spectra);
-        let (tables, ids, warp) = spectral_tables(scene, &heat, needed, in_registers, weights, emitted)?;
-        let separable = scene.is_factored().then(|| Separated::new(scene, &heat)).transpose()?;
-        let separable = separable.map(|separated| separated.by_id(&ids, needed, &tables));
+        // A factored scene may be evaluated otherwise too, in order to know how bright it is.
+        let separated = (evaluator == Evaluator::Factored).then(|| Separated::new(scene, &heat)).transpose()?;
+        let values = separated.as_ref().is_none_or(|separated| !separated.remainder.is_empty());
+        let (tables, ids, warp) = spectral_tables(scene, &heat, needed, in_registers, values, weights, emitted)?;
+        let separable = separated.map(|separated| separated.by_id(&ids, needed, &tables));
         let factor = |s: usize| tables.ids[ids.factors[&s]];
         let source = |s: usize| tables.ids[ids.sources[&s]];
         let id = |position: usize| tables.ids[ids.needed[position]];
@@ -260,6 +264,11 @@ impl Prepared {
             return Err(Error::input(&scene.file, message));
         }
         Ok(())
+    }
+
+    /// Whether what does not separate is evaluated in channels, beside weights.
+    pub fn has_remainder(&self) -> bool {
+        self.separable.as_ref().is_some_and(|separable| separable.has_remainder)
     }
 
     /// On a device that binds each array as a whole.

@@ -1,10 +1,18 @@
-//! Scenes whose light transport separates: what a path brings is a weight, which knows no wavelength, times a product of spectra of the
+//! Light transport that separates: what a path brings is a weight, which knows no wavelength, times a product of spectra of the
 //! scene ([`crate::spectral::product`]). The records that paths leave say by ids which; here is what ids mean.
+//!
+//! What a path brings by something that does not separate (facets, boundaries, matter, maps) is the *remainder*: it is evaluated in
+//! channels as in any other render. Which of both a contribution is [`Mixed`] says by the records before it, one after the other, on the
+//! host as on the device (`shaders/parts/remainder/separates.wgsl`), so that nothing is left out and nothing counts twice.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use smallvec::SmallVec;
 
+use crate::device::instructions::{
+    MODE_ADD, MODE_ADVANCE, MODE_GATHER, MODE_KEEP, MODE_ON_F, MODE_START, OP_AMOUNTS, OP_HOLD, OP_MARCH, OP_MEDIUM,
+    OP_ONE, OP_PLAIN, OP_RESTORE, OP_SAVE, OP_SPECTRUM,
+};
 use crate::device::parts::heat::{self, Heat, HotLeaf};
 use crate::device::parts::surfaces::Needed;
 use crate::device::spectra::SpectrumIds;
@@ -18,9 +26,11 @@ pub const MOST_FACTORS: u32 = 64;
 /// Factors and sources have 16 bits.
 const MOST_EXPRESSIONS: usize = u16::MAX as usize;
 
-/// The basis of a scene, and what its spectra are in it.
+/// The basis of a scene, what its spectra are in it, and what of the scene is in no product.
 pub struct Separated {
     pub basis: Basis,
+    /// What does not separate, in words.
+    pub remainder: Vec<String>,
     factors: BTreeMap<SpectrumId, u16>,
     /// Those of an emission are added.
     sources: BTreeMap<SpectrumId, Sources>,
@@ -28,22 +38,153 @@ pub struct Separated {
 
 type Sources = SmallVec<[u16; 2]>;
 
+/// What a spectrum id stands for where it multiplies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Factor {
+    /// The constant 1.
+    One,
+    Of(u16),
+    /// Something that is no factor of products.
+    Mixed,
+}
+
 /// What the spectrum ids of records are in products.
 #[derive(Debug)]
 pub struct Separable {
-    /// By id; ids that multiply nothing have none.
-    pub factors: Vec<Option<u16>>,
-    /// By id: those that are added.
-    pub sources: Vec<Sources>,
+    pub factors: Vec<Factor>,
+    /// Those that are added; `None` where what shines is no source of products.
+    pub sources: Vec<Option<Sources>>,
+    /// The same for devices: [`SEPARATES_AS_FACTOR`] and [`SEPARATES_AS_SOURCE`] of each id.
+    pub bits: Vec<u32>,
+    /// Whether there is something that does not separate.
+    pub has_remainder: bool,
+}
+
+impl Factor {
+    /// Its place among the factors, of one that is in products.
+    pub fn of_product(self) -> Option<u16> {
+        match self {
+            Factor::Of(factor) => Some(factor),
+            Factor::One | Factor::Mixed => None,
+        }
+    }
+}
+
+impl Separable {
+    /// Of spectrum a of an instruction that has one.
+    pub fn factor(&self, spectra: u32) -> Factor {
+        self.factors[(spectra & 0xffff) as usize]
+    }
+
+    /// What the first word of an instruction that gathers names; `None` where that is no source of products.
+    pub fn sources_of(&self, word: u32) -> Option<&[u16]> {
+        self.sources.get((word >> 16) as usize)?.as_deref()
+    }
+}
+
+/// Whether a spectrum id is in products where it multiplies, and where it shines.
+pub const SEPARATES_AS_FACTOR: u32 = 1;
+pub const SEPARATES_AS_SOURCE: u32 = 2;
+
+/// Which registers of a path ([`crate::device::instructions`]) hold something that does not separate: T, P, F and the T put aside.
+#[derive(Debug, Clone, Copy)]
+pub struct Mixed {
+    pub throughput: bool,
+    product: bool,
+    factor: bool,
+    /// Also before anything was put aside, which is taken back only then.
+    saved: bool,
+}
+
+impl Mixed {
+    /// Where a path begins.
+    pub const NOTHING: Mixed = Mixed { throughput: false, product: false, factor: false, saved: true };
+
+    /// Whether all that the path brings from now on is of the remainder.
+    pub fn is_settled(self) -> bool {
+        self.throughput && self.saved
+    }
+
+    /// Goes on by an instruction, and says whether what it adds to R, if anything, is of the remainder.
+    pub fn step(&mut self, scene: &Separable, word: u32, spectra: u32) -> bool {
+        let operation = word & 0x3f;
+        match operation {
+            OP_MEDIUM | OP_MARCH => {
+                self.throughput = true;
+                return true;
+            }
+            OP_AMOUNTS => {
+                match word & MODE_ON_F {
+                    0 => self.throughput = true,
+                    _ => self.factor = word & MODE_GATHER == 0,
+                }
+                return true;
+            }
+            OP_SAVE => {
+                self.saved = self.throughput;
+                return false;
+            }
+            OP_RESTORE => {
+                self.throughput = self.saved;
+                return false;
+            }
+            OP_HOLD => {
+                self.factor = false;
+                return false;
+            }
+            _ if word & MODE_KEEP != 0 => return false,
+            _ => {}
+        }
+        let value = match operation {
+            OP_ONE => false,
+            OP_PLAIN | OP_SPECTRUM => scene.factor(spectra) == Factor::Mixed,
+            _ => true,
+        };
+        let source = scene.sources_of(word).is_none();
+        if operation == OP_PLAIN {
+            self.throughput |= value;
+            return self.throughput || source;
+        }
+        self.product &= word & MODE_START == 0;
+        if word & MODE_ON_F != 0 {
+            self.factor |= value;
+        } else {
+            self.product |= value;
+        }
+        self.factor |= word & MODE_ADD != 0 && self.product;
+        let is_remainder = self.throughput || self.factor || source;
+        if word & MODE_GATHER != 0 {
+            self.factor = false;
+        }
+        if word & MODE_ADVANCE != 0 {
+            self.throughput |= self.factor;
+            self.factor = false;
+        }
+        is_remainder
+    }
 }
 
 /// The basis of `scene`.
 ///
 /// # Errors
-/// What of the scene does not separate, by name.
+/// What cannot be rendered so at all, by name.
 pub fn basis(scene: &Scene) -> Result<Basis> {
+    of(scene).map(|separated| separated.basis)
+}
+
+/// The basis of `scene`, and what is in no product of it.
+///
+/// # Errors
+/// As [`basis`].
+pub fn of(scene: &Scene) -> Result<Separated> {
     let heat = heat::as_emission(scene);
-    Separated::new(&heat.scene, &heat).map(|separated| separated.basis)
+    Separated::new(&heat.scene, &heat)
+}
+
+/// Whether something of `scene` does not separate.
+pub fn has_remainder(scene: &Scene) -> bool {
+    let heat = heat::as_emission(scene);
+    !obstacles(&heat.scene, &heat).is_empty()
 }
 
 impl Separated {
@@ -52,7 +193,7 @@ impl Separated {
     /// # Errors
     /// As [`basis`].
     pub fn new(scene: &Scene, heat: &Heat) -> Result<Separated> {
-        check(scene, heat)?;
+        check(scene)?;
         let shares = scene.materials.iter().flat_map(|material| match material.bsdf {
             Bsdf::Diffuse { reflectance } => vec![reflectance],
             Bsdf::Translucent { reflectance, transmittance } => vec![reflectance, transmittance],
@@ -67,13 +208,15 @@ impl Separated {
             _ => &[],
         });
         let reflecting: BTreeSet<SpectrumId> = plain.chain(endmembers.copied()).collect();
-        let surfaces = scene.objects.iter().filter_map(|object| object.emission.as_ref().map(|e| e.radiance));
+        let lamps = scene.objects.iter().zip(&heat.kinds).filter(|(_, kind)| matches!(kind, heat::Kind::Lamp));
+        let surfaces = lamps.filter_map(|(object, _)| object.emission.as_ref().map(|e| e.radiance));
         let environment = scene.environment.as_ref().and_then(|environment| environment.uniform());
         let lights = scene.lights.iter().map(|light| light.spectrum());
         let emitting: BTreeSet<SpectrumId> = surfaces.chain(environment).chain(lights).collect();
 
         let mut maker = Maker { scene, basis: Basis::default() };
-        let mut separated = Separated { basis: Basis::default(), factors: BTreeMap::new(), sources: BTreeMap::new() };
+        let (factors, sources) = (BTreeMap::new(), BTreeMap::new());
+        let mut separated = Separated { basis: Basis::default(), remainder: obstacles(scene, heat), factors, sources };
         for spectrum in reflecting {
             let factor = maker.expression(spectrum);
             separated.factors.insert(spectrum, push(&mut maker.basis.factors, factor));
@@ -81,6 +224,9 @@ impl Separated {
         for spectrum in emitting {
             let made = heat.made.iter().find(|made| made.spectrum == spectrum);
             let (lamp, parts) = made.map_or((Some(spectrum), &[][..]), |made| (made.lamp, &made.parts[..]));
+            if !parts.iter().all(|part| heat_separates(scene, part)) {
+                continue;
+            }
             let lamp = lamp.map(|lamp| maker.expression(lamp));
             let parts: Vec<Expression> = parts.iter().map(|part| maker.heat(part)).collect();
             let sources = lamp.into_iter().chain(parts).map(|source| push(&mut maker.basis.sources, source));
@@ -97,19 +243,26 @@ impl Separated {
 
     /// By the ids that `tables` gave to spectra. `needed`: those that materials of general scenes asked for.
     pub fn by_id(&self, ids: &SpectrumIds, needed: &[Needed], tables: &SpectralTables) -> Separable {
-        let (mut factors, mut sources) = (vec![None; tables.ids.len()], vec![SmallVec::new(); tables.ids.len()]);
+        let (mut factors, mut sources) = (vec![Factor::Mixed; tables.ids.len()], vec![None; tables.ids.len()]);
+        factors[0] = Factor::One;
         let of_materials = ids.factors.iter().map(|(&spectrum, &position)| (spectrum, position));
         let of_surfaces = needed.iter().zip(&ids.needed).filter_map(|(needed, &position)| match needed {
             Needed::Scene(spectrum) => Some((*spectrum, position)),
             _ => None,
         });
         for (spectrum, position) in of_materials.chain(of_surfaces) {
-            factors[tables.ids[position] as usize] = self.factors.get(&spectrum).copied();
+            if let Some(&factor) = self.factors.get(&spectrum) {
+                factors[tables.ids[position] as usize] = Factor::Of(factor);
+            }
         }
         for (spectrum, &position) in &ids.sources {
-            sources[tables.ids[position] as usize] = self.sources.get(spectrum).cloned().unwrap_or_default();
+            sources[tables.ids[position] as usize] = self.sources.get(spectrum).cloned();
         }
-        Separable { factors, sources }
+        let bits = factors.iter().zip(&sources).map(|(factor, source)| {
+            let as_factor = if *factor == Factor::Mixed { 0 } else { SEPARATES_AS_FACTOR };
+            as_factor | if source.is_some() { SEPARATES_AS_SOURCE } else { 0 }
+        });
+        Separable { bits: bits.collect(), factors, sources, has_remainder: !self.remainder.is_empty() }
     }
 }
 
@@ -179,20 +332,27 @@ impl Maker<'_> {
     }
 }
 
-/// Refuses what does not separate.
-fn check(scene: &Scene, heat: &Heat) -> Result<()> {
-    let found = obstacles(scene, heat);
-    if found.is_empty() {
+/// Refuses what cannot be rendered so at all.
+fn check(scene: &Scene) -> Result<()> {
+    let bounces = scene.integrator.max_bounces;
+    if bounces <= MOST_FACTORS {
         return Ok(());
     }
     let message = format!(
-        "--factored: light transport does not separate into weights and spectra in this scene: {}; render without it",
-        found.join(", ")
+        "--factored: paths of {bounces} bounces (integrator.max_bounces) may be of more factors than the {MOST_FACTORS} that a factored \
+         cube has room for; lower it, or render without --factored"
     );
     Err(Error::input(&scene.file, message))
 }
 
-/// What of `scene`, whose heat is emission already, keeps its light transport from separating, in words: nothing where it does.
+/// Whether what a hot part emits is a product.
+fn heat_separates(scene: &Scene, part: &HotLeaf) -> bool {
+    let is_even = matches!(part.temperature, Temperature::Constant(_));
+    let bsdf = &scene.materials[part.material].bsdf;
+    is_even && matches!(bsdf, Bsdf::Black | Bsdf::Diffuse { reflectance: Reflectance::Spectrum(_) })
+}
+
+/// What of `scene`, whose heat is emission already, does not separate, in words: nothing where all does.
 pub fn obstacles(scene: &Scene, heat: &Heat) -> Vec<String> {
     let mut found: Vec<String> = Vec::new();
     for material in &scene.materials {
@@ -222,15 +382,9 @@ pub fn obstacles(scene: &Scene, heat: &Heat) -> Vec<String> {
         found.push("heat and emission that differ by place".into());
     }
     for made in &heat.made {
-        let mixed =
-            |part: &&HotLeaf| !matches!(scene.materials[part.material].bsdf, Bsdf::Black | Bsdf::Diffuse { .. });
-        if let Some(part) = made.parts.iter().find(mixed) {
+        if let Some(part) = made.parts.iter().find(|part| !heat_separates(scene, part)) {
             found.push(format!("heat of the material \"{}\"", scene.materials[part.material].name));
         }
-    }
-    let bounces = scene.integrator.max_bounces;
-    if bounces > MOST_FACTORS {
-        found.push(format!("paths of {bounces} bounces (integrator.max_bounces; at most {MOST_FACTORS})"));
     }
     found.dedup();
     found

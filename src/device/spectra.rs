@@ -44,12 +44,14 @@ pub fn daylight(environment: &Environment) -> Option<usize> {
 
 /// Tables of the constant 1, of what multiplies throughput, then of what emits; the weights of responses and wavelengths last.
 /// With them, where in the channels wavelengths are drawn, by what is `emitted`. `in_registers`: evaluation holds the spectra of a
-/// plain scene in registers where they are few, and then kinks take the place of strata.
+/// plain scene in registers where they are few, and then kinks take the place of strata. Without `values` nobody evaluates: ids are all
+/// that is needed, of tables that hold nothing.
 pub fn spectral_tables<'a>(
     scene: &Scene,
     heat: &heat::Heat,
     needed: &[Needed],
     in_registers: bool,
+    values: bool,
     responses: Option<&[Curve]>,
     emitted: impl FnOnce() -> Vec<Share<'a>>,
 ) -> Result<(SpectralTables, SpectrumIds, Warp)> {
@@ -107,8 +109,7 @@ pub fn spectral_tables<'a>(
         let wanted: Vec<Wanted> = wanted.iter().copied().chain(is_weighted.then_some(weights)).collect();
         SpectralTables::warped(&wanted, &scene.channels, warp)
     };
-    if scene.is_factored() {
-        // Ids are all that is needed.
+    if !values {
         let channels = Channels::equal(400.0, 500.0, 1);
         let none = Wanted::from(Tabulated::Same(&Curve::Constant(1.0)));
         let tables = SpectralTables::warped(&vec![none; wanted.len()], &channels, &Warp::uniform(&channels));

@@ -12,10 +12,11 @@ use smallvec::{SmallVec, smallvec};
 
 use crate::cube::{Weights, random_of, systematic};
 use crate::device::instructions::{
-    MODE_ADD, MODE_ADVANCE, MODE_GATHER, MODE_ON_F, MODE_START, OP_ONE, OP_PLAIN, OP_SPECTRUM,
+    FIRST_RAW_OP, MODE_ADD, MODE_ADVANCE, MODE_GATHER, MODE_KEEP, MODE_ON_F, MODE_START, OP_AMOUNTS, OP_HOLD, OP_MARCH,
+    OP_MEDIUM, OP_PLAIN, OP_RESTORE, OP_SAVE, OP_SPECTRUM,
 };
 use crate::device::prepared::Prepared;
-use crate::device::separable::Separable;
+use crate::device::separable::{Mixed, Separable};
 use crate::device::words::{Counters, Wave};
 use crate::render::worker::UnitRect;
 use crate::spectral::product::Product;
@@ -51,6 +52,7 @@ struct Walker {
     touched: Vec<u32>,
     // Of general scenes: T, P and F (`device::instructions`) as sums of weights times factors.
     throughput: Vec<(f64, u32)>,
+    saved: Vec<(f64, u32)>,
     product: (f64, Factors),
     factor: Vec<(f64, Factors)>,
     tally: Tally,
@@ -97,8 +99,9 @@ pub struct Saved<'a> {
 
 impl Met {
     fn new(scene: &Separable) -> Met {
-        let past = |most: Option<&u16>| most.map_or(0, |most| usize::from(*most) + 1);
-        Met::of(past(scene.factors.iter().flatten().max()), past(scene.sources.iter().flatten().max()))
+        let past = |most: Option<u16>| most.map_or(0, |most| usize::from(most) + 1);
+        let factors = scene.factors.iter().filter_map(|factor| factor.of_product());
+        Met::of(past(factors.max()), past(scene.sources.iter().flatten().flatten().copied().max()))
     }
 
     fn empty(&self) -> Met {
@@ -183,76 +186,120 @@ impl Walker {
         let mut state = 0;
         for record in records.chunks_exact(2) {
             let (factor, source) = ((record[0] & 0xffff) as usize, (record[0] >> 16) as usize);
-            if let Some(factor) = scene.factors[factor] {
+            if let Some(factor) = scene.factors[factor].of_product() {
                 state = self.met.behind(state, factor);
             }
             let weight = f32::from_bits(record[1]);
             if !weight.is_finite() {
                 return false;
             }
-            if weight != 0.0 {
-                self.add(f64::from(weight), state, &scene.sources[source]);
+            if let Some(sources) = scene.sources[source].as_ref().filter(|_| weight != 0.0) {
+                self.add(f64::from(weight), state, sources);
             }
         }
         true
     }
 
-    /// A path of a general scene: a small program on sums of products.
+    /// A path of a general scene: a small program on sums of products. What it brings by registers that hold something else is evaluated
+    /// on the device.
     fn general(&mut self, scene: &Separable, records: &[u32], random: u64) -> bool {
         self.throughput.clear();
         self.throughput.push((1.0, 0));
         self.factor.clear();
-        for (place, record) in records.chunks_exact(4).enumerate() {
-            let (word, weight) = (record[0], f32::from_bits(record[2]));
-            if !weight.is_finite() {
-                return false;
+        let mut mixed = Mixed::NOTHING;
+        let mut places = (0..records.len() / 4).fuse();
+        while let Some(place) = places.next() {
+            let record = &records[4 * place..][..4];
+            let (word, spectra) = (record[0], record[1]);
+            let operation = word & 0x3f;
+            // Records of numbers.
+            let numbers = if operation == OP_MARCH { 2 } else { usize::from(operation >= FIRST_RAW_OP) };
+            (0..numbers).for_each(|_| _ = places.next());
+            let is_remainder = mixed.step(scene, word, spectra);
+            if mixed.is_settled() {
+                break;
             }
-            let (operation, weight) = (word & 0x3f, f64::from(weight));
-            let value = match operation {
-                OP_ONE => None,
-                OP_PLAIN | OP_SPECTRUM => scene.factors[(record[1] & 0xffff) as usize],
-                _ => unreachable!("scenes with other instructions are refused: operation {operation}"),
-            };
-            let sources = (word >> 16) as usize;
-            if operation == OP_PLAIN {
-                if let Some(factor) = value {
-                    for (_, state) in &mut self.throughput {
-                        *state = self.met.behind(*state, factor);
-                    }
-                }
-                if weight != 0.0 {
-                    for i in 0..self.throughput.len() {
-                        let (through, state) = self.throughput[i];
-                        self.add(weight * through, state, &scene.sources[sources]);
-                    }
+            match operation {
+                OP_SAVE => self.saved.clone_from(&self.throughput),
+                OP_RESTORE => self.throughput.clone_from(&self.saved),
+                _ => {}
+            }
+            let is_none = matches!(operation, OP_MEDIUM | OP_MARCH | OP_AMOUNTS | OP_SAVE | OP_RESTORE | OP_HOLD);
+            if is_none || word & MODE_KEEP != 0 {
+                if operation == OP_HOLD || (operation == OP_AMOUNTS && word & MODE_GATHER != 0) {
+                    self.factor.clear();
                 }
                 continue;
             }
-            if word & MODE_ON_F != 0 {
-                for (share, factors) in &mut self.factor {
-                    *share *= weight;
-                    factors.extend(value);
-                }
-            } else {
-                if word & MODE_START != 0 {
-                    self.product = (1.0, Factors::new());
-                }
-                self.product.0 *= weight;
-                self.product.1.extend(value);
+            let weight = f32::from_bits(record[2]);
+            if !weight.is_finite() && !mixed.throughput {
+                return false;
             }
-            if word & MODE_ADD != 0 {
-                self.factor.push(self.product.clone());
+            let weight = f64::from(weight);
+            // None: 1, or what is in no product.
+            let value = match operation {
+                OP_PLAIN | OP_SPECTRUM => scene.factor(spectra).of_product(),
+                _ => None,
+            };
+            let sources = scene.sources_of(word).filter(|_| !is_remainder).unwrap_or_default();
+            if operation == OP_PLAIN {
+                self.plain_vertex(value, weight, sources, mixed);
+                continue;
             }
+            self.instruction(word, value, weight);
             if word & MODE_GATHER != 0 {
-                self.multiply_out(|walker, weight, state| walker.add(weight, state, &scene.sources[sources]));
+                match is_remainder {
+                    true => self.factor.clear(),
+                    false => self.multiply_out(|walker, weight, state| walker.add(weight, state, sources)),
+                }
             }
             if word & MODE_ADVANCE != 0 {
                 let mut through = Vec::with_capacity(self.throughput.len());
-                self.multiply_out(|_, weight, state| through.push((weight, state)));
+                match mixed.throughput {
+                    true => self.factor.clear(),
+                    false => self.multiply_out(|_, weight, state| through.push((weight, state))),
+                }
                 self.throughput = choose(through, random ^ place as u64);
             }
         }
         true
+    }
+
+    /// A diffuse vertex in one record.
+    fn plain_vertex(&mut self, value: Option<u16>, weight: f64, sources: &[u16], mixed: Mixed) {
+        if mixed.throughput {
+            return;
+        }
+        if let Some(factor) = value {
+            for (_, state) in &mut self.throughput {
+                *state = self.met.behind(*state, factor);
+            }
+        }
+        if weight != 0.0 {
+            for i in 0..self.throughput.len() {
+                let (through, state) = self.throughput[i];
+                self.add(weight * through, state, sources);
+            }
+        }
+    }
+
+    /// What an instruction makes of P and F, but for what it does with them then.
+    fn instruction(&mut self, word: u32, value: Option<u16>, weight: f64) {
+        if word & MODE_ON_F != 0 {
+            for (share, factors) in &mut self.factor {
+                *share *= weight;
+                factors.extend(value);
+            }
+        } else {
+            if word & MODE_START != 0 {
+                self.product = (1.0, Factors::new());
+            }
+            self.product.0 *= weight;
+            self.product.1.extend(value);
+        }
+        if word & MODE_ADD != 0 {
+            self.factor.push(self.product.clone());
+        }
     }
 
     /// Calls `each` with every term of T F, and leaves F = 0.
@@ -333,6 +380,7 @@ impl Gather {
             weights: Vec::new(),
             touched: Vec::new(),
             throughput: Vec::new(),
+            saved: Vec::new(),
             product: (0.0, smallvec![]),
             factor: Vec::new(),
             tally: Tally::default(),
@@ -384,7 +432,7 @@ impl Gather {
         *last_wave = saved.wave.sequence;
     }
 
-    /// What came of the units of a group, and what evaluation would have counted.
+    /// What came of the units of a group, and what evaluation would have counted: beside it, where there is a remainder.
     pub fn finish(&mut self, group: usize, counters: &mut Counters) -> Vec<Weights> {
         let Group { units, samples, pixels, tally, last_wave } = std::mem::take(&mut self.groups[group]);
         counters.folded = tally.ended;

@@ -65,11 +65,11 @@ pub fn header(scene: &Scene, tile: [u32; 2], seed: u64, uncertainty: bool, layer
     };
     let header = if uncertainty { header.with_uncertainty() } else { header };
     let header = header.with_layers(&layers::names(scene, layers)?);
-    Ok(match scene.is_factored() {
-        // What does not separate is refused by `check`.
-        true => header.with_weights(&separable::basis(scene).unwrap_or_default(), scene.integrator.max_bounces),
-        false => header,
-    })
+    if !scene.is_factored() {
+        return Ok(header);
+    }
+    let separated = separable::of(scene)?;
+    Ok(header.with_weights(&separated.basis, scene.integrator.max_bounces, &separated.remainder))
 }
 
 /// The evaluator for `scene` on a software device or a GPU; or the one with which the cube was begun that `there` describes, since

@@ -76,7 +76,7 @@ struct Taken {
     collected: u32,
     /// The means of each tile over these, where several epochs are merged at once.
     means: Vec<Vec<f32>>,
-    /// Or their weights, of a factored render.
+    /// Their weights, of a factored render, whose means are those of what does not separate.
     weights: Vec<Weights>,
     tally: Tally,
     bad: Option<[u32; 4]>,
@@ -318,21 +318,16 @@ impl Pool {
         let began = Instant::now();
         oldest.note(counters, epoch, || self.bad_sample(collected));
         let (n_before, samples) = (samples_before(epoch, self.full_epoch), epoch_samples(epoch, self.full_epoch));
-        if self.prepared.separable.is_some() {
-            let merged = self.merge_weights(collected, oldest, [n_before, samples], post.mergers.as_deref())?;
-            return if merged { self.report_merged(began, n_before + samples, collected.idle_s, post) } else { Ok(()) };
-        }
         // With responses the device has rendered parts of the channels.
         let sums = self.prepared.integration.as_ref().map(|integration| integration.sums(collected.means()));
         let means: &[f32] = sums.as_deref().unwrap_or(collected.means());
+        if self.prepared.separable.is_some() {
+            let merged = self.merge_weights(collected, means, oldest, [n_before, samples], post.mergers.as_deref())?;
+            return if merged { self.report_merged(began, n_before + samples, collected.idle_s, post) } else { Ok(()) };
+        }
         let units = means.chunks(means.len() / collected.units.len());
         if oldest.group.epochs > 1 {
-            // The same arithmetic as in the cube, but nothing is written before the last of these epochs.
-            if oldest.means.is_empty() {
-                oldest.means = units.map(<[f32]>::to_vec).collect();
-            } else {
-                oldest.means.iter_mut().zip(units).for_each(|(mean, unit)| merge_means(mean, n_before, unit, samples));
-            }
+            oldest.gather(units, [n_before, samples]);
             if !last {
                 return Ok(());
             }
@@ -349,19 +344,25 @@ impl Pool {
         self.report_merged(began, n_before + samples, collected.idle_s, post)
     }
 
-    /// Merges what came back of a factored render; whether the group is done.
+    /// Merges what came back of a factored render, `means` of what does not separate included; whether the group is done.
     fn merge_weights(
         &self,
         collected: &Collected,
+        means: &[f32],
         oldest: &mut Taken,
         [n_before, samples]: [u32; 2],
         mergers: Option<&ThreadPool>,
     ) -> Result<bool> {
         let cube = self.cube();
         let tiles = &oldest.group.tiles;
+        // None where all separates.
+        let size = means.len() / tiles.len();
         if oldest.group.epochs == 1 {
-            let units: Vec<_> = tiles.iter().zip(&collected.weights).collect();
-            on_all(mergers, &units, |(tile, unit)| cube.merge_weights(**tile, n_before, samples, (*unit).clone()))?;
+            let units: Vec<_> = tiles.iter().zip(&collected.weights).enumerate().collect();
+            on_all(mergers, &units, |(i, (tile, unit))| {
+                let remainder = (size > 0).then(|| &means[i * size..][..size]);
+                cube.merge_weights(**tile, n_before, samples, (*unit).clone(), remainder)
+            })?;
             return Ok(true);
         }
         // The same arithmetic as in the cube, but nothing is written before the last of these epochs.
@@ -372,11 +373,17 @@ impl Pool {
             Ok(merging.merged.compacted())
         });
         oldest.weights = merged.collect::<Result<_>>()?;
+        if size > 0 {
+            oldest.gather(means.chunks(size), [n_before, samples]);
+        }
         if oldest.collected < oldest.group.epochs {
             return Ok(false);
         }
-        let all: Vec<_> = tiles.iter().zip(&oldest.weights).collect();
-        on_all(mergers, &all, |(tile, all)| cube.merge_weights(**tile, 0, n_before + samples, (*all).clone()))?;
+        let all: Vec<_> = oldest.group.tiles.iter().zip(&oldest.weights).enumerate().collect();
+        on_all(mergers, &all, |(i, (tile, all))| {
+            let remainder = oldest.means.get(*i).map(Vec::as_slice);
+            cube.merge_weights(**tile, 0, n_before + samples, (*all).clone(), remainder)
+        })?;
         Ok(true)
     }
 
@@ -404,6 +411,15 @@ impl Pool {
 impl Taken {
     fn new(group: Group) -> Taken {
         Taken { group, collected: 0, means: Vec::new(), weights: Vec::new(), tally: Tally::default(), bad: None }
+    }
+
+    /// Merges the means of one more epoch with those before it. The same arithmetic as in the cube, but nothing is written before the last.
+    fn gather<'a>(&mut self, units: impl Iterator<Item = &'a [f32]>, [n_before, samples]: [u32; 2]) {
+        if self.means.is_empty() {
+            self.means = units.map(<[f32]>::to_vec).collect();
+        } else {
+            self.means.iter_mut().zip(units).for_each(|(mean, unit)| merge_means(mean, n_before, unit, samples));
+        }
     }
 
     fn note(&mut self, counters: Counters, epoch: u32, bad_sample: impl FnOnce() -> [u32; 3]) {

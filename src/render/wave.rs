@@ -80,7 +80,7 @@ pub struct WavePlan {
     pub scaled: bool,
     /// Whether roulette decides which paths are evaluated.
     pub thinned: bool,
-    /// Whether records are read back instead of means (factored renders).
+    /// Whether records are read back (factored renders): instead of means, or beside those of what does not separate.
     pub gathered: bool,
     /// Whether single rays are asked for (layers).
     pub first_hits: bool,
@@ -104,9 +104,9 @@ impl WavePlan {
         budget: Budget,
         thinned: bool,
     ) -> Result<WavePlan> {
-        // Records are all that comes back of factored renders.
+        // Records are all that comes back of factored renders, but for what does not separate.
         let gathered = prepared.separable.is_some();
-        let channels = if gathered { 0 } else { prepared.channels as u64 };
+        let channels = if gathered && !prepared.has_remainder() { 0 } else { prepared.channels as u64 };
         let records = u64::from(prepared.max_records());
         let tile_pixels = u64::from(tile[0]) * u64::from(tile[1]);
         let tile_bytes = tile_pixels * channels * 4;

@@ -132,6 +132,8 @@ struct Pending {
     submission: wgpu::SubmissionIndex,
     /// The number of its last wave.
     last_wave: u64,
+    /// Of each pixel.
+    samples: u32,
     proof: Proof,
 }
 
@@ -141,7 +143,7 @@ pub struct Collected<'a> {
     pub gpu: &'a Gpu,
     pub units: &'a [UnitRect],
     view: wgpu::BufferView,
-    /// Of each unit, in factored renders: there are no means then.
+    /// Of each unit, in factored renders: the means are those of what does not separate then, if there is such a thing.
     pub weights: Vec<Weights>,
     pub counters: Counters,
     /// Seconds in which the device had nothing to do, so far.
@@ -312,7 +314,7 @@ impl Worker {
         buffer::map(staging);
         *of_slot = units.to_vec();
         let (last_wave, proof) = (self.submitted, self.proof(units, epoch_samples));
-        let before = self.pending.replace(Pending { slot, submission, last_wave, proof });
+        let before = self.pending.replace(Pending { slot, submission, last_wave, samples: epoch_samples, proof });
         #[cfg(test)]
         self.gpu.faults.reach(Phase::Transfer, &self.gpu);
         drop(watched);
@@ -400,8 +402,13 @@ impl Worker {
         };
         *is_mapped = true;
         let mut counters: Counters = bytemuck::pod_read_unaligned(&view[view.len() - size_of::<Counters>()..]);
+        let on_device = self.evaluate.as_ref().and_then(|_| counters.missing(&pending.proof));
         let weights = self.gather.as_mut().map(|gather| gather.finish(pending.slot, &mut counters));
-        if let Some(what) = counters.missing(&pending.proof) {
+        // Who walks records sees each path once, whatever channels there are.
+        let slots = units.len() as u64 * u64::from(self.plan.tile_pixels());
+        let walked = Proof { folded: slots * u64::from(pending.samples), ..pending.proof };
+        let on_host = weights.as_ref().and_then(|_| counters.missing(&walked));
+        if let Some(what) = on_device.or(on_host) {
             let what = format!("{}: a unit came back incomplete: {what}", self.gpu.name);
             return Err(Error::DevicesLost(what));
         }
@@ -432,10 +439,9 @@ impl Worker {
         let samples = u64::from(epoch_samples);
         let pixels = |[x0, y0, x1, y1]: &UnitRect| u64::from(x1 - x0) * u64::from(y1 - y0);
         let slots = units.len() as u64 * u64::from(self.plan.tile_pixels());
-        let blocks = if self.gather.is_some() { 1 } else { self.shape.blocks };
         Proof {
             paths: units.iter().map(pixels).sum::<u64>() * samples,
-            folded: slots * samples * u64::from(blocks),
+            folded: slots * samples * u64::from(self.shape.blocks),
             sequence: sequence(self.submitted),
         }
     }

@@ -4,7 +4,7 @@
 use glam::{DVec2, DVec3};
 use spectile::device::separable;
 use spectile::render::wave::Budget;
-use spectile::scene::{Bsdf, Cone, Filter, Profile, Projection, Reflectance, Scene, Sides, Weight};
+use spectile::scene::{Cone, Filter, Profile, Projection, Scene, Sides, Weight};
 use spectile::spectral::{Channels, Curve, Outside};
 
 use crate::device::{Settings, assert_rendered_as_reference, render, render_relit};
@@ -289,25 +289,4 @@ fn mixtures_of_mixtures_keep_their_mean() {
     };
     let bound = Bound { resolution: size::either(0.2, 0.1), allowance: 1e-6 };
     relit_is_as_reference("mixtures", scene, size::either(64, 256), bound);
-}
-
-/// What does not separate is named.
-#[test]
-fn what_does_not_separate_is_named() {
-    let refused = |scene: Scene, words: &str| {
-        let said = separable::basis(&scene).expect_err(words).to_string();
-        assert!(said.contains("--factored") && said.contains(words), "{words}: {said}");
-    };
-    let ball = || sphere(DVec3::ZERO, 0.5);
-    refused(Builder::new().plastic(ball(), 0.5, 1.5, 0.2).build(), "plastic");
-    refused(Builder::new().dielectric(ball(), 1.5, 0.0).build(), "dielectric");
-    refused(Builder::new().conductor(ball(), 0.2, 3.0, [0.0; 2]).build(), "conductor");
-    refused(Builder::new().gas(1.0).build(), "media");
-    refused(Builder::new().rgb_map([2, 1], vec![1.0; 6]).build(), "environment map");
-    refused(Builder::new().bounces(65).diffuse(ball(), 0.5).build(), "integrator.max_bounces");
-    let mut one_sided = Builder::new().one_sided(ball(), 0.5).at_kelvin(300.0).build();
-    refused(one_sided.clone(), "heat");
-    one_sided.materials[0].bsdf = Bsdf::Diffuse { reflectance: Reflectance::Spectrum(0) };
-    one_sided.materials[0].two_sided = true;
-    assert!(separable::basis(&one_sided).is_ok());
 }

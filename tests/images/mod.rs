@@ -12,6 +12,7 @@ mod materials;
 mod media;
 mod opacity;
 mod pictures;
+mod remainder;
 mod roughness;
 mod roulette;
 mod scattering;

@@ -41,6 +41,9 @@ quad = { corner = [-0.3, 1, -0.5], edge_u = [0.6, 0, 0], edge_v = [0, 0, 0.6] }
 material = "black"
 emission = { samples = [[400, 1.0], [700, 2.0]] }
 "#;
+/// Its channels.
+const K: u64 = 5;
+
 /// Pixels of a tile: neither the crop's 24 x 20 nor its halves.
 const TILE: u64 = 16;
 
@@ -120,12 +123,16 @@ fn the_page_is_what_renders_write() {
     choices_have_the_fields_of_the_page(&cubes);
 }
 
-/// The two arrays of factored cubes are as the chapter on them says, and nothing else differs from other cubes.
+/// The arrays of factored cubes are as the chapter on them says, and nothing else differs from other cubes; with a remainder a record of the
+/// journal has eight checksums and three sums of each channel more.
 #[test]
 fn factored_cubes_are_as_the_page_says() {
     let folder = tempfile::tempdir().expect("a folder");
-    std::fs::write(folder.path().join("scene.toml"), SCENE).expect("written");
-    for (name, more) in [("factored", ""), ("uncertainty", " --uncertainty")] {
+    let shiny = SCENE.replace("[materials.grey.diffuse]", "[materials.grey.plastic]\neta = 1.5");
+    for (name, more, scene) in
+        [("factored", "", SCENE), ("uncertainty", " --uncertainty", SCENE), ("remainder", " --uncertainty", &shiny)]
+    {
+        std::fs::write(folder.path().join("scene.toml"), scene).expect("written");
         let render = format!("render scene.toml -o {name}.zarr --spp 64 --tile 16 --quiet --factored{more}");
         let output = spectile(folder.path(), &render.split(' ').collect::<Vec<_>>(), true);
         assert!(output.status.success(), "{}", text(&output.stderr));
@@ -134,15 +141,19 @@ fn factored_cubes_are_as_the_page_says() {
         let arrays = group["consolidated_metadata"]["metadata"].as_object().expect("arrays");
         let of_others: BTreeSet<String> = rows("Arrays").iter().map(|row| code(&row[0]).to_owned()).collect();
         let instead = ["radiance".to_owned(), "standard_error".to_owned()];
-        let documented = rows("Factored cubes");
+        let mut documented = rows("Factored cubes");
+        documented.retain(|row| name == "remainder" || !code(&row[0]).starts_with("remainder"));
         let expected = of_others.into_iter().filter(|array| !instead.contains(array));
         let expected: BTreeSet<String> =
             expected.chain(documented.iter().map(|row| code(&row[0]).to_owned())).collect();
         assert_eq!(arrays.keys().cloned().collect::<BTreeSet<_>>(), expected);
-        let groups = if name == "uncertainty" { 8 } else { 2 };
-        let factored: Value =
-            serde_json::from_str(group["attributes"]["factored"].as_str().expect("JSON as text")).expect("JSON");
-        let most = factored["most_factors"].as_u64().expect("a number");
+        let groups = if name == "factored" { 2 } else { 8 };
+        assert_eq!(factored_words(&group, "remainder").is_some(), name == "remainder");
+        if name == "remainder" {
+            let record = std::fs::metadata(path.join(".spectile/journal/0")).expect("a journal").len();
+            assert!(record.is_multiple_of(136 + 16 * K + 8 * 16 + 3 * 8 * K), "{record}");
+        }
+        let most = factored_words(&group, "most_factors").and_then(|most| most.as_u64()).expect("a number");
         let size = |word: &str| -> u64 {
             match word.trim() {
                 "⌈H/h⌉" | "⌈W/w⌉" => 2,
@@ -150,6 +161,10 @@ fn factored_cubes_are_as_the_page_says() {
                 "2 + G" => 2 + groups,
                 "1 + F" => 1 + most.max(1),
                 "72 w h" => 72 * TILE * TILE,
+                "K" => K,
+                "H" => 20,
+                "W" => 24,
+                "h" | "w" => TILE,
                 word => panic!("`{word}` is no size"),
             }
         };
@@ -157,7 +172,12 @@ fn factored_cubes_are_as_the_page_says() {
             let found = &arrays[code(&row[0])];
             let sizes = |cell: &str| cell.split(',').map(|word| size(word).to_string()).collect::<Vec<_>>().join(", ");
             let codecs: Vec<String> = (found["codecs"].as_array().expect("codecs").iter())
-                .map(|codec| format!("{} {}", plain(&codec["name"]), plain(&codec["configuration"]["endian"])))
+                .map(|codec| match &codec["configuration"] {
+                    order if order["order"].is_array() => {
+                        format!("{} [{}]", plain(&codec["name"]), list(&order["order"]))
+                    }
+                    of => format!("{} {}", plain(&codec["name"]), plain(&of["endian"])),
+                })
                 .collect();
             let written = [
                 list(&found["dimension_names"]),
@@ -173,6 +193,12 @@ fn factored_cubes_are_as_the_page_says() {
             assert!(path.join(&file).exists(), "{file}");
         }
     }
+}
+
+/// A field of the attribute `factored` of a group.
+fn factored_words(group: &Value, field: &str) -> Option<Value> {
+    let text = group["attributes"]["factored"].as_str().expect("JSON as text");
+    serde_json::from_str::<Value>(text).expect("JSON").get(field).cloned()
 }
 
 /// Layers are the arrays of the chapter on them beside all others, with those attributes and files; and a record has six checksums more.

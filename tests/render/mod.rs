@@ -15,6 +15,7 @@ mod out_of_core;
 mod outcome;
 mod products;
 mod reflectance;
+mod remainder;
 mod responses;
 mod resume;
 mod running;

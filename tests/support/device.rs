@@ -10,7 +10,7 @@ use spectile::gpu::adapter::Gpu;
 use spectile::render::pilot;
 use spectile::render::wave::Budget;
 use spectile::render::worker::{UnitRect, Worker};
-use spectile::scene::Scene;
+use spectile::scene::{Evaluator, Scene};
 use spectile::spectral::Channels;
 use spectile::spectral::product::{Basis, Expander};
 
@@ -90,7 +90,27 @@ fn device(settings: Settings) -> Arc<Gpu> {
 /// Renders `epochs` epochs of `samples` samples per pixel (a power of two) of the film's crop.
 pub fn render(scene: &Scene, epochs: u32, samples: u32, settings: Settings) -> Epochs {
     let basis = scene.is_factored().then(|| separable::basis(scene).expect("a scene that separates"));
-    render_as(scene, basis.as_ref().map(|basis| (basis, &scene.channels)), epochs, samples, settings)
+    let prepared = Prepared::new(scene, settings.seed).expect("a scene that fits");
+    render_as(prepared, scene, basis.as_ref().map(|basis| (basis, &scene.channels)), epochs, samples, settings)
+}
+
+/// The paths of the factored render of a scene, evaluated in channels: as [`render`] of what is not factored, by its decisions.
+pub fn render_paths_of_weights(scene: &Scene, epochs: u32, samples: u32, settings: Settings) -> Epochs {
+    let factored = scene.clone().factored();
+    let prepared = Prepared::for_evaluator(&factored, settings.seed, Evaluator::DpeptPixel);
+    render_as(prepared.expect("a scene that fits"), &factored, None, epochs, samples, settings)
+}
+
+/// Of a factored render as it came back, the weights of all pixels, and the sum of what does not separate over pixels and channels.
+pub fn parts_of(scene: &Scene, samples: u32, settings: Settings) -> (usize, f64) {
+    let prepared = Prepared::new(&scene.clone().factored(), settings.seed).expect("a scene that fits");
+    let mut worker =
+        Worker::new(device(settings), Arc::new(prepared), settings.tile, settings.budget).expect("a worker");
+    let [x0, y0, x1, y1] = scene.film.crop;
+    worker.submit(&[[x0, y0, x1.min(x0 + settings.tile[0]), y1.min(y0 + settings.tile[1])]], 0, samples).expect("work");
+    let collected = worker.collect().expect("results").expect("a unit");
+    let remainder = collected.means().iter().map(|value| f64::from(*value)).sum();
+    (collected.weights[0].len(), remainder)
 }
 
 /// As [`render`], a scene as weights of products of spectra; then with the spectra of `basis` in `channels`.
@@ -102,10 +122,13 @@ pub fn render_relit(
     samples: u32,
     settings: Settings,
 ) -> Epochs {
-    render_as(&scene.clone().factored(), Some((basis, channels)), epochs, samples, settings)
+    let factored = scene.clone().factored();
+    let prepared = Prepared::new(&factored, settings.seed).expect("a scene that fits");
+    render_as(prepared, &factored, Some((basis, channels)), epochs, samples, settings)
 }
 
 fn render_as(
+    prepared: Prepared,
     scene: &Scene,
     factored: Option<(&Basis, &Channels)>,
     epochs: u32,
@@ -115,7 +138,7 @@ fn render_as(
     let expander =
         factored.map(|(basis, channels)| Expander::new(basis, channels, scene.integrator.max_bounces as usize));
     let [x0, y0, x1, y1] = scene.film.crop;
-    let mut prepared = Arc::new(Prepared::new(scene, settings.seed).expect("a scene that fits"));
+    let mut prepared = Arc::new(prepared);
     if let Some(scale) = settings.scale {
         let pilot = pilot::choose(&device(settings), &prepared, scene, None, &Arc::default()).expect("a pilot");
         let thinning = Thinning::new(&prepared, scale, &pilot.mean_radiance);
@@ -155,9 +178,13 @@ fn render_as(
                         let rows = expander.rows(&weights.products);
                         means.chunks_mut(channels).enumerate().for_each(|(i, out)| weights.expand(i, &rows, out));
                     }
+                    // What does not separate, of the scene's own channels.
+                    let remainder = sums.as_deref().unwrap_or(collected.means());
+                    assert!(remainder.is_empty() || remainder.len() == means.len(), "channels of a remainder");
+                    means.iter_mut().zip(remainder).for_each(|(value, other)| *value += other);
                     means
                 });
-                let means: &[f32] = sums.as_deref().or(made.as_deref()).unwrap_or(collected.means());
+                let means: &[f32] = made.as_deref().or(sums.as_deref()).unwrap_or(collected.means());
                 for (unit, means) in collected.units.iter().zip(means.chunks(unit_size)) {
                     for y in unit[1]..unit[3] {
                         for x in unit[0]..unit[2] {

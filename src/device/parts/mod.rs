@@ -15,6 +15,7 @@ pub mod opacity;
 pub mod origins;
 pub mod paths;
 pub mod radiators;
+pub mod remainder;
 pub mod roughness;
 pub mod scattering;
 pub mod sky;

@@ -5,6 +5,7 @@
 //! cost is known by the kind of device, how they vary is measured on paths that are never counted in the picture, so that the choice is
 //! the same every time.
 
+mod remainder;
 mod work;
 
 use std::ops::Range;
