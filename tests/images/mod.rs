@@ -16,5 +16,6 @@ mod roughness;
 mod roulette;
 mod scattering;
 mod spots;
+mod techniques;
 mod textures;
 mod wavelengths;

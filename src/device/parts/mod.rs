@@ -2,6 +2,7 @@
 //! it; its WGSL stands in the folder of the same name in `shaders/parts/`.
 
 pub mod attributes;
+pub mod by_technique;
 pub mod camera;
 pub mod crossings;
 pub mod geometry;
@@ -20,4 +21,5 @@ pub mod scattering;
 pub mod sky;
 pub mod spectra;
 pub mod surfaces;
+pub mod techniques;
 pub mod textures;
