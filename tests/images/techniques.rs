@@ -3,7 +3,7 @@
 
 use glam::{DVec2, DVec3};
 use spectile::device::prepared::Prepared;
-use spectile::scene::{Emission, Evaluator, Filter, Mesh, Projection, Scene, Shape, Sides, TextureKind};
+use spectile::scene::{Emission, Evaluator, Field, Filter, Mesh, Phase, Projection, Scene, Shape, Sides, TextureKind};
 use spectile::spectral::{Channels, Curve};
 
 use crate::device::{Settings, assert_as_reference, render};
@@ -180,7 +180,7 @@ fn frosted_plate(count: usize, roughness: f64) -> Scene {
 #[test]
 fn rough_dispersive_glass_is_that_of_the_reference() {
     let scene = frosted_plate(8, 0.06);
-    println!("{} techniques", techniques(&scene));
+    assert_eq!(techniques(&scene), 6);
     let bound = Bound { resolution: size::either(0.35, 0.1), allowance: 4e-3 };
     assert_as_reference(
         "a frosted wedge",
@@ -189,4 +189,31 @@ fn rough_dispersive_glass_is_that_of_the_reference() {
         size::either(2_000, 50_000),
         bound,
     );
+}
+
+/// Matter that scatters, lobes and rough dispersion together: one set of techniques is for all, each of which would have others alone.
+#[test]
+#[ignore = "half a minute, most of it compiling: a kernel with nearly everything"]
+fn all_that_techniques_decide() {
+    let mut scene = saturated_room();
+    let cloud = {
+        let (steep, flat) = (slanted(3.0, 0.2), slanted(0.5, 0.5));
+        let mut b = Builder(scene);
+        let forward = b.henyey_greenstein(slanted(0.8, 0.1));
+        b = b.medium(0.1, None, Field::Constant(1.0)).scattering(steep, forward);
+        b = b.beside(0.0, Field::Constant(1.0)).scattering(flat, Phase::Rayleigh { depolarisation: 0.0 });
+        b.null_box(DVec3::new(-0.9, -0.2, -0.8), DVec3::new(0.0, 0.6, 0.8))
+    };
+    scene = demanding(cloud.dielectric(sphere(DVec3::new(0.5, 0.5, 0.6), 0.25), slanted(1.7, 1.4), 0.12).build(), 4);
+    assert_eq!(techniques(&scene), 4);
+    let bound = Bound { resolution: 0.15, allowance: 2e-3 };
+    assert_as_reference("all at once", &scene, [64, 128], 20_000, bound);
+    let shown = |evaluator| {
+        let mut scene = scene.clone();
+        scene.integrator.evaluator = evaluator;
+        render(&scene, 2, 16, Settings::default()).means
+    };
+    for (a, b) in shown(Evaluator::DpeptPixel).iter().flatten().zip(shown(Evaluator::Pt).iter().flatten()) {
+        assert!((a - b).abs() <= 2e-4 * a.abs().max(0.01), "{a} {b}");
+    }
 }

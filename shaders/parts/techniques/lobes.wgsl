@@ -120,9 +120,7 @@ fn index_by_technique(lobe: Lobe, u: f32) -> f32 {
 
 fn add_bent(row: PickRow, lobe: Lobe, v: Vertex, i: vec3<f32>) {
     var shared_by_all = 0.0;
-    var own = 0.9;
     if (lone_channel != NONE) {
-        own = 0.0;
         shared_by_all = refracted_density(lobe, v, i, relative_index(lone_index(lobe), v.inside));
     } else {
         for (var n = 0u; n < 3u; n += 1u) {
@@ -131,8 +129,9 @@ fn add_bent(row: PickRow, lobe: Lobe, v: Vertex, i: vec3<f32>) {
     }
     for (var t = 0u; t < TECHNIQUES; t += 1u) {
         var density = shared_by_all;
-        if (own > 0.0) {
-            density += own * refracted_density(lobe, v, i, relative_index(tables[lobe.loss + t], v.inside));
+        // What never comes here decides nothing.
+        if (lone_channel == NONE && ratios[t] > 0.0) {
+            density += 0.9 * refracted_density(lobe, v, i, relative_index(tables[lobe.loss + t], v.inside));
         }
         densities[t] += pick_by(row, t) * density;
     }

@@ -10,6 +10,7 @@ pub mod heat;
 pub mod instances;
 pub mod layers;
 pub mod lights;
+mod lobe_choice;
 mod lobes;
 pub mod media;
 pub mod opacity;

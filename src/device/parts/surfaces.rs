@@ -4,6 +4,7 @@ use crate::device::part::{Part, Place, Records, SceneBuffer};
 use crate::device::parts::by_technique::{self, Way};
 use crate::device::parts::geometry::{FEWER_MATERIALS, MATERIALS};
 use crate::device::parts::lights::STEPS;
+use crate::device::parts::lobe_choice::{self, LobeChoice};
 use crate::device::parts::lobes::Leaf;
 use crate::device::parts::roughness;
 use crate::device::parts::techniques::{Asking, Techniques};
@@ -236,16 +237,21 @@ impl Collected {
         let materials = masks.into_iter().enumerate().map(|(material, mask)| {
             let mut leaves = Vec::new();
             surfaces.collect(scene, material, 1.0, &[], &mut leaves);
-            let name = &scene.materials[material].name;
-            let by_shares =
-                |albedo: &dyn Fn(&Leaf, usize) -> f64| probabilities(&leaves, scene.channels.len(), albedo).0;
-            let mut asks = by_technique::ask(scene, name, &leaves, by_shares, asking);
-            for bends in leaves.iter().filter_map(|leaf| leaf.bends.as_ref()) {
-                asks |= by_technique::ask_for_bends(name, bends, asking);
-            }
-            OfMaterial { leaves, mask, asks }
+            OfMaterial { leaves, mask, asks: false }
         });
-        let materials = materials.collect();
+        let mut materials: Vec<OfMaterial> = materials.collect();
+        let choices = materials.iter().zip(&scene.materials).map(|(of, material)| {
+            let by_shares =
+                |albedo: &dyn Fn(&Leaf, usize) -> f64| probabilities(&of.leaves, scene.channels.len(), albedo).0;
+            LobeChoice::new(scene, &material.name, &of.leaves, by_shares)
+        });
+        let asks = lobe_choice::ask(scene, choices.collect(), asking);
+        for ((of, asks), material) in materials.iter_mut().zip(asks).zip(&scene.materials) {
+            of.asks = asks;
+            for bends in of.leaves.iter().filter_map(|leaf| leaf.bends.as_ref()) {
+                of.asks |= by_technique::ask_for_bends(&material.name, bends, asking);
+            }
+        }
         Collected { surfaces, materials }
     }
 

@@ -2,7 +2,7 @@
 //! path (docs/METHOD.md, Techniques). What scatters in media, lobes of surfaces and rough boundaries that disperse share one set of them.
 
 use crate::device::part::{Part, Place};
-use crate::device::parts::by_technique::LobeChoice;
+use crate::device::parts::lobe_choice::LobeChoices;
 use crate::device::parts::{media, surfaces};
 use crate::device::text::module;
 use crate::scene::Scene;
@@ -39,8 +39,6 @@ pub const TECHNIQUES: Part = Part {
 pub const MOST_TECHNIQUES: usize = 16;
 /// For lobes at most.
 const MOST_FOR_LOBES: usize = 4;
-/// What a channel's second moment may be by the technique nearest to it, over what it has by chances of its own.
-const NEAR: f64 = 2.0;
 
 /// What asks for several techniques, and what they would differ in.
 pub struct Asking {
@@ -49,7 +47,7 @@ pub struct Asking {
     /// The most that media or boundaries ask for.
     wanted: usize,
     reasons: Vec<String>,
-    lobes: Vec<LobeChoice>,
+    lobes: Option<LobeChoices>,
     /// As the scene has it.
     demanded: Option<usize>,
 }
@@ -60,7 +58,7 @@ impl Asking {
             points: vec![Vec::new(); scene.channels.len()],
             wanted: 1,
             reasons: Vec::new(),
-            lobes: Vec::new(),
+            lobes: None,
             demanded: scene.integrator.techniques.map(|count| count as usize),
         }
     }
@@ -88,12 +86,11 @@ impl Asking {
         }
     }
 
-    /// Lobes of a material, among which channels would choose by other chances than all together.
-    pub fn ask_for_lobes(&mut self, choice: LobeChoice) {
-        for coordinate in choice.coordinates() {
-            self.tell_apart(coordinate);
-        }
-        self.lobes.push(choice);
+    /// Lobes of `materials`, among which channels would choose by other chances than all together, as `coordinates` of every channel tell.
+    pub(super) fn ask_for_lobes(&mut self, lobes: LobeChoices, materials: Vec<String>, coordinates: Vec<Vec<f64>>) {
+        coordinates.into_iter().for_each(|coordinate| self.tell_apart(coordinate));
+        self.reasons.push(format!("lobes of {}", named(&materials)));
+        self.lobes = Some(lobes);
     }
 }
 
@@ -115,11 +112,7 @@ impl Techniques {
         if count <= 1 {
             return Techniques::default();
         }
-        let mut reasons = asking.reasons;
-        if !asking.lobes.is_empty() {
-            reasons.push(format!("lobes of {}", named(&asking.lobes)));
-        }
-        Techniques { channels: farthest_apart(&asking.points, count), reasons }
+        Techniques { channels: farthest_apart(&asking.points, count), reasons: asking.reasons }
     }
 
     /// T.
@@ -148,25 +141,16 @@ impl Techniques {
 
 /// How many lobes ask for: so many that every channel has one near, 4 at most.
 fn for_lobes(asking: &Asking) -> usize {
-    if asking.lobes.is_empty() {
-        return 1;
-    }
+    let Some(lobes) = &asking.lobes else { return 1 };
     let most = MOST_FOR_LOBES.min(asking.points.len());
-    let are_near = |count: &usize| {
-        let chosen = farthest_apart(&asking.points, *count);
-        asking.lobes.iter().all(|choice| choice.are_near(&chosen, NEAR))
-    };
-    (2..most).find(are_near).unwrap_or(most)
+    (2..most).find(|count| lobes.are_near(&farthest_apart(&asking.points, *count))).unwrap_or(most)
 }
 
-/// The names of some materials.
-fn named(lobes: &[LobeChoice]) -> String {
+/// The first few.
+fn named(names: &[String]) -> String {
     const MOST: usize = 3;
-    let mut names = lobes.iter().take(MOST).map(|choice| choice.material.as_str()).collect::<Vec<_>>().join(", ");
-    if lobes.len() > MOST {
-        names += &format!(" and {} more", lobes.len() - MOST);
-    }
-    names
+    let first = names[..names.len().min(MOST)].join(", ");
+    if names.len() > MOST { format!("{first} and {} more", names.len() - MOST) } else { first }
 }
 
 /// `count` of the points, in order of choice: the two farthest apart, then always the one that is farthest from those chosen; of equal
