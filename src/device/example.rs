@@ -194,8 +194,9 @@ impl Exhibit {
         self.spectrum(Curve::Linear { nm: hull.to_vec(), value: ends.to_vec(), outside: Outside::Hold })
     }
 
-    /// Channels scatter to one side or to the other.
+    /// Channels scatter to one side or to the other; what is so small asks for no techniques by itself.
     pub fn add_saturated_blend(&mut self) {
+        self.scene.integrator.techniques.get_or_insert(3);
         let [reflectance, transmittance] =
             [[0.01, 0.95], [0.95, 0.01]].map(|ends| Reflectance::Spectrum(self.rising(ends)));
         self.add_ball(Bsdf::Translucent { reflectance, transmittance }, None);
