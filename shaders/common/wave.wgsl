@@ -46,7 +46,7 @@ fn load_path(number: u32, second: vec4<u32>) -> Path {
 #endif
 #if RATIOS
     for (var t = 0u; t < TECHNIQUES; t += 1u) {
-        ratios[t] = bitcast<f32>(states[STATE_WORDS * number + 3u + t / 4u][t & 3u]);
+        ratios[t] = bitcast<f32>(states[STATE_WORDS * number + RATIOS_ROW + t / 4u][t & 3u]);
     }
 #endif
     return path;
@@ -63,7 +63,7 @@ fn save_path(path: Path, records: u32) {
 #endif
 #if RATIOS
     for (var t = 0u; t < TECHNIQUES; t += 1u) {
-        states[STATE_WORDS * path.number + 3u + t / 4u][t & 3u] = bitcast<u32>(ratios[t]);
+        states[STATE_WORDS * path.number + RATIOS_ROW + t / 4u][t & 3u] = bitcast<u32>(ratios[t]);
     }
 #endif
 }

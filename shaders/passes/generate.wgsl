@@ -54,11 +54,13 @@ fn scatter(list: ptr<function, RecordList>, path: Path, site: Site, v: Vertex, a
         var chance = (*choice).density;
         if (!site.in_matter) {
             chance = bsdf_density(material, v, direction);
+#lines SURFACE_DENSITY
         } else if (to_light) {
             chance = matter_density(direction);
         }
 #else
         let chance = bsdf_density(material, v, direction);
+#lines SURFACE_DENSITY
 #endif
         var weight = 1.0 / chance;
         if (to_light) {
@@ -146,14 +148,8 @@ fn generate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroup
     // The next vertex, or what comes from beyond the scene.
 #if SCATTERS
     let way_begins = list;
-#if RATIOS
-    if (step.bounce == 0u) {
-        for (var t = 0u; t < TECHNIQUES; t += 1u) {
-            ratios[t] = 1.0;
-        }
-    }
 #endif
-#endif
+#lines BEGIN
     let meeting = meet(&path, &list, &overflow);
     var site: Site;
     var v: Vertex;
@@ -235,7 +231,6 @@ fn generate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroup
 #if SCATTERS
     if (site.in_matter) {
         path.ray.origin = site.surface.position;
-        note_turn();
     }
 #endif
 #lines PASSED

@@ -22,6 +22,16 @@ fn choose(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups)
 #if TEXTURES
     v.uv = vec2<f32>(0.3, 0.6);
 #endif
+#if RATIOS
+    // As of a path that has just begun.
+    technique = n % TECHNIQUES;
+    for (var t = 0u; t < TECHNIQUES; t += 1u) {
+        ratios[t] = 1.0;
+    }
+#endif
+#if BENDS_BY_TECHNIQUE
+    lone_channel = NONE;
+#endif
     let choice = choose_direction(material, &v, question.xy, question.zw, 0x80000000u, NONE);
     if (asked[2u * n + 2u].x > 0.0) {
         given[n] = vec4<f32>(question.xyz, bsdf_density(material, v, question.xyz));

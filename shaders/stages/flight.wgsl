@@ -82,7 +82,11 @@ fn is_scattered(path: ptr<function, Path>, list: ptr<function, RecordList>, begi
         return false;
     }
     let ray = (*path).ray;
-    let own = technique_of((*path).number);
+#if RATIOS
+    let own = technique;
+#else
+    let own = 0u;
+#endif
     let from_path = draw_of((*path).number);
     let u = draw(Draw(from_path.key ^ SALT_FLIGHT, from_path.index), DIMENSION_BOUNCE + step.bounce * DIMENSIONS_PER_VERTEX).x;
 #if FORCED
@@ -190,9 +194,9 @@ fn is_scattered(path: ptr<function, Path>, list: ptr<function, RecordList>, begi
             (*path).nested = followed.around[n];
         }
     }
-    let before = sum_of_ratios();
     let own_depth = depths.flight[own];
 #if RATIOS
+    let before = sum_of_ratios();
     let own_rate = select(1.0, rate_there[own], is_hit);
     for (var t = 0u; t < TECHNIQUES; t += 1u) {
         let rate = select(1.0, rate_there[t] / own_rate, is_hit);
@@ -203,8 +207,8 @@ fn is_scattered(path: ptr<function, Path>, list: ptr<function, RecordList>, begi
 #endif
         ratios[t] = min(ratios[t] * rate * exp(own_depth - depths.flight[t]), 1.0e30);
     }
-#endif
     (*path).scale *= before / sum_of_ratios();
+#endif
     if (!is_hit) {
         // The chance of having come here.
         (*path).scale *= exp(own_depth);

@@ -6,6 +6,9 @@ fn site_in_matter(position: vec3<f32>, survival: f32) -> Site {
     site.in_matter = true;
     site.surface.position = position;
     site.material.flags = MATERIAL_TRANSMITS;
+#if RATIOS
+    site.material.flags |= MATERIAL_BY_TECHNIQUE;
+#endif
     site.material.lobe_count = 1u;
     site.material.survival = survival;
     // No direction lies along it.
@@ -29,22 +32,12 @@ fn choose_turn(u: vec2<f32>, u_kind: f32) -> DirectionChoice {
     choice.direction = sample_turn(u, u_kind);
     choice.density = matter_density(choice.direction);
 #if RATIOS
-    chosen_turn = turns;
+    chosen_densities = densities;
 #endif
 #if DISPERSION
     choice.only_channel = NONE;
 #endif
     return choice;
-}
-
-// The density of a direction in which the path goes on becomes a part of its densities; its weight has that of all techniques already.
-fn note_turn() {
-#if RATIOS
-    let own = max(chosen_turn[collision.technique], 1.0e-30);
-    for (var t = 0u; t < TECHNIQUES; t += 1u) {
-        ratios[t] = min(ratios[t] * chosen_turn[t] / own, 1.0e30);
-    }
-#endif
 }
 
 // What is scattered into a direction, of every kind of matter there.

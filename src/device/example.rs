@@ -188,6 +188,26 @@ impl Exhibit {
         self.add_ball(Bsdf::Dielectric { eta, dispersion: true, roughness: Roughness::even(0.2) }, None);
     }
 
+    /// A straight line over all channels.
+    fn rising(&mut self, ends: [f64; 2]) -> usize {
+        let hull = self.scene.channels.hull().expect("a scene has channels");
+        self.spectrum(Curve::Linear { nm: hull.to_vec(), value: ends.to_vec(), outside: Outside::Hold })
+    }
+
+    /// Channels scatter to one side or to the other; what is so small asks for no techniques by itself.
+    pub fn add_saturated_blend(&mut self) {
+        self.scene.integrator.techniques.get_or_insert(3);
+        let [reflectance, transmittance] =
+            [[0.01, 0.95], [0.95, 0.01]].map(|ends| Reflectance::Spectrum(self.rising(ends)));
+        self.add_ball(Bsdf::Translucent { reflectance, transmittance }, None);
+    }
+
+    /// Channels bend apart by one and a half widths of the lobe.
+    pub fn add_frosted_flint(&mut self) {
+        let eta = self.rising([1.9, 1.4]);
+        self.add_ball(Bsdf::Dielectric { eta, dispersion: true, roughness: Roughness::even(0.25) }, None);
+    }
+
     pub fn add_glass(&mut self) {
         let eta = self.index();
         self.add_ball(Bsdf::Dielectric { eta, dispersion: true, roughness: Roughness::even(0.0) }, None);

@@ -5,8 +5,8 @@ use std::ops::Deref;
 
 use crate::device::example::Exhibit;
 use crate::device::parts::{
-    attributes, camera, geometry, heat, instances, layers, lights, media, opacity, paths, remainder, roughness,
-    scattering, sky, spectra, surfaces, textures,
+    attributes, by_technique, camera, geometry, heat, instances, layers, lights, media, opacity, paths, remainder,
+    roughness, scattering, sky, spectra, surfaces, techniques, textures,
 };
 use crate::device::prepared::Prepared;
 use crate::device::text::{Defines, Module};
@@ -89,7 +89,9 @@ pub const PARTS: &[&Part] = &[
     &media::VOXELS,
     &media::PLANCK,
     &scattering::SCATTERING,
-    &scattering::TECHNIQUES,
+    &techniques::TECHNIQUES,
+    &by_technique::LOBES,
+    &by_technique::BOUNDARIES,
     &scattering::FORCED,
     &scattering::TABLES,
     &surfaces::DISPERSION,

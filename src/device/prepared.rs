@@ -15,9 +15,10 @@ use crate::device::parts::lights::{self, LightPicks, STEPS, light_picks};
 use crate::device::parts::media::Media;
 use crate::device::parts::paths::Thinning;
 use crate::device::parts::radiators::Radiators;
-use crate::device::parts::scattering::Scattering;
+use crate::device::parts::scattering::{Coefficients, Scattering};
 use crate::device::parts::sky::SkyMap;
-use crate::device::parts::surfaces::{Needed, Surfaces};
+use crate::device::parts::surfaces::{Collected, Needed, Surfaces};
+use crate::device::parts::techniques::{Asking, Techniques};
 use crate::device::separable::{self, Separable, Separated};
 use crate::device::spectra::{MAX_REGISTER_SPECTRA, SpectrumIds, daylight, spectral_tables};
 use crate::device::windows::Windows;
@@ -77,6 +78,8 @@ pub struct Prepared {
     pub media: Option<Media>,
     /// What media that scatter need.
     pub scattering: Option<Scattering>,
+    /// By which paths decide.
+    pub techniques: Techniques,
     /// Emitting primitives, then lamps, then the spectra of what emits by angle.
     pub emitters: Vec<Emitter>,
     pub lamps: Vec<Lamp>,
@@ -151,7 +154,7 @@ impl Prepared {
         if scene.materials.len() > MAX_MATERIALS {
             return Err(Error::input(&scene.file, format!("more than {MAX_MATERIALS} materials")));
         }
-        let General { mut surfaces, mut media, scattering, mut radiators, mut sky } =
+        let General { mut surfaces, mut media, scattering, techniques, mut radiators, mut sky } =
             General::of(scene, &heat, &accel)?;
         let is_general = surfaces.is_some();
 
@@ -202,6 +205,7 @@ impl Prepared {
             surfaces,
             media,
             scattering,
+            techniques,
             emitters,
             lamps,
             suns,
@@ -328,6 +332,7 @@ struct General {
     surfaces: Option<Surfaces>,
     media: Option<Media>,
     scattering: Option<Scattering>,
+    techniques: Techniques,
     radiators: Option<Radiators>,
     sky: Option<SkyMap>,
 }
@@ -350,8 +355,13 @@ impl General {
             return Ok(General::default());
         }
         let mut media = Media::new(scene, accel)?;
-        let scattering = media.as_mut().and_then(|media| Scattering::new(scene, media));
-        let mut surfaces = Surfaces::new(scene);
+        let mut asking = Asking::new(scene);
+        let coefficients = media.as_ref().and_then(|media| Coefficients::of(scene, media, &mut asking));
+        let collected = Collected::new(scene, &mut asking);
+        let techniques = Techniques::new(asking);
+        let both = media.as_mut().zip(coefficients.as_ref());
+        let scattering = both.map(|(media, coefficients)| Scattering::new(scene, media, coefficients, &techniques));
+        let mut surfaces = collected.finish(scene, &techniques);
         let radiators = match heat.radiating.is_empty() {
             true => None,
             false => Some(Radiators::new(scene, &heat.radiating, &mut surfaces)?),
@@ -364,7 +374,7 @@ impl General {
             media.finish();
             media.move_spectra(&mut surfaces.spectra);
         }
-        Ok(General { surfaces: Some(surfaces), media, scattering, radiators, sky })
+        Ok(General { surfaces: Some(surfaces), media, scattering, techniques, radiators, sky })
     }
 }
 

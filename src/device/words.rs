@@ -87,6 +87,12 @@ constants! {
         MATERIAL_MASK_IS_TEXTURE = 8;
         MASK_SHIFT = 8;
     }
+    /// Another, where paths decide by several techniques: each has its own chances for the lobes.
+    TECHNIQUES {
+        MATERIAL_BY_TECHNIQUE = 16;
+        /// Of [`Lobe::kind`]: channels bend by their own indices, and each technique by its own, `loss` of the tables being the first.
+        LOBE_BY_TECHNIQUE = 0x8000;
+    }
     /// Flags of what a ray meets first: its traversal gave up; less than half of all rays are stopped there.
     FIRST_HITS {
         FIRST_HIT_OVERFLOW = 1;

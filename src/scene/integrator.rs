@@ -17,8 +17,7 @@ pub struct Integrator {
     /// before it is rendered. Cubes made before there was a choice say nothing of it, and have 1.
     #[serde(default = "one", with = "auto")]
     pub wavelengths_per_channel: Option<u32>,
-    /// How many techniques decide where light goes that matter scatters (docs/METHOD.md, Techniques), 1 to 16; `None`: as many as
-    /// its channels differ.
+    /// By how many techniques paths decide (docs/METHOD.md, Techniques), 1 to 16; `None`: as many as the scene's channels differ.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub techniques: Option<u32>,
     /// Whether a camera ray that leaves the scene through matter that scatters is always scattered there, with the weight of the chance of it.

@@ -14,7 +14,7 @@ use crate::scene::{Bsdf, Placement, Scene, Texture, TextureKind, Weight};
 pub const CASES: &[Case] = &[Case {
     group: "sampling",
     name: "scattering",
-    what: "directions at 13 materials, both sides, 5 directions each: chi-square against their density, and for bare facets against \
+    what: "directions at 15 materials, both sides, 5 directions each: chi-square against their density, and for bare facets against \
            Heitz's",
     run: scattering,
 }];
@@ -117,7 +117,7 @@ const fn facets(name: &'static str, text: &'static str, roughness: [f64; 2]) -> 
 }
 
 /// GLASS stands for an index that falls over the channels.
-const MATERIALS: [Material; 13] = [
+const MATERIALS: [Material; 15] = [
     facets(
         "facets",
         "[materials.m.conductor]\neta = 0.2\nk = 3.4\nroughness = 0.3\nenergy_compensation = false\n",
@@ -149,6 +149,17 @@ const MATERIALS: [Material; 13] = [
     opaque(
         "masked blend",
         "[materials.a.diffuse]\nreflectance = 0.8\n[materials.b.conductor]\neta = 0.2\nk = 3.4\nroughness = [0.3, 0.15]\n\
+         [materials.m.blend]\na = \"a\"\nb = \"b\"\nweight = 0.5\n",
+    ),
+    // By the mean of their techniques, each of which is one of the random numbers'.
+    clear(
+        "rough glass by techniques",
+        "[materials.m.dielectric]\neta = { samples = [[400, 1.9], [700, 1.4]] }\nroughness = 0.25\n",
+    ),
+    opaque(
+        "masked blend by techniques",
+        "[integrator]\ntechniques = 3\n[materials.a.diffuse]\nreflectance = { samples = [[400, 0.9], [700, 0]] }\n\
+         [materials.b.conductor]\neta = 0.2\nk = { samples = [[400, 0.1], [700, 4]] }\nroughness = 0.3\n\
          [materials.m.blend]\na = \"a\"\nb = \"b\"\nweight = 0.5\n",
     ),
 ];

@@ -17,5 +17,6 @@ mod roughness;
 mod roulette;
 mod scattering;
 mod spots;
+mod techniques;
 mod textures;
 mod wavelengths;

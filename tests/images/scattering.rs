@@ -9,7 +9,6 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use spectile::scene::{Camera, Evaluator, Field, Filter, Phase, PhaseTable, Scene, Sides};
-use spectile::spectral::{Channels, Curve, Outside};
 
 use crate::device::{Settings, assert_as_reference, measure, render};
 use crate::scene_builder::heat::*;
@@ -17,14 +16,6 @@ use crate::scene_builder::*;
 use crate::size;
 use crate::statistics::{Bound, Estimate, assert_estimates};
 use crate::truth;
-
-/// Channels a nanometre wide, and a spectrum of these values in them.
-fn by_channel(values: &[f64]) -> (Channels, Curve) {
-    let bounds: Vec<[f64; 2]> = (0..values.len()).map(|k| [500.0 + 10.0 * k as f64, 501.0 + 10.0 * k as f64]).collect();
-    let nm = bounds.iter().flatten().copied().collect();
-    let value = values.iter().flat_map(|value| [*value; 2]).collect();
-    (Channels::from_bounds(bounds, None), Curve::Linear { nm, value, outside: Outside::Hold })
-}
 
 fn isotropic(b: &mut Builder) -> Phase {
     b.henyey_greenstein(0.0)

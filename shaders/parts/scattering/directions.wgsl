@@ -9,14 +9,6 @@
 
 const STEP_WORDS: u32 = 2u * TECHNIQUES + 1u;
 
-// Densities of the path so far under each technique, over that of its own.
-#if RATIOS
-var<private> ratios: array<f32, TECHNIQUES>;
-// The densities of the turn that was looked at last, 0 of techniques that never come there; and of the one that the path takes.
-var<private> turns: array<f32, TECHNIQUES>;
-var<private> chosen_turn: array<f32, TECHNIQUES>;
-#endif
-
 // Where a path was scattered by matter.
 struct Collision {
     // The first word of its volume, and the voxel there.
@@ -31,36 +23,6 @@ struct Collision {
 }
 
 var<private> collision: Collision;
-
-fn ratio_of(t: u32) -> f32 {
-#if RATIOS
-    return ratios[t];
-#else
-    return 1.0;
-#endif
-}
-
-fn sum_of_ratios() -> f32 {
-#if RATIOS
-    var sum = 0.0;
-    for (var t = 0u; t < TECHNIQUES; t += 1u) {
-        sum += ratios[t];
-    }
-    return sum;
-#else
-    return 1.0;
-#endif
-}
-
-fn technique_of(path: u32) -> u32 {
-#if RATIOS
-    let from_path = draw_of(path);
-    let u = draw(Draw(from_path.key ^ 0x5bd1e995u, from_path.index), DIMENSION_BOUNCE).x;
-    return min(u32(u * f32(TECHNIQUES)), TECHNIQUES - 1u);
-#else
-    return 0u;
-#endif
-}
 
 // 1 - cos of the angle between two unit vectors, without cancellation.
 fn versine_between(a: vec3<f32>, b: vec3<f32>) -> f32 {
@@ -148,11 +110,11 @@ fn matter_density(direction: vec3<f32>) -> f32 {
     var sum = 0.0;
     var all = 0.0;
     for (var t = 0u; t < TECHNIQUES; t += 1u) {
-        turns[t] = 0.0;
+        densities[t] = 0.0;
         // What never comes here decides nothing.
         if (ratios[t] > 0.0) {
-            turns[t] = turn_density(t, versine);
-            sum += ratios[t] * turns[t];
+            densities[t] = turn_density(t, versine);
+            sum += ratios[t] * densities[t];
             all += ratios[t];
         }
     }

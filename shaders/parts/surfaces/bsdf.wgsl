@@ -229,6 +229,11 @@ fn lobe_density(lobe: Lobe, v: Vertex, i: vec3<f32>) -> f32 {
 
 // The density with which the whole material chooses `i`.
 fn bsdf_density(material: SurfaceMaterial, v: Vertex, i: vec3<f32>) -> f32 {
+#if BY_TECHNIQUE
+    if ((material.flags & MATERIAL_BY_TECHNIQUE) != 0u) {
+        return density_of_techniques(material, v, i);
+    }
+#endif
     var density = 0.0;
     for (var p = material.first_lobe; p < material.first_lobe + material.lobe_count; p += 1u) {
         let pick = lobe_pick(p, v);

@@ -26,6 +26,9 @@ fn choose_direction(material: SurfaceMaterial, vertex: ptr<function, Vertex>, u_
         picks += lobe_pick(p, *vertex);
     }
     (*vertex).pick_scale = select(1.0 / picks, 0.0, picks == 0.0);
+#if BY_TECHNIQUE
+    scale_picks(material, *vertex);
+#endif
 #endif
     let v = *vertex;
     var choice: DirectionChoice;
@@ -34,7 +37,11 @@ fn choose_direction(material: SurfaceMaterial, vertex: ptr<function, Vertex>, u_
     var chosen_pick = 0.0;
     var below = 0.0;
     for (var p = material.first_lobe; p < material.first_lobe + material.lobe_count; p += 1u) {
+#if BY_TECHNIQUE
+        let pick = own_pick(material, p, v);
+#else
         let pick = lobe_pick(p, v);
+#endif
         if (pick > 0.0 && (choice.lobe == NONE || u_lobe.x >= below)) {
             choice.lobe = p;
             chosen_pick = pick;
@@ -44,6 +51,11 @@ fn choose_direction(material: SurfaceMaterial, vertex: ptr<function, Vertex>, u_
     if (choice.lobe == NONE) {
         return choice;
     }
+#if BY_TECHNIQUE
+    if ((material.flags & MATERIAL_BY_TECHNIQUE) != 0u) {
+        chosen_pick = pick_of_techniques(choice.lobe, v);
+    }
+#endif
     let lobe = lobe_at(choice.lobe, v);
     choice.direction = cosine_hemisphere(vec3<f32>(0.0, 0.0, 1.0), u_bsdf);
     choice.goes_on = true;
@@ -126,6 +138,10 @@ fn choose_direction(material: SurfaceMaterial, vertex: ptr<function, Vertex>, u_
                     let channel = select(live, min(u32(u_channel * f32(CHANNELS)), CHANNELS - 1u), live == NONE);
                     choice.only_channel = select(NONE, channel, live == NONE);
                     eta = channel_value(lobe.ab & 0xffffu, channel, mu);
+#if BENDS_BY_TECHNIQUE
+                } else if ((lobe.kind & LOBE_BY_TECHNIQUE) != 0u) {
+                    eta = index_by_technique(lobe, u_channel);
+#endif
                 } else if ((lobe.kind & LOBE_DISPERSES) != 0u) {
                     eta = spread_index(lobe, min(u32(3.0 * u_channel), 2u));
                 }

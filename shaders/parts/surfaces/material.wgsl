@@ -10,6 +10,9 @@ struct SurfaceMaterial {
 }
 
 #constants MATERIALS
+#if RATIOS
+#constants TECHNIQUES
+#endif
 
 // One way in which a material scatters.
 struct Lobe {
@@ -26,7 +29,7 @@ struct Lobe {
     picks: u32,
     decision: u32,
     // First value of the table of what single scattering loses, and its rows; or the number of 128 values before a table
-    // over index and cosine.
+    // over index and cosine; or, of a rough boundary, the first of the techniques' indices in `tables`.
     loss: u32,
     rows: u32,
     mean_loss: f32,

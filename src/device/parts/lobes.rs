@@ -4,11 +4,12 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use crate::device::parts::by_technique::Bends;
 use crate::device::parts::roughness::ByPlace;
 use crate::device::parts::surfaces::{INTERVALS, Kind, Surfaces, texture_records};
 use crate::device::parts::textures::{self, Share};
 use crate::device::prepared::LEAST_ALBEDO;
-use crate::device::words::{LOBE_BOUNDED, LOBE_DISPERSES, LOBE_NARROW, LOBE_TEXTURED, Lobe};
+use crate::device::words::{LOBE_BOUNDED, LOBE_DISPERSES, LOBE_TEXTURED, Lobe};
 use crate::scene::{Reflectance, Scene, SpectrumId};
 use crate::spectral::Curve;
 use crate::spectral::hemisphere::fresnel::{self, mean_conductor, mean_dielectric};
@@ -30,6 +31,8 @@ pub(super) struct Leaf {
     pub shares: Vec<Share>,
     /// Where its roughness is a texture.
     pub by_place: Option<ByPlace>,
+    /// Of a rough boundary that disperses.
+    pub bends: Option<Bends>,
     /// Records that one evaluation takes; 0 for the only directions of mirrors and ideal refraction.
     pub records: u32,
 }
@@ -150,13 +153,9 @@ impl Surfaces {
             .map(|(behind, cosine)| decision.at(behind, cosine) as f32)
             .collect();
         let apart = |eta: f64| if (eta - 1.0).abs() < MATCHED { 1.0 + MATCHED.copysign(eta - 1.0) } else { eta };
-        let narrow = index.disperses && bends_apart(range, index.bending, alpha);
         self.dispersion |= index.disperses;
-        self.spread |= index.disperses && !narrow;
         let boundary = Lobe {
-            kind: Kind::RoughBoundary as u32
-                | if index.disperses { LOBE_DISPERSES } else { 0 }
-                | if narrow { LOBE_NARROW } else { 0 },
+            kind: Kind::RoughBoundary as u32 | if index.disperses { LOBE_DISPERSES } else { 0 },
             ab: id,
             alpha: [alpha as f32; 2],
             decision: self.table(&decisions),
@@ -167,6 +166,10 @@ impl Surfaces {
         };
         let (table, indices) = (Arc::clone(&albedo), n.clone());
         let mut leaves = vec![leaf(boundary, 2, move |behind, cosine, k| 1.0 - table.loss(indices[k], behind, cosine))];
+        leaves[0].bends = index.disperses.then(|| {
+            let indices = n.iter().map(|eta| apart(*eta)).collect();
+            Bends::new(indices, range, index.bending, alpha)
+        });
 
         // What is scattered again, by `reference::bsdf::dielectric`'s reciprocal split between both sides: the share over
         // the mean loss of the side it goes to.
@@ -285,19 +288,12 @@ impl Index {
     }
 }
 
-/// Whether the directions in which the extreme indices bend differ by more than the lobe of roughness `alpha` is wide: at 45
-/// degrees, where a facet that tilts by δ turns what it refracts by about (1 - 1/η) δ.
-fn bends_apart(range: [f64; 2], eta: f64, alpha: f64) -> bool {
-    let refracted = |eta: f64| (0.5f64.sqrt() / eta.max(1.0 / eta)).asin();
-    (refracted(range[0]) - refracted(range[1])).abs() > alpha * (1.0 - 1.0 / eta).abs()
-}
-
 fn lobe_of(kind: Kind) -> Lobe {
     Lobe { kind: kind as u32, ..Lobe::default() }
 }
 
 fn leaf(lobe: Lobe, records: u32, albedo: impl Fn(bool, f64, usize) -> f64 + 'static) -> Leaf {
-    Leaf { lobe, active: [true; 2], albedo: Box::new(albedo), shares: Vec::new(), by_place: None, records }
+    Leaf { lobe, active: [true; 2], albedo: Box::new(albedo), shares: Vec::new(), by_place: None, bends: None, records }
 }
 
 /// The mean of `curve` over each channel.

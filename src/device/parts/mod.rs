@@ -2,6 +2,7 @@
 //! it; its WGSL stands in the folder of the same name in `shaders/parts/`.
 
 pub mod attributes;
+pub mod by_technique;
 pub mod camera;
 pub mod crossings;
 pub mod geometry;
@@ -9,6 +10,7 @@ pub mod heat;
 pub mod instances;
 pub mod layers;
 pub mod lights;
+mod lobe_choice;
 mod lobes;
 pub mod media;
 pub mod opacity;
@@ -21,4 +23,5 @@ pub mod scattering;
 pub mod sky;
 pub mod spectra;
 pub mod surfaces;
+pub mod techniques;
 pub mod textures;

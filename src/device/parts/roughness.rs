@@ -78,6 +78,7 @@ impl Surfaces {
             let variants = if has_tables { same.iter().map(|leaf| leaf.lobe).collect() } else { Vec::new() };
             // Of the smoothest, which tells whether its facets are narrow.
             let Leaf { lobe, active, records, .. } = same[0];
+            let bends = same[0].bends.clone();
             let albedos: Vec<_> = same.into_iter().map(|leaf| leaf.albedo).collect();
             let typical = typical.clone();
             let albedo = move |behind: bool, cosine: f64, k: usize| {
@@ -93,6 +94,7 @@ impl Surfaces {
                 shares: Vec::new(),
                 records,
                 by_place: Some(by_place),
+                bends,
             });
         }
         leaves

@@ -4,6 +4,7 @@
 use crate::device::part::{Part, Place, Records};
 use crate::device::parts::media::{self, Filled, List, Media};
 use crate::device::parts::surfaces::Needed;
+use crate::device::parts::techniques::{Asking, Techniques};
 use crate::device::text::module;
 use crate::device::words::{
     NONE, PHASE_HENYEY_GREENSTEIN, PHASE_RAYLEIGH, PHASE_TABLE, VOLUME_BY_EXTINCTION, VOLUME_WORDS, VOLUMES_HEAD,
@@ -14,7 +15,9 @@ use crate::spectral::{Curve, Outside};
 pub const SCATTERING: Part = Part {
     name: "media that scatter",
     used: |scene| scene.scattering.is_some(),
-    effect: |scene| scene.scattering.as_ref().map_or_else(String::new, Scattering::words),
+    effect: |scene| {
+        scene.scattering.as_ref().map_or_else(String::new, |scattering| scattering.words(&scene.techniques))
+    },
     is_planned: true,
     modules: &[
         (Place::Generate, module!("parts/scattering/directions.wgsl")),
@@ -22,8 +25,7 @@ pub const SCATTERING: Part = Part {
         (Place::Stage, module!("stages/matter.wgsl")),
     ],
     defines: |scene, _, defines| {
-        let Some(scattering) = &scene.scattering else { return };
-        defines.set("SCATTERS", true).constant("TECHNIQUES", scattering.techniques);
+        defines.set("SCATTERS", true).constant("TECHNIQUES", scene.techniques.count() as u32);
         defines.set("SCALED", true);
     },
     // Of a way that is gone on from somewhere within: its throughput put aside and taken back, and what lies before that place. At
@@ -34,19 +36,6 @@ pub const SCATTERING: Part = Part {
         Records { way: way + 2, vertex: 4 * scatterers, path: 0 }
     },
     example: Some(|exhibit| exhibit.add_cloud()),
-    ..Part::NOTHING
-};
-
-pub const TECHNIQUES: Part = Part {
-    name: "several techniques",
-    used: |scene| scene.scattering.as_ref().is_some_and(|scattering| scattering.techniques > 1),
-    effect: |scene| {
-        let techniques = scene.scattering.as_ref().map_or(0, |scattering| scattering.techniques);
-        format!("{} bytes a path, and the density of each at every collision", 16 * techniques.div_ceil(4))
-    },
-    is_planned: true,
-    defines: |_, _, defines| _ = defines.set("RATIOS", true),
-    state_words: |scene| scene.scattering.as_ref().map_or(0, |scattering| 4 * scattering.techniques.div_ceil(4)),
     ..Part::NOTHING
 };
 
@@ -77,8 +66,6 @@ pub const TABLES: Part = Part {
 
 const WORDS: usize = VOLUME_WORDS as usize;
 
-/// Techniques of a scene at most.
-const MOST_TECHNIQUES: usize = 16;
 /// Optical depths below this are as this: nothing is scattered noticeably.
 const LEAST_DEPTH: f64 = 0.1;
 /// Ratios of optical depths below this need one technique.
@@ -90,7 +77,6 @@ const ROW_DEGREES: f64 = 0.25;
 
 /// What media that scatter need on a device, beside the words that it adds to their volumes.
 pub struct Scattering {
-    pub techniques: u32,
     pub has_tables: bool,
     /// Whether camera rays that meet nothing are always scattered.
     pub forced: bool,
@@ -99,17 +85,25 @@ pub struct Scattering {
     by_extinction: Vec<String>,
 }
 
-impl Scattering {
-    /// `None` where nothing scatters. Adds to the words and spectra of `media`.
-    pub fn new(scene: &Scene, media: &mut Media) -> Option<Scattering> {
+/// What media that scatter are in every channel, before it is known by how many techniques paths decide.
+pub struct Coefficients(Vec<OfMedium>);
+
+impl Coefficients {
+    /// `None` where nothing scatters; else media ask for techniques.
+    pub fn of(scene: &Scene, media: &Media, asking: &mut Asking) -> Option<Coefficients> {
         if !media.places.iter().any(|place| scene.media[place.medium].scatters()) {
             return None;
         }
-        let coefficients: Vec<Coefficients> =
-            scene.media.iter().map(|medium| Coefficients::of(scene, medium)).collect();
-        let deciding = Deciding::of(scene, &media.places, &coefficients);
+        let all: Vec<OfMedium> = scene.media.iter().map(|medium| OfMedium::new(scene, medium)).collect();
+        ask(scene, &media.places, &all, asking);
+        Some(Coefficients(all))
+    }
+}
+
+impl Scattering {
+    /// Adds to the words and spectra of `media`.
+    pub fn new(scene: &Scene, media: &mut Media, coefficients: &Coefficients, techniques: &Techniques) -> Scattering {
         let mut scattering = Scattering {
-            techniques: deciding.count() as u32,
             has_tables: false,
             forced: scene.integrator.forced_collision,
             most_scatterers: 0,
@@ -117,17 +111,17 @@ impl Scattering {
         };
         let mut tables = Tables::default();
         for (i, place) in media.places.clone().into_iter().enumerate() {
-            let (medium, of) = (&scene.media[place.medium], &coefficients[place.medium]);
+            let (medium, of) = (&scene.media[place.medium], &coefficients.0[place.medium]);
             let first = VOLUMES_HEAD as usize + WORDS * i;
             let mut list = List::default();
-            list.push_numbers(of.walked(medium, &deciding));
+            list.push_numbers(of.walked(medium, techniques));
             let scatterers = medium.components.iter().filter(|component| component.scattering.is_some()).count() as u32;
             list.words.push(scatterers);
             scattering.most_scatterers = scattering.most_scatterers.max(scatterers);
             for (c, component) in medium.components.iter().enumerate() {
                 if let Some(how) = &component.scattering {
                     list.push_density(place.densities[c]);
-                    of.scatterer(scene, media, &deciding, &mut tables, (c, how), &mut list);
+                    of.scatterer(scene, media, techniques, &mut tables, (c, how), &mut list);
                 }
             }
             media.volumes[first + 22] = media.append(list);
@@ -139,16 +133,16 @@ impl Scattering {
             }
         }
         scattering.has_tables = !tables.0.is_empty();
-        let words = tables.words(scene, &deciding, media.volumes.len() as u32);
+        let words = tables.words(scene, techniques, media.volumes.len() as u32);
         media.volumes[4] = media.append(words.into());
-        Some(scattering)
+        scattering
     }
 
-    fn words(&self) -> String {
-        let mut words = format!("{} techniques", self.techniques);
-        if self.techniques == 1 {
-            words = "one technique".into();
-        }
+    fn words(&self, techniques: &Techniques) -> String {
+        let mut words = match techniques.count() {
+            1 => "one technique".to_owned(),
+            count => format!("{count} techniques"),
+        };
         if !self.by_extinction.is_empty() {
             words += &format!(", by extinction in {}", self.by_extinction.join(", "));
         }
@@ -157,7 +151,7 @@ impl Scattering {
 }
 
 /// Of a medium: coefficients in each channel at density 1, and densities as they are on the whole.
-struct Coefficients {
+struct OfMedium {
     /// Of each kind of matter.
     components: Vec<ComponentCoefficients>,
     /// Whether more is absorbed than scattered in all channels, so that paths would go deep for nothing.
@@ -200,8 +194,8 @@ fn least_of(values: &[f64]) -> f64 {
 /// Of an amount on a way: what every technique makes of it for how far paths go; what it loses of it, and the channel that absorbs least.
 type Term = (Vec<f64>, Vec<f64>, f64);
 
-impl Coefficients {
-    fn of(scene: &Scene, medium: &Medium) -> Coefficients {
+impl OfMedium {
+    fn new(scene: &Scene, medium: &Medium) -> OfMedium {
         let kelvin = medium.temperature.as_ref().map(mean);
         let count = scene.channels.len();
         let component = |component: &Component| {
@@ -230,7 +224,7 @@ impl Coefficients {
         };
         let by_extinction = medium.scatters()
             && (0..count).all(|k| total(ComponentCoefficients::scattered, k) < total(|c, k| c.absorption[k], k));
-        Coefficients { components, by_extinction }
+        OfMedium { components, by_extinction }
     }
 
     /// What decides how far paths go, of one kind of matter in channel `k`, at its mean density.
@@ -241,9 +235,12 @@ impl Coefficients {
 
     /// Words of a volume: for each amount on a way, what every technique makes of it for how far paths go; then what every technique, and the
     /// channel that absorbs least, loses of it.
-    fn walked(&self, medium: &Medium, deciding: &Deciding) -> Vec<f64> {
-        let terms =
-            if medium.grid_size().is_some() { self.along_amounts(deciding) } else { vec![self.along_metres(deciding)] };
+    fn walked(&self, medium: &Medium, techniques: &Techniques) -> Vec<f64> {
+        let terms = if medium.grid_size().is_some() {
+            self.along_amounts(techniques)
+        } else {
+            vec![self.along_metres(techniques)]
+        };
         terms
             .into_iter()
             .flat_map(|(flights, losses, least)| flights.into_iter().chain(losses).chain([least]))
@@ -251,39 +248,39 @@ impl Coefficients {
     }
 
     /// Of each amount of a medium of voxels.
-    fn along_amounts(&self, deciding: &Deciding) -> Vec<Term> {
-        let none = || vec![0.0; deciding.count()];
+    fn along_amounts(&self, techniques: &Techniques) -> Vec<Term> {
+        let none = || vec![0.0; techniques.count()];
         let mut terms = Vec::new();
         for component in &self.components {
             for column in &component.columns {
-                let values = deciding.values(column);
+                let values = techniques.values(column);
                 terms.push(match self.by_extinction {
                     true => (values, none(), 0.0),
                     false => (none(), values, least_of(column)),
                 });
             }
             if !component.scattering.is_empty() {
-                terms.push((deciding.covering(&component.scattering), none(), 0.0));
+                terms.push((covering(techniques, &component.scattering), none(), 0.0));
             }
         }
         terms
     }
 
     /// The one amount of a medium that is the same everywhere: metres.
-    fn along_metres(&self, deciding: &Deciding) -> Term {
-        let (mut flights, mut losses) = (vec![0.0; deciding.count()], vec![0.0; deciding.count()]);
+    fn along_metres(&self, techniques: &Techniques) -> Term {
+        let (mut flights, mut losses) = (vec![0.0; techniques.count()], vec![0.0; techniques.count()]);
         let mut least = 0.0;
         for component in &self.components {
             let add = |sum: &mut Vec<f64>, values: Vec<f64>| {
                 sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += component.density * value);
             };
             let absorbed = if self.by_extinction { &mut flights } else { &mut losses };
-            add(absorbed, deciding.values(&component.absorption));
+            add(absorbed, techniques.values(&component.absorption));
             if !self.by_extinction {
                 least += component.density * least_of(&component.absorption);
             }
             if !component.scattering.is_empty() {
-                add(&mut flights, deciding.covering(&component.scattering));
+                add(&mut flights, covering(techniques, &component.scattering));
             }
         }
         (flights, losses, least)
@@ -294,7 +291,7 @@ impl Coefficients {
         &self,
         scene: &Scene,
         media: &mut Media,
-        deciding: &Deciding,
+        techniques: &Techniques,
         tables: &mut Tables,
         (number, scattering): (usize, &scene::Scattering),
         list: &mut List,
@@ -323,8 +320,8 @@ impl Coefficients {
         }
         let own = &self.components[number];
         let asymmetry =
-            if own.asymmetry.is_empty() { vec![0.0; deciding.count()] } else { deciding.values(&own.asymmetry) };
-        list.push_numbers(deciding.covering(&own.scattering).into_iter().chain(asymmetry));
+            if own.asymmetry.is_empty() { vec![0.0; techniques.count()] } else { techniques.values(&own.asymmetry) };
+        list.push_numbers(covering(techniques, &own.scattering).into_iter().chain(asymmetry));
     }
 
     /// What a kind of matter counts, per density, where all channels have a say: half of the mean over channels of its share of what is
@@ -347,87 +344,40 @@ impl ComponentCoefficients {
     }
 }
 
-/// The channels whose coefficients drive the decisions of paths, one of them drawn for each path; without any, the mean over all does.
-struct Deciding(Vec<usize>);
-
-impl Deciding {
-    fn of(scene: &Scene, places: &[Filled], coefficients: &[Coefficients]) -> Deciding {
-        let channels = scene.channels.len();
-        let mut points = vec![Vec::new(); channels];
-        let mut ratio: f64 = 1.0;
-        for place in places.iter().filter(|place| scene.media[place.medium].scatters()) {
-            let of = &coefficients[place.medium];
-            let mut spread = |depth: &dyn Fn(usize) -> f64| {
-                let depths: Vec<f64> = (0..channels).map(|k| (depth(k) * place.extent).max(LEAST_DEPTH)).collect();
-                let least = depths.iter().copied().fold(f64::INFINITY, f64::min);
-                ratio = ratio.max(depths.iter().copied().fold(0.0, f64::max) / least);
-                depths
-            };
-            spread(&|k| of.components.iter().map(|component| of.deciding(component, k)).sum());
-            for component in &of.components {
-                let depths = spread(&|k| of.deciding(component, k));
-                points.iter_mut().zip(depths).for_each(|(point, depth)| point.push(depth.ln()));
-                let asymmetries = points.iter_mut().zip(&component.asymmetry);
-                asymmetries.for_each(|(point, g)| point.push(((1.0 + g) / (1.0 - g)).ln()));
+/// Lets media that scatter ask for techniques: by the ratios of the optical depths of bodies from end to end.
+fn ask(scene: &Scene, places: &[Filled], coefficients: &[OfMedium], asking: &mut Asking) {
+    let channels = scene.channels.len();
+    let mut ratio: f64 = 1.0;
+    for place in places.iter().filter(|place| scene.media[place.medium].scatters()) {
+        let of = &coefficients[place.medium];
+        let mut spread = |depth: &dyn Fn(usize) -> f64| {
+            let depths: Vec<f64> = (0..channels).map(|k| (depth(k) * place.extent).max(LEAST_DEPTH)).collect();
+            let least = depths.iter().copied().fold(f64::INFINITY, f64::min);
+            ratio = ratio.max(depths.iter().copied().fold(0.0, f64::max) / least);
+            depths
+        };
+        spread(&|k| of.components.iter().map(|component| of.deciding(component, k)).sum());
+        for component in &of.components {
+            let depths = spread(&|k| of.deciding(component, k));
+            asking.tell_apart(depths.into_iter().map(f64::ln));
+            if !component.asymmetry.is_empty() {
+                asking.tell_apart(component.asymmetry.iter().map(|g| ((1.0 + g) / (1.0 - g)).ln()));
             }
         }
-        let wanted = match scene.integrator.techniques {
-            Some(count) => count as usize,
-            None if ratio < SMALL_RATIO => 1,
-            None => 1 + ratio.log2().ceil() as usize,
-        };
-        match wanted.min(MOST_TECHNIQUES).min(channels) {
-            0 | 1 => Deciding(Vec::new()),
-            count => Deciding(farthest_apart(&points, count)),
-        }
     }
-
-    /// T.
-    fn count(&self) -> usize {
-        self.0.len().max(1)
-    }
-
-    /// What each technique takes of a quantity of every channel.
-    fn values(&self, by_channel: &[f64]) -> Vec<f64> {
-        match self.0.is_empty() {
-            true => vec![mean_of(by_channel)],
-            false => self.0.iter().map(|&k| by_channel[k]).collect(),
-        }
-    }
-
-    /// The same of what scatters, so that some technique goes wherever any channel does.
-    fn covering(&self, by_channel: &[f64]) -> Vec<f64> {
-        let mut values = self.values(by_channel);
-        if values.iter().all(|value| *value == 0.0) {
-            values[0] = mean_of(by_channel);
-        }
-        values
+    if ratio >= SMALL_RATIO {
+        let wanted = 1 + ratio.log2().ceil() as usize;
+        asking.ask(wanted, || format!("scattering, whose optical depths differ by a factor of {ratio:.1}"));
     }
 }
 
-/// `count` of the points, in order of choice: the two farthest apart, then always the one that is farthest from those chosen; of equal
-/// ones the first.
-fn farthest_apart(points: &[Vec<f64>], count: usize) -> Vec<usize> {
-    let distance = |a: usize, b: usize| -> f64 { points[a].iter().zip(&points[b]).map(|(a, b)| (a - b).powi(2)).sum() };
-    let mut best = (f64::NEG_INFINITY, 0, 0);
-    for a in 0..points.len() {
-        for b in a + 1..points.len() {
-            let apart = distance(a, b);
-            if apart > best.0 {
-                best = (apart, a, b);
-            }
-        }
+/// The same of what scatters, so that some technique goes wherever any channel does.
+fn covering(techniques: &Techniques, by_channel: &[f64]) -> Vec<f64> {
+    let mut values = techniques.values(by_channel);
+    if values.iter().all(|value| *value == 0.0) {
+        values[0] = mean_of(by_channel);
     }
-    let mut chosen = vec![best.1, best.2];
-    let mut nearest: Vec<f64> = (0..points.len()).map(|i| distance(i, chosen[0]).min(distance(i, chosen[1]))).collect();
-    while chosen.len() < count {
-        let farther = |best: usize, i: usize| if nearest[i] > nearest[best] { i } else { best };
-        let next = (0..points.len()).filter(|i| !chosen.contains(i)).reduce(farther);
-        let Some(next) = next else { break };
-        chosen.push(next);
-        nearest.iter_mut().enumerate().for_each(|(i, least)| *least = least.min(distance(i, next)));
-    }
-    chosen
+    values
 }
 
 /// The place of a wavelength among the columns of a table; the outermost hold.
@@ -456,7 +406,7 @@ impl Tables {
 
     /// The word of each, the first of all being `first`; then of each its numbers of rows and columns, the angles in degrees, the columns,
     /// and for each technique its phase function and the share of directions up to each row.
-    fn words(&self, scene: &Scene, deciding: &Deciding, first: u32) -> Vec<u32> {
+    fn words(&self, scene: &Scene, techniques: &Techniques, first: u32) -> Vec<u32> {
         let mut words = vec![0; self.0.len()];
         for (number, table) in self.0.iter().enumerate() {
             words[number] = first + words.len() as u32;
@@ -477,8 +427,11 @@ impl Tables {
                     .map(|(own, mean)| OWN_SHARE * own + (1.0 - OWN_SHARE) * mean)
                     .collect()
             };
-            let techniques =
-                if deciding.0.is_empty() { vec![mean.clone()] } else { deciding.0.iter().map(own).collect() };
+            let techniques = if techniques.channels.is_empty() {
+                vec![mean.clone()]
+            } else {
+                techniques.channels.iter().map(own).collect()
+            };
             for technique in techniques {
                 let shares = shares(&degrees, &technique);
                 numbers.extend(technique.into_iter().chain(shares));

@@ -1,17 +1,21 @@
 //! Materials of general scenes as devices get them: lists of lobes, tables, and the spectra that these need.
 
 use crate::device::part::{Part, Place, Records, SceneBuffer};
+use crate::device::parts::by_technique::{self, Way};
 use crate::device::parts::geometry::{FEWER_MATERIALS, MATERIALS};
 use crate::device::parts::lights::STEPS;
+use crate::device::parts::lobe_choice::{self, LobeChoice};
 use crate::device::parts::lobes::Leaf;
 use crate::device::parts::roughness;
+use crate::device::parts::techniques::{Asking, Techniques};
 use crate::device::parts::textures::{self, Share, Textures};
 use crate::device::text::{Module, module};
 use crate::device::words::{
     ALBEDO_ROW, COSINE_INTERVALS, LOBE_BASE, LOBE_BEYOND_AGAIN, LOBE_BOUNDARY_AGAIN, LOBE_CONDUCTOR,
     LOBE_CONDUCTOR_AGAIN, LOBE_LAMBERT, LOBE_MIRROR, LOBE_OPAQUE, LOBE_REFRACTION, LOBE_ROUGH_BOUNDARY,
     LOBE_ROUGH_COAT, LOBE_ROUGH_CONDUCTOR, LOBE_TEXTURED, LOBE_TRANSMITTED, LOBE_TWO_SIDED, Lobe, MASK_SHIFT,
-    MATERIAL_DIFFUSE, MATERIAL_MASK_IS_TEXTURE, MATERIAL_MASKED, MATERIAL_TRANSMITS, SurfaceMaterial,
+    MATERIAL_BY_TECHNIQUE, MATERIAL_DIFFUSE, MATERIAL_MASK_IS_TEXTURE, MATERIAL_MASKED, MATERIAL_TRANSMITS,
+    SurfaceMaterial,
 };
 use crate::scene::{Attributes, Bsdf, MaterialId, Scene, SpectrumId, Texture, TextureKind, Weight};
 use crate::spectral::hemisphere::IndexTable;
@@ -65,6 +69,10 @@ pub struct Surfaces {
     pub dispersion: bool,
     /// Some rough boundary bends each channel by itself.
     pub spread: bool,
+    /// Materials of which each technique has its own chances for the lobes.
+    pub by_technique: u32,
+    /// Some rough boundary bends paths by the indices of techniques.
+    pub bends_by_technique: bool,
     /// Where any material has some.
     pub textures: Option<Textures>,
     /// Some reflectance is a texture; of a coated base.
@@ -106,7 +114,7 @@ pub const LOBES: Part = Part {
     defines: |scene, _, defines| {
         let Some(surfaces) = &scene.surfaces else { return };
         defines.set("GENERAL", true).constant("STATE_WORDS", scene.state_bytes() / 16);
-        defines.set("THIRD_STATE", scene.state_bytes() > 32);
+        defines.set("THIRD_STATE", scene.media.is_some() || scene.disperses());
         for (name, kinds) in LOBES_OF_CODE {
             defines.set(name, kinds.iter().any(|kind| surfaces.has(*kind)));
         }
@@ -202,9 +210,22 @@ pub const KNOTS_OF_ONE_CHANNEL: Part = Part {
     ..Part::NOTHING
 };
 
-impl Surfaces {
-    /// Parts and tables of all materials of `scene`.
-    pub fn new(scene: &Scene) -> Surfaces {
+/// The materials of a scene, before it is known by how many techniques paths decide.
+pub struct Collected {
+    surfaces: Surfaces,
+    materials: Vec<OfMaterial>,
+}
+
+struct OfMaterial {
+    leaves: Vec<Leaf>,
+    mask: u32,
+    /// Whether techniques have chances of their own.
+    asks: bool,
+}
+
+impl Collected {
+    /// Parts of all materials of `scene`, which ask for techniques.
+    pub fn new(scene: &Scene, asking: &mut Asking) -> Collected {
         let carries = |f: &dyn Fn(&Attributes) -> bool| scene.objects.iter().any(|object| f(&object.attributes));
         let mut surfaces = Surfaces {
             attributes: carries(&|attributes| *attributes != Attributes::default()),
@@ -213,10 +234,32 @@ impl Surfaces {
         };
         // First in the tables, where few bits tell their places.
         let masks: Vec<u32> = scene.materials.iter().map(|material| surfaces.mask(material.opacity)).collect();
-        for (material, mask) in masks.into_iter().enumerate() {
+        let materials = masks.into_iter().enumerate().map(|(material, mask)| {
             let mut leaves = Vec::new();
             surfaces.collect(scene, material, 1.0, &[], &mut leaves);
-            surfaces.add(scene, leaves, mask);
+            OfMaterial { leaves, mask, asks: false }
+        });
+        let mut materials: Vec<OfMaterial> = materials.collect();
+        let choices = materials.iter().zip(&scene.materials).map(|(of, material)| {
+            let by_shares =
+                |albedo: &dyn Fn(&Leaf, usize) -> f64| probabilities(&of.leaves, scene.channels.len(), albedo).0;
+            LobeChoice::new(scene, &material.name, &of.leaves, by_shares)
+        });
+        let asks = lobe_choice::ask(scene, choices.collect(), asking);
+        for ((of, asks), material) in materials.iter_mut().zip(asks).zip(&scene.materials) {
+            of.asks = asks;
+            for bends in of.leaves.iter().filter_map(|leaf| leaf.bends.as_ref()) {
+                of.asks |= by_technique::ask_for_bends(&material.name, bends, asking);
+            }
+        }
+        Collected { surfaces, materials }
+    }
+
+    /// With the tables of all materials.
+    pub fn finish(self, scene: &Scene, techniques: &Techniques) -> Surfaces {
+        let Collected { mut surfaces, materials } = self;
+        for material in materials {
+            surfaces.add(scene, material, techniques);
         }
         if !scene.textures.is_empty() {
             let mut textures = Textures::new(scene, |spectrum| surfaces.spectrum(spectrum));
@@ -230,7 +273,9 @@ impl Surfaces {
         }
         surfaces
     }
+}
 
+impl Surfaces {
     pub fn has(&self, kind: Kind) -> bool {
         self.kinds >> kind as u32 & 1 == 1
     }
@@ -278,33 +323,35 @@ impl Surfaces {
         }
     }
 
-    /// Appends a material of these leaves, with the probabilities of choosing each.
-    fn add(&mut self, scene: &Scene, leaves: Vec<Leaf>, mask: u32) {
-        let channels = scene.channels.len();
-        let mut survival = 0.0f64;
-        let mut picks = vec![Vec::with_capacity(2 * (INTERVALS + 1)); leaves.len()];
-        for side in 0..2 {
-            for node in 0..=INTERVALS {
-                let cosine = node as f64 / INTERVALS as f64;
-                let albedo = |leaf: &Leaf, k: usize| match leaf.active[side] {
-                    true => f64::from(leaf.lobe.weight) * (leaf.albedo)(side == 1, cosine, k).max(0.0),
-                    false => 0.0,
-                };
-                let (q, largest) = probabilities(&leaves, channels, &albedo);
-                survival = survival.max(largest);
-                for (l, q) in q.iter().enumerate() {
-                    picks[l].push(if leaves[l].active[side] { *q as f32 } else { 0.0 });
-                }
+    /// Appends a material, with the probabilities of choosing each of its leaves.
+    fn add(&mut self, scene: &Scene, material: OfMaterial, techniques: &Techniques) {
+        let OfMaterial { mut leaves, mask, asks } = material;
+        let asks = asks && techniques.are_several();
+        let (mut picks, survival) = chances(scene, &leaves);
+        if asks {
+            let own = by_technique::tables(&leaves, techniques, &picks);
+            picks.iter_mut().zip(own).for_each(|(picks, own)| picks.extend(own));
+            self.by_technique += 1;
+        }
+        for leaf in &mut leaves {
+            if let Some(bends) = &leaf.bends {
+                let way = bends.decide(&mut leaf.lobe, techniques, |values| self.table(values));
+                self.spread |= way != Way::One;
+                self.bends_by_technique |= way == Way::ByTechnique;
             }
         }
         let diffuse = leaves.len() == 1 && leaves[0].lobe.kind & 0xff == Kind::Lambert as u32 && leaves[0].active[0];
         let diffuse = diffuse && leaves[0].lobe.weight == 1.0 && leaves[0].lobe.kind & LOBE_TEXTURED == 0;
         let diffuse = diffuse && leaves[0].shares.is_empty();
         let transmits = leaves.iter().any(|leaf| leaf.lobe.kind & LOBE_OPAQUE == 0);
+        let flag = |is: bool, flag: u32| if is { flag } else { 0 };
         self.materials.push(SurfaceMaterial {
             first_lobe: self.lobes.len() as u32,
             lobe_count: leaves.len() as u32,
-            flags: if transmits { MATERIAL_TRANSMITS } else { 0 } | if diffuse { MATERIAL_DIFFUSE } else { 0 } | mask,
+            flags: flag(transmits, MATERIAL_TRANSMITS)
+                | flag(diffuse, MATERIAL_DIFFUSE)
+                | flag(asks, MATERIAL_BY_TECHNIQUE)
+                | mask,
             survival: ((survival.min(1.0) * STEPS).ceil() / STEPS) as f32,
         });
         let spread: u32 = leaves.iter().map(|leaf| leaf.records).sum();
@@ -439,6 +486,27 @@ pub(super) fn wavelength(scene: &Scene) -> Needed {
     let [low, high] = scene.channels.hull().expect("a scene has channels");
     let curve = Curve::Linear { nm: vec![low, high], value: vec![low * 1e-3, high * 1e-3], outside: Outside::Hold };
     Needed::Exact("wavelength".into(), curve)
+}
+
+/// Chances of every leaf at [before, behind][257 cosines], by shares; and the largest albedo of all together.
+fn chances(scene: &Scene, leaves: &[Leaf]) -> (Vec<Vec<f32>>, f64) {
+    let mut survival = 0.0f64;
+    let mut picks = vec![Vec::with_capacity(2 * (INTERVALS + 1)); leaves.len()];
+    for side in 0..2 {
+        for node in 0..=INTERVALS {
+            let cosine = node as f64 / INTERVALS as f64;
+            let albedo = |leaf: &Leaf, k: usize| match leaf.active[side] {
+                true => f64::from(leaf.lobe.weight) * (leaf.albedo)(side == 1, cosine, k).max(0.0),
+                false => 0.0,
+            };
+            let (q, largest) = probabilities(leaves, scene.channels.len(), &albedo);
+            survival = survival.max(largest);
+            for (l, q) in q.iter().enumerate() {
+                picks[l].push(if leaves[l].active[side] { *q as f32 } else { 0.0 });
+            }
+        }
+    }
+    (picks, survival)
 }
 
 /// q by shares (docs/METHOD.md, Decisions) for the leaves at one cosine, and the largest albedo of all together.

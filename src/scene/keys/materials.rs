@@ -220,7 +220,7 @@ pub static DIELECTRIC: Section = Section {
             Boolean,
             "true",
             "Whether directions differ by wavelength where `eta` does: a path that is refracted then goes on for one \
-             channel, chosen at random. `false` bends all by the mean index; how much is reflected still differs by \
+             channel, chosen at random, or for all where the boundary is rough enough ([METHOD.md](METHOD.md#techniques)). `false` bends all by the mean index; how much is reflected still differs by \
              channel.",
         ),
         ROUGHNESS,

@@ -373,10 +373,11 @@ pub static INTEGRATOR: Section = Section {
             "techniques",
             Whole,
             "\"auto\"",
-            "By how many channels paths decide where light goes that matter scatters, one of them drawn for each path: the means are \
-             the same, and channels that differ much among one another make less noise with more \
-             ([METHOD.md](METHOD.md#techniques)). `auto`: one more than how often the largest optical depth of all channels halves to \
-             the smallest. With 1 the mean over channels decides.",
+            "By how many channels paths decide where light goes that matter scatters, by which lobe of a plastic, leaf or blend it goes on, \
+             and how rough dispersive glass bends it, one of them drawn for each path: the means are the same, and channels that differ \
+             much among one another make less noise with more ([METHOD.md](METHOD.md#techniques)). `auto`: as many as the scene's media, \
+             lobes and boundaries need, which `spectile plan` tells; 1 where channels hardly differ. With 1 all channels together decide, and \
+             dispersive glass whose channels bend further apart than its lobe is wide leaves one of them.",
         )
         .or("`\"auto\"`")
         .range("[1, 16]"),

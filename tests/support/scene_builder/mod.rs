@@ -315,6 +315,14 @@ pub fn table(nm: &[f64], value: &[f64]) -> Curve {
     Curve::Linear { nm: nm.to_vec(), value: value.to_vec(), outside: Outside::Hold }
 }
 
+/// Channels a nanometre wide, and a spectrum of these values in them.
+pub fn by_channel(values: &[f64]) -> (Channels, Curve) {
+    let bounds: Vec<[f64; 2]> = (0..values.len()).map(|k| [500.0 + 10.0 * k as f64, 501.0 + 10.0 * k as f64]).collect();
+    let nm = bounds.iter().flatten().copied().collect();
+    let value = values.iter().flat_map(|value| [*value; 2]).collect();
+    (Channels::from_bounds(bounds, None), Curve::Linear { nm, value, outside: Outside::Hold })
+}
+
 /// A projection so narrow that all rays of a film go to one point to within 1e-9 of the distance.
 pub fn narrow() -> Projection {
     Projection::Perspective { tan_half: DVec2::splat(1e-9) }
