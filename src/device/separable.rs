@@ -16,6 +16,7 @@ use crate::device::instructions::{
 use crate::device::parts::heat::{self, Heat, HotLeaf};
 use crate::device::parts::surfaces::Needed;
 use crate::device::spectra::SpectrumIds;
+use crate::device::words::{SEPARATES_AS_FACTOR, SEPARATES_AS_SOURCE};
 use crate::scene::{Bsdf, Reflectance, Scene, SpectrumId, Temperature, TextureKind};
 use crate::spectral::product::{Basis, Expression, Leaf, Term};
 use crate::spectral::table::SpectralTables;
@@ -81,10 +82,6 @@ impl Separable {
         self.sources.get((word >> 16) as usize)?.as_deref()
     }
 }
-
-/// Whether a spectrum id is in products where it multiplies, and where it shines.
-pub const SEPARATES_AS_FACTOR: u32 = 1;
-pub const SEPARATES_AS_SOURCE: u32 = 2;
 
 /// Which registers of a path ([`crate::device::instructions`]) hold something that does not separate: T, P, F and the T put aside.
 #[derive(Debug, Clone, Copy)]

@@ -142,6 +142,11 @@ constants! {
         COSINE_INTERVALS = 256;
         ALBEDO_ROW = 128;
     }
+    /// Of a spectrum, in factored renders of scenes that separate in part: whether it is in products where it multiplies, and where it shines.
+    SEPARABLE {
+        SEPARATES_AS_FACTOR = 1;
+        SEPARATES_AS_SOURCE = 2;
+    }
     /// Words of a texture at the head of their list.
     TEXTURES {
         TEXTURE_WORDS = 5;

@@ -241,6 +241,8 @@ impl Walker {
                 OP_PLAIN | OP_SPECTRUM => scene.factor(spectra).of_product(),
                 _ => None,
             };
+            let is_added = word & MODE_GATHER != 0 || (operation == OP_PLAIN && weight != 0.0);
+            debug_assert!(scene.has_remainder || !(is_remainder && is_added), "nobody evaluates {word:x} {spectra:x}");
             let sources = scene.sources_of(word).filter(|_| !is_remainder).unwrap_or_default();
             if operation == OP_PLAIN {
                 self.plain_vertex(value, weight, sources, mixed);

@@ -1,7 +1,9 @@
 // Which contributions of a path are of the remainder: what src/device/separable.rs (`Mixed`) says on the host, word by word, which
 // takes all others as weights.
 
-// Of each spectrum: bit 0 where it is a factor of products, bit 1 where it is a source of them.
+#constants SEPARABLE
+
+// Of each spectrum these bits.
 @group(1) @binding(17) var<storage, read> separates: array<u32>;
 
 // Which registers hold something that does not separate: T, P, F and the T put aside.
@@ -42,10 +44,10 @@ fn is_of_remainder(record: vec4<u32>, mixed: ptr<function, Mixed>) -> bool {
     if ((record.x & MODE_KEEP) != 0u) {
         return false;
     }
-    let is_source_mixed = (separates[record.x >> 16u] & 2u) == 0u;
+    let is_source_mixed = (separates[record.x >> 16u] & SEPARATES_AS_SOURCE) == 0u;
     var is_value_mixed = operation != OP_ONE;
     if (operation == OP_PLAIN || operation == OP_SPECTRUM) {
-        is_value_mixed = (separates[record.y & 0xffffu] & 1u) == 0u;
+        is_value_mixed = (separates[record.y & 0xffffu] & SEPARATES_AS_FACTOR) == 0u;
     }
     if (operation == OP_PLAIN) {
         (*mixed).throughput = (*mixed).throughput || is_value_mixed;

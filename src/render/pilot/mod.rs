@@ -57,7 +57,7 @@ const MOST_COST_OF_ONE: f64 = 4.0;
 /// Variance within a channel, over the square of the mean, that some spectrum must have for `auto` to ask samples.
 const LEAST_VARIATION: f64 = 0.05;
 
-/// Whether there is something to decide: `pt` evaluates while it traces, and factored renders evaluate nothing.
+/// Whether there is something to decide: `pt` evaluates while it traces, and factored renders evaluate what does not separate of all paths.
 pub fn is_needed(scene: &Scene, prepared: &Prepared) -> bool {
     may_thin(scene, prepared) || (is_deferred(prepared) && scene.integrator.wavelengths_per_channel.is_none())
 }
