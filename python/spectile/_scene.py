@@ -204,21 +204,25 @@ class Spectrum:
     def is_plain(self) -> bool:
         return not (self.axis or self.names)
 
-    def plain(self, reader: _Reader) -> list[list[float]]:
+    def data(self, header: list[str]) -> _spectile.Data:
+        import numpy
+
+        return _spectile.spectrum(f"{_spelt(self.path)} (array {len(self.pairs)})", header, numpy.array(self.pairs))
+
+    def plain(self, reader: _Reader, header: list[str] | None = None) -> list[list[float]]:
         """[nm, value] of a spectrum that is written where nothing is known of what it is to be."""
-        if not self.is_plain:
-            message = f"calls its numbers `{(self.names or [self.axis])[0]}`, which is not heeded here"
-            raise reader.mistake(self.path, message, "give them alone, as a pair of arrays: nm, and the unit that docs/scene.md names")
-        return self.pairs
+        if self.is_plain:
+            return self.pairs
+        samples = self.data(header or self.header).samples()
+        if samples is None:
+            message = f"calls its numbers `{', '.join(self.header)}`, which is not heeded here"
+            help = "give them alone, as a pair of arrays: nm, and the unit that docs/scene.md names"
+            raise reader.mistake(self.path, message, help)
+        return [[nm, value] for nm, value in samples]
 
     def table(self) -> dict[str, Any]:
         """As a scene has it."""
-        import numpy
-
-        if self.is_plain:
-            return {"samples": self.pairs}
-        name = f"{_spelt(self.path)} (array {len(self.pairs)})"
-        return {"file": _spectile.spectrum(name, self.header, numpy.array(self.pairs))}
+        return {"samples": self.pairs} if self.is_plain else {"file": self.data(self.header)}
 
 
 class _Reader:
@@ -274,7 +278,8 @@ class _Reader:
         import numpy
 
         attributes = getattr(value, "attrs", None)
-        for key, neutral in _PACKED.items() if isinstance(attributes, Mapping) else ():
+        attributes = attributes if isinstance(attributes, Mapping) else {}
+        for key, neutral in _PACKED.items():
             if key in attributes and attributes[key] != neutral:
                 message = f"has the attribute `{key}` = {attributes[key]}, which is not applied here"
                 raise self.mistake(path, message, "decode it, as xarray.decode_cf does, or remove the attribute")

@@ -11,7 +11,8 @@ class Draft:
     def check(self, overrides: Sequence[tuple[str, str]]) -> dict[str, Any]: ...
 
 @final
-class Data: ...
+class Data:
+    def samples(self) -> list[tuple[float, float]] | None: ...
 
 @final
 class Task:

@@ -285,7 +285,9 @@ def _write_responses(file: str, responses: Any) -> None:
             found = reader.spectrum(spectrum, (str(name),))
             if found is None:
                 raise UsageError(f"the response of band {name!r} is no spectrum; give an array [n, 2] of nm and response")
-            rows.writerows([str(name), repr(nm), repr(value)] for nm, value in found.pairs)
+            # Of responses the unit does not matter.
+            samples = found.plain(reader, [found.header[0], "value"]) if found.axis else found.pairs
+            rows.writerows([str(name), repr(nm), repr(value)] for nm, value in samples)
 
 
 def _write_spectrum(file: str, spectrum: Spectrum) -> str:

@@ -18,6 +18,12 @@ impl Data {
     fn __repr__(&self) -> String {
         format!("<{}>", self.0.name())
     }
+
+    /// [nm, value] of a spectrum that says no more of itself than a table in a scene; else None.
+    fn samples(&self) -> Option<Vec<(f64, f64)>> {
+        let (nm, value) = self.0.plain()?;
+        Some(nm.iter().copied().zip(value.iter().copied()).collect())
+    }
 }
 
 /// A picture or a grid: float32 in any number of dimensions. `name` is what messages call it; `units` and `names` are what the array says

@@ -338,10 +338,14 @@ def test_what_arrays_say_of_their_values_counts_as_in_files():
     scene["spectra"]["paint"] = {"samples": labelled(paint, long_name="leaf transmittance"), "scale": 1}
     assert any("times `scale`" in warning for warning in scene.check()["warnings"])
     air = ball()
-    air["spectra"]["paint"] = labelled(paint, xarray.DataArray(PAINT[:, 0], dims="wavelength", attrs={"long_name": "wavelength in air"}))
+    air["spectra"]["paint"] = labelled(
+        paint, xarray.DataArray(PAINT[:, 0], dims="wavelength", attrs={"long_name": "wavelength in air"})
+    )
     assert any("converted to vacuum" in warning for warning in air.check()["warnings"])
-    with pytest.raises(sp.SceneError, match="`reflectance .%.`, which is not heeded here"):
+    with pytest.raises(sp.SceneError, match="reflectance .%.`, which is not heeded here"):
         ball().check({"spectra.paint": labelled(100 * paint, name="reflectance", units="%")})
+    # A name that says nothing is no hindrance.
+    assert ball().check({"spectra.paint": labelled(paint, name="oak")})["digest"] == ball().digest
 
 
 def optional(name):
@@ -391,7 +395,12 @@ def test_what_is_masked_infinite_or_has_a_unit_is_refused():
     nm, values = PAINT.T
     packed = xarray.DataArray(values, coords={"wavelength": nm}, dims="wavelength", attrs={"scale_factor": 1e-4})
     bare = xarray.DataArray(values, dims="wavelength")
-    cases = [(masked, "masked"), (Quantity(), "unit of its own"), (packed, "attribute `scale_factor`"), (bare, "no coordinate `wavelength`")]
+    cases = [
+        (masked, "masked"),
+        (Quantity(), "unit of its own"),
+        (packed, "attribute `scale_factor`"),
+        (bare, "no coordinate `wavelength`"),
+    ]
     try:
         import pint
     except ImportError:

@@ -188,6 +188,16 @@ impl Data {
         }
     }
 
+    /// Wavelengths (nm, vacuum) and values of a spectrum that says no more of these than a table in a scene.
+    pub fn plain(&self) -> Option<(&[f64], &[f64])> {
+        match self {
+            Data::Spectrum { read: Ok(SpectrumTable { nm, value, unit: None, said: None, notes, .. }), .. } => {
+                notes.is_empty().then_some((nm, value))
+            }
+            _ => None,
+        }
+    }
+
     /// A spectrum of `pairs`, called `name`: places on an axis and values. What the `axis` and the values are called counts as in the
     /// header of a table: the first of `names` that says a unit, and the first that says a quantity.
     pub fn of_spectrum(name: String, axis: &str, names: &[String], pairs: &[[f64; 2]]) -> Data {

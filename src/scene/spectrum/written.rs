@@ -118,6 +118,9 @@ pub(super) fn file(item: &Item, column: Option<Item>, unit: Option<Item>, needed
             key.error_help("goes with the names of files only", "remove it");
             return None;
         }
+        if let Some((nm, value)) = data.plain() {
+            return Some(Data::Table { nm: nm.to_vec(), value: value.to_vec(), file: None });
+        }
         return match data.spectrum() {
             Ok(table) => Some(table_data(table, PathBuf::from(data.name()))),
             Err(problem) => {
