@@ -47,7 +47,7 @@ pub struct Bends {
 }
 
 impl Bends {
-    /// At 45 degrees, where a facet that tilts by δ densities what it refracts by about (1 - 1/η) δ. `range`: the least and the greatest index
+    /// At 45 degrees, where a facet that tilts by δ turns what it refracts by about (1 - 1/η) δ. `range`: the least and the greatest index
     /// within any channel; `eta`: their mean; `alpha`: the roughness.
     pub fn new(indices: Vec<f64>, range: [f64; 2], eta: f64, alpha: f64) -> Bends {
         let refracted = |eta: f64| (0.5f64.sqrt() / eta.max(1.0 / eta)).asin();
@@ -61,7 +61,7 @@ impl Bends {
 
     /// By how many techniques directions are as near to one another as the lobe is wide; 1 where they all are.
     fn needs(&self) -> usize {
-        if self.spread > 1.0 { 1 + self.spread.ceil() as usize } else { 1 }
+        if self.spread > 1.0 { (self.spread.ceil() as usize).saturating_add(1) } else { 1 }
     }
 }
 
