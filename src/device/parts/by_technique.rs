@@ -61,7 +61,7 @@ impl Bends {
 
     /// By how many techniques directions are as near to one another as the lobe is wide; 1 where they all are.
     fn needs(&self) -> usize {
-        if self.spread > 1.0 { 1 + self.spread.ceil() as usize } else { 1 }
+        if self.spread > 1.0 { (self.spread.ceil() as usize).saturating_add(1) } else { 1 }
     }
 }
 

@@ -171,7 +171,7 @@ impl LobeChoice {
 /// By which a technique chooses among lobes of these albedos, where all together would choose by `common`.
 pub(super) fn chances(albedos: &[f64], common: &[f64]) -> Vec<f64> {
     let all: f64 = albedos.iter().sum();
-    if !(all > 0.0) {
+    if all <= 0.0 {
         return common.to_vec();
     }
     albedos.iter().zip(common).map(|(a, common)| OWN_CHANCE * a / all + (1.0 - OWN_CHANCE) * common).collect()
