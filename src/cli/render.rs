@@ -251,6 +251,9 @@ pub(super) fn render(
     for warning in &scene.warnings {
         reporter.warn(warning)?;
     }
+    if let Some(error) = args.error.filter(|error| *error > 1.0) {
+        reporter.warn(&format!("--error {error} lets noise be {:.0} % of the picture: 1 % is 0.01", 100.0 * error))?;
+    }
     let sinks = Sinks::start(args, output, &mut reporter)?;
     let job = Job {
         output: args.output.clone(),

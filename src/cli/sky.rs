@@ -57,7 +57,7 @@ pub struct Args {
     #[arg(
         long,
         value_name = "FOLDER",
-        conflicts_with_all = ["size", "spp", "time", "uncertainty", "resume", "overwrite", "preview"]
+        conflicts_with_all = ["size", "spp", "time", "uncertainty", "seed", "resume", "overwrite", "preview"]
     )]
     pub scene: Option<PathBuf>,
 

@@ -88,6 +88,12 @@ pub(super) fn get_ready(
         }
         Err(error) => return Err(error),
     }
+    if evaluator == Evaluator::Factored && !prepared.obstacles.is_empty() {
+        let what = prepared.obstacles.join(", ");
+        observe(Event::Note(format!(
+            "light by what does not separate stays in channels, where relight cannot change it: {what} (plan --pilot says how much it is)"
+        )))?;
+    }
     if prepared.accel.degenerate > 0 {
         let what =
             format!("{} triangles without area in f32 were left out: no ray can meet them", prepared.accel.degenerate);

@@ -83,4 +83,7 @@ fn errors_are_positive_numbers() {
         assert!(output.status.code() == Some(2) && (stderr.contains("0.01 for 1 %") || bad == "-1"), "{stderr}");
     }
     assert!(!place.path().join("cube.zarr").exists());
+    // Percent are meant, perhaps.
+    let output = place.run(&["render", "scene.toml", "-o", "cube.zarr", "--error", "5", "--spp", "1"]);
+    assert!(output.status.success() && super::text(&output.stderr).contains("500 %"), "{output:?}");
 }

@@ -53,7 +53,12 @@ fn remainders_go_on_where_they_were() {
         place.render("tiles.zarr", &[TILES_OF_8, SPP, &["--tiles", tiles]].concat());
     }
     assert!(arrays(&place.cube("tiles.zarr")) == straight, "by tiles");
-    place.render("cube.zarr", &[TILES_OF_8, &["--spp", "2"]].concat());
+    let begun = place.run(&[&["render", "scene.toml", "-o", "cube.zarr", "--spp", "2"], TILES_OF_8].concat());
+    let told = text(&begun.stderr);
+    assert!(
+        begun.status.success() && told.contains("relight cannot change it: the material \"shiny\" (plastic)"),
+        "{told}"
+    );
     let again = ["render", "scene.toml", "-o", "cube.zarr", "--resume"];
     for (after_ms, devices) in [(600, "1"), (1100, "2")] {
         let mut child: Running =

@@ -102,9 +102,12 @@ impl File {
 
     fn check(&self) -> Result<(), String> {
         let asset = &self.root.asset;
-        let version = asset.min_version.as_ref().unwrap_or(&asset.version);
-        if version.split('.').next() != Some("2") {
-            return Err(format!("is glTF of version {}: only 2 is supported", version.escape_debug()));
+        if asset.version.split('.').next() != Some("2") {
+            return Err(format!("is glTF of version {}: only 2 is supported", asset.version.escape_debug()));
+        }
+        // Files of a later minor version may be read as 2.0, unless they say otherwise.
+        if let Some(least) = asset.min_version.as_ref().filter(|least| *least != "2.0") {
+            return Err(format!("asks for readers of glTF {}: only 2.0 is supported", least.escape_debug()));
         }
         let is_known = |name: &&String| name.starts_with("KHR_materials_") || KNOWN.contains(&name.as_str());
         match self.root.extensions_required.iter().find(|name| !is_known(name)) {

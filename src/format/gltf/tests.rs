@@ -186,6 +186,7 @@ fn mistakes_have_a_path() {
         (r#"{"mesh": 0}"#, r#"{"mesh": 0, "rotation": [0, 0, 0, 0]}"#, "`nodes[0].rotation` is no rotation"),
         (r#""mode": 5"#, r#""mode": 5, "material": 9"#, "`meshes[0].primitives[0].material` names material 9"),
         (r#""2.0""#, r#""1.0""#, "is glTF of version 1.0: only 2 is supported"),
+        (r#""2.0""#, r#""2.1", "minVersion": "2.1""#, "asks for readers of glTF 2.1: only 2.0 is supported"),
         (
             r#""nodes""#,
             r#""extensionsRequired": ["EXT_meshopt_compression"], "nodes""#,
