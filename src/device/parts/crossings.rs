@@ -7,7 +7,7 @@ use crate::device::words::{KIND_INSTANCE, Primitive};
 use crate::scene::Scene;
 
 /// What bounds the volumes of a scene: primitives of the world, and those of assemblies at each place where they are.
-pub struct Surfaces<'a> {
+pub struct Boundaries<'a> {
     accel: &'a Accel,
     /// Primitives and the numbers of what is behind them.
     of_world: Vec<(u32, u32)>,
@@ -16,10 +16,10 @@ pub struct Surfaces<'a> {
     instances: Vec<(u32, usize)>,
 }
 
-impl<'a> Surfaces<'a> {
+impl<'a> Boundaries<'a> {
     /// `boundaries`: for each primitive the number of the volume behind it in the low byte, or 0.
     pub fn new(scene: &Scene, accel: &'a Accel, boundaries: &[u32]) -> Self {
-        let mut surfaces = Surfaces {
+        let mut found = Boundaries {
             accel,
             of_world: Vec::new(),
             of_assemblies: vec![Vec::new(); scene.assemblies.len()],
@@ -28,15 +28,15 @@ impl<'a> Surfaces<'a> {
         let assembly = |primitive: usize| scene.objects[accel.objects[primitive] as usize].assembly;
         for (primitive, number) in boundaries.iter().map(|boundary| boundary & 0xff).enumerate() {
             if number != 0 {
-                let list = assembly(primitive).map_or(&mut surfaces.of_world, |of| &mut surfaces.of_assemblies[of]);
+                let list = assembly(primitive).map_or(&mut found.of_world, |of| &mut found.of_assemblies[of]);
                 list.push((primitive as u32, number));
             }
         }
         let is_instance = |(_, primitive): &(usize, &Primitive)| primitive.tag >> 24 == KIND_INSTANCE;
         let instances = accel.primitives.iter().enumerate().filter(is_instance);
         let of = instances.filter_map(|(instance, _)| Some((instance as u32, assembly(instance)?)));
-        surfaces.instances = of.filter(|(_, of)| !surfaces.of_assemblies[*of].is_empty()).collect();
-        surfaces
+        found.instances = of.filter(|(_, of)| !found.of_assemblies[*of].is_empty()).collect();
+        found
     }
 
     /// All of them, in device units of the world.

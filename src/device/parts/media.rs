@@ -4,7 +4,7 @@ use glam::{DAffine3, DVec3};
 
 use crate::device::accel::Accel;
 use crate::device::part::{Part, Place, Records, SceneBuffer};
-use crate::device::parts::crossings::Surfaces;
+use crate::device::parts::crossings::Boundaries;
 use crate::device::parts::origins::{Cut, Origins};
 use crate::device::parts::surfaces::{Needed, wavelength};
 use crate::device::text::{Module, module};
@@ -259,7 +259,7 @@ impl Media {
             of_object[object as usize] | if null { NULL_BOUNDARY } else { 0 }
         };
         let boundaries: Vec<u32> = accel.primitives.iter().zip(&accel.objects).map(boundary).collect();
-        let surfaces = Surfaces::new(scene, accel, &boundaries);
+        let world = Boundaries::new(scene, accel, &boundaries);
         let bodies: usize = volumes.iter().map(|volume| volume.times(scene)).sum();
         let mut media = Media {
             volumes: vec![0; HEAD],
@@ -284,7 +284,7 @@ impl Media {
         media.volumes.resize(HEAD + WORDS * volumes.len(), 0);
         media.volumes[0] = (1.0 / accel.space.scale as f32).to_bits();
         let within: Vec<Option<Curve>> = (0..volumes.len())
-            .map(|i| product_of_indices(scene, &volumes, &media.bodies_around(i as u32 + 1, &surfaces)))
+            .map(|i| product_of_indices(scene, &volumes, &media.bodies_around(i as u32 + 1, &world)))
             .collect();
         for (index, (volume, within)) in volumes.iter_mut().zip(within).enumerate() {
             volume.index = within;
@@ -295,7 +295,7 @@ impl Media {
                 extent: extent(scene, accel, volume.interior.as_ref()),
             });
         }
-        media.place_camera(scene, accel, &surfaces)?;
+        media.place_camera(scene, accel, &world)?;
         Ok(Some(media))
     }
 
@@ -516,7 +516,7 @@ impl Media {
 
     /// Notes the volumes around the camera, the innermost in the low byte; where boundaries cut its lens or window, those around a
     /// place there, from which devices find those of each ray.
-    fn place_camera(&mut self, scene: &Scene, accel: &Accel, surfaces: &Surfaces) -> Result<()> {
+    fn place_camera(&mut self, scene: &Scene, accel: &Accel, boundaries: &Boundaries) -> Result<()> {
         let mut place = (scene.camera.position - accel.space.center) * accel.space.scale;
         if let Projection::Pushbroom { lines, .. } = &scene.camera.projection {
             // Any place of the track does, to which straight ways lead from all others; one that is on no boundary that a model is likely to have.
@@ -525,12 +525,12 @@ impl Media {
             place = self.start_everywhere((middle - accel.space.center) * accel.space.scale);
         } else if let Some(origins) = Origins::of(scene, &accel.space) {
             let mut cuts: Vec<Cut> = Vec::new();
-            surfaces.each(|primitive, _| cuts.extend(origins.cut(primitive)));
+            boundaries.each(|primitive, _| cuts.extend(origins.cut(primitive)));
             if !cuts.is_empty() {
                 place = self.start_everywhere(origins.place_apart_from(&cuts));
             }
         }
-        let around = self.around(place, surfaces);
+        let around = self.around(place, boundaries);
         if around.len() > 8 {
             return Err(Error::input(&scene.file, "the camera is inside more than 8 nested media"));
         }
@@ -549,16 +549,16 @@ impl Media {
     }
 
     /// Volume `number` and those around it, as they are at one place of its surface; the innermost first.
-    fn bodies_around(&self, number: u32, surfaces: &Surfaces) -> Vec<u32> {
-        let around = surfaces.place_on(number).map(|place| self.around(place, surfaces)).unwrap_or_default();
+    fn bodies_around(&self, number: u32, boundaries: &Boundaries) -> Vec<u32> {
+        let around = boundaries.place_on(number).map(|place| self.around(place, boundaries)).unwrap_or_default();
         let outer = around.into_iter().filter(|other| *other != number);
         std::iter::once(number).chain(outer).collect()
     }
 
     /// The volumes around a point in device units, the innermost first.
-    fn around(&self, point: DVec3, surfaces: &Surfaces) -> Vec<u32> {
+    fn around(&self, point: DVec3, boundaries: &Boundaries) -> Vec<u32> {
         let outer = (self.outer != NONE).then(|| self.outer + 1);
-        surfaces.bodies_around(point).into_iter().chain(outer).collect()
+        boundaries.bodies_around(point).into_iter().chain(outer).collect()
     }
 }
 

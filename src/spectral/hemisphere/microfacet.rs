@@ -18,7 +18,8 @@ use super::{fresnel, recent};
 /// Nodes along the cosine, and around the normal over a quarter turn.
 const COSINES: usize = 128;
 const AZIMUTHS: usize = 33;
-/// Points of the lattice for a node of a table, and its generator: two Fibonacci numbers. Off by at most 4e-5.
+/// Points of the lattice for a node of a table, and its generator: two Fibonacci numbers. Off by at most
+/// 4e-5 (measured for α from 0.001 to 1 and indices of 1.33 and 1.5).
 pub(super) const LATTICE: (usize, usize) = (4_181, 2_584);
 /// The same where some of what is seen is totally reflected, an edge in the integrand: off by up to 5e-4.
 const LATTICE_OF_DENSER: (usize, usize) = (10_946, 6_765);
