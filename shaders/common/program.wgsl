@@ -1,9 +1,9 @@
 // What the operations of records (common/record.wgsl) mean, for a quad of channels.
 
 #if OP_FRESNEL
-// Reflectance of a boundary at cosine `c`, index `eta` beyond over before (`spectral::hemisphere::fresnel`: no differences of nearly equal
+// Reflectance of a boundary at cosines `c`, indices `eta` beyond over before (`spectral::hemisphere::fresnel`: no differences of nearly equal
 // numbers).
-fn fresnel_dielectric(c: f32, eta: vec4<f32>) -> vec4<f32> {
+fn fresnel_dielectric(c: vec4<f32>, eta: vec4<f32>) -> vec4<f32> {
     let excess = (eta - 1.0) * (eta + 1.0);
     let square = excess + c * c;
     let t = sqrt(max(square, vec4<f32>(0.0)));
@@ -67,18 +67,6 @@ fn bending_index(eta: vec4<f32>) -> vec4<f32> {
     return select(eta, 1.0 + select(vec4<f32>(-1.0e-4), vec4<f32>(1.0e-4), away >= vec4<f32>(0.0)), abs(away) < vec4<f32>(1.0e-4));
 }
 
-// Reflectances at a cosine of each channel's own, as `fresnel_dielectric` has them.
-fn fresnel_of_cosines(c: vec4<f32>, eta: vec4<f32>) -> vec4<f32> {
-    let excess = (eta - 1.0) * (eta + 1.0);
-    let square = excess + c * c;
-    let t = sqrt(max(square, vec4<f32>(0.0)));
-    let s = excess / max((c + t) * (c + t), vec4<f32>(1.0e-30));
-    let e = eta * eta * c + t;
-    let p = excess * ((excess + 2.0) * c * c - 1.0) / max(e * e, vec4<f32>(1.0e-30));
-    let partial = 0.5 * (s * s + p * p);
-    return select(min(select(partial, vec4<f32>(1.0), square <= vec4<f32>(0.0)), vec4<f32>(1.0)), vec4<f32>(0.0), excess == vec4<f32>(0.0));
-}
-
 fn rough_transmit(eta_in: vec4<f32>, alpha: f32, cos_o: f32, i: vec3<f32>) -> vec4<f32> {
     let eta = bending_index(eta_in);
     let o = vec3<f32>(sqrt(max(0.0, (1.0 - cos_o) * (1.0 + cos_o))), 0.0, cos_o);
@@ -95,7 +83,7 @@ fn rough_transmit(eta_in: vec4<f32>, alpha: f32, cos_o: f32, i: vec3<f32>) -> ve
     let slope2 = (hx * hx + hy * hy) / (alpha * alpha) + hz * hz;
     let distribution = 1.0 / (PI * alpha * alpha * slope2 * slope2);
     let geometric = distribution * o_h * -i_h / max(sum * sum, vec4<f32>(1.0e-30));
-    let passes = 1.0 - fresnel_of_cosines(clamp(o_h, vec4<f32>(0.0), vec4<f32>(1.0)), eta_in);
+    let passes = 1.0 - fresnel_dielectric(clamp(o_h, vec4<f32>(0.0), vec4<f32>(1.0)), eta_in);
     return select(vec4<f32>(0.0), geometric * passes, (o_h > vec4<f32>(0.0)) & (i_h < vec4<f32>(0.0)));
 }
 #endif
@@ -163,7 +151,7 @@ fn operation_value(record: vec4<u32>, raw: vec4<f32>, quad: u32, s: SpectralSamp
 #if OP_FRESNEL
         case OP_FRESNEL, OP_TRANSMIT: {
             let eta = select(index, 1.0 / index, (record.x & MODE_BEHIND) != 0u);
-            let reflected = fresnel_dielectric(parameter, eta);
+            let reflected = fresnel_dielectric(vec4<f32>(parameter), eta);
             if (operation == OP_FRESNEL) {
                 return reflected;
             }

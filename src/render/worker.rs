@@ -132,8 +132,6 @@ struct Pending {
     submission: wgpu::SubmissionIndex,
     /// The number of its last wave.
     last_wave: u64,
-    /// Of each pixel.
-    samples: u32,
     proof: Proof,
 }
 
@@ -314,7 +312,7 @@ impl Worker {
         buffer::map(staging);
         *of_slot = units.to_vec();
         let (last_wave, proof) = (self.submitted, self.proof(units, epoch_samples));
-        let before = self.pending.replace(Pending { slot, submission, last_wave, samples: epoch_samples, proof });
+        let before = self.pending.replace(Pending { slot, submission, last_wave, proof });
         #[cfg(test)]
         self.gpu.faults.reach(Phase::Transfer, &self.gpu);
         drop(watched);
@@ -402,11 +400,11 @@ impl Worker {
         };
         *is_mapped = true;
         let mut counters: Counters = bytemuck::pod_read_unaligned(&view[view.len() - size_of::<Counters>()..]);
-        let on_device = self.evaluate.as_ref().and_then(|_| counters.missing(&pending.proof));
-        let weights = self.gather.as_mut().map(|gather| gather.finish(pending.slot, &mut counters));
         // Who walks records sees each path once, whatever channels there are.
-        let slots = units.len() as u64 * u64::from(self.plan.tile_pixels());
-        let walked = Proof { folded: slots * u64::from(pending.samples), ..pending.proof };
+        let walked = pending.proof;
+        let evaluated = Proof { folded: walked.folded * u64::from(self.shape.blocks), ..walked };
+        let on_device = self.evaluate.as_ref().and_then(|_| counters.missing(&evaluated));
+        let weights = self.gather.as_mut().map(|gather| gather.finish(pending.slot, &mut counters));
         let on_host = weights.as_ref().and_then(|_| counters.missing(&walked));
         if let Some(what) = on_device.or(on_host) {
             let what = format!("{}: a unit came back incomplete: {what}", self.gpu.name);
@@ -434,14 +432,14 @@ impl Worker {
         self.pending.is_none()
     }
 
-    /// What the counters must show after the last wave of `units`.
+    /// What the counters must show after the last wave of `units`, where each path is seen once.
     fn proof(&self, units: &[UnitRect], epoch_samples: u32) -> Proof {
         let samples = u64::from(epoch_samples);
         let pixels = |[x0, y0, x1, y1]: &UnitRect| u64::from(x1 - x0) * u64::from(y1 - y0);
         let slots = units.len() as u64 * u64::from(self.plan.tile_pixels());
         Proof {
             paths: units.iter().map(pixels).sum::<u64>() * samples,
-            folded: slots * samples * u64::from(self.shape.blocks),
+            folded: slots * samples,
             sequence: sequence(self.submitted),
         }
     }

@@ -1,10 +1,10 @@
 //! Weights of products of spectra: closed forms, the f64 reference under spectra that the render never saw, and the same paths as
 //! without.
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use spectile::device::separable;
 use spectile::render::wave::Budget;
-use spectile::scene::{Cone, Filter, Profile, Projection, Scene, Sides, Weight};
+use spectile::scene::{Cone, Filter, Profile, Scene, Sides, Weight};
 use spectile::spectral::{Channels, Curve, Outside};
 
 use crate::device::{Settings, assert_rendered_as_reference, render, render_relit};
@@ -124,13 +124,7 @@ fn plain(paints: Paints) -> Scene {
 }
 
 fn corner() -> Builder {
-    let projection = Projection::Perspective { tan_half: DVec2::new(0.7, 0.5) };
-    Builder::new()
-        .camera(look(DVec3::new(0.2, 0.3, 2.2), DVec3::ZERO, DVec3::Y, projection))
-        .film(7, 5, Filter::Box)
-        .channels(Channels::equal(400.0, 700.0, 6))
-        .bounces(4)
-        .roulette(3)
+    Builder::new().into_corner().roulette(3)
 }
 
 /// What makes a scene general and separates still: endmembers, a blend, a leaf, an opacity, a point, a spot and a sun.

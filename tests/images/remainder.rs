@@ -1,11 +1,9 @@
 //! Factored renders of scenes that separate in part: weights and remainder together are the picture, whatever a path meets.
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use spectile::device::separable;
 use spectile::render::wave::Budget;
-use spectile::scene::{
-    Bsdf, Field, Filter, Projection, Reflectance, Scene, Shape, Sides, TextureKind, Wavelengths, Weight,
-};
+use spectile::scene::{Bsdf, Field, Reflectance, Scene, Shape, Sides, TextureKind, Wavelengths, Weight};
 use spectile::spectral::{Channels, Curve, Outside};
 
 use crate::device::{Settings, assert_rendered_as_reference, parts_of, render, render_paths_of_weights, render_relit};
@@ -18,19 +16,11 @@ use crate::statistics::Bound;
 fn corner() -> Builder {
     let floor = quad(DVec3::new(-2.0, -1.0, 2.0), 4.0 * DVec3::X, 4.0 * DVec3::NEG_Z);
     let wall = quad(DVec3::new(-2.0, -1.0, -1.0), 4.0 * DVec3::X, 3.0 * DVec3::Y);
-    view()
+    Builder::new()
+        .into_corner()
         .diffuse(floor, steps([0.5, 0.6, 0.2, 0.8, 0.1, 0.9]))
         .diffuse(wall, steps([0.9, 0.3, 0.8, 0.2, 0.7, 0.5]))
         .lamp(sphere(DVec3::new(-0.5, 1.2, 0.4), 0.2), steps([9.0, 20.0, 3.0, 40.0, 5.0, 6.0]), Sides::Front)
-}
-
-fn view() -> Builder {
-    let projection = Projection::Perspective { tan_half: DVec2::new(0.7, 0.5) };
-    Builder::new()
-        .camera(look(DVec3::new(0.2, 0.3, 2.2), DVec3::ZERO, DVec3::Y, projection))
-        .film(7, 5, Filter::Box)
-        .channels(Channels::equal(400.0, 700.0, 6))
-        .bounces(4)
 }
 
 /// One value in each of the six channels.
@@ -164,7 +154,8 @@ fn what_separates_is_relit_beside_what_does_not() {
         let floor = |builder: Builder, x: f64, paint: Curve| {
             builder.diffuse(quad(DVec3::new(x, -1.0, 2.0), 2.0 * DVec3::X, 4.0 * DVec3::NEG_Z), paint)
         };
-        let builder = view().black(quad(DVec3::new(0.1, -3.0, 3.0), 6.0 * DVec3::NEG_Z, 6.0 * DVec3::Y));
+        let builder =
+            Builder::new().into_corner().black(quad(DVec3::new(0.1, -3.0, 3.0), 6.0 * DVec3::NEG_Z, 6.0 * DVec3::Y));
         let builder = floor(builder, -1.9, paint);
         let builder = floor(builder, 0.1, Curve::Constant(0.4));
         builder

@@ -122,11 +122,7 @@ pub(super) fn tables(leaves: &[Leaf], techniques: &Techniques, common: &[Vec<f32
             let by_shares: Vec<f64> =
                 common.iter().map(|picks| f64::from(picks[side * (INTERVALS + 1) + node])).collect();
             for &k in &techniques.channels {
-                let albedo = |leaf: &Leaf| match leaf.active[side] {
-                    true => f64::from(leaf.lobe.weight) * (leaf.albedo)(side == 1, cosine, k).max(0.0),
-                    false => 0.0,
-                };
-                let albedos: Vec<f64> = leaves.iter().map(albedo).collect();
+                let albedos: Vec<f64> = leaves.iter().map(|leaf| leaf.scattered(side == 1, cosine, k)).collect();
                 for (table, chance) in tables.iter_mut().zip(chances(&albedos, &by_shares)) {
                     table.push(chance as f32);
                 }

@@ -446,11 +446,7 @@ impl HotLeaf {
             Reflectance::Spectrum(spectrum) => curve(spectrum),
             Reflectance::Texture(texture) => Cow::Owned(textures::mean_reflectance(scene, texture)),
         };
-        let share = |&(texture, missing): &Share| {
-            let mean = textures::mean_number(&scene.textures[texture]);
-            if missing { 1.0 - mean } else { mean }
-        };
-        let weight = self.weight * self.shares.iter().map(share).product::<f64>();
+        let weight = self.weight * textures::mean_share(scene, &self.shares);
         let temperatures = match self.temperature {
             Temperature::Constant(kelvin) => vec![(1.0, kelvin)],
             Temperature::Texture(texture) => textures::typical_numbers(&scene.textures[texture]),

@@ -26,6 +26,8 @@ pub struct LobeChoice {
     nodes: Vec<Node>,
     /// Lobes that go different ways.
     count: usize,
+    /// Of a world of nothing else, in the channel that has most of it, by shares.
+    excess: f64,
 }
 
 /// At one cosine.
@@ -70,13 +72,11 @@ impl LobeChoice {
         leaves: &[Leaf],
         by_shares: impl Fn(&dyn Fn(&Leaf, usize) -> f64) -> Vec<f64>,
     ) -> Option<LobeChoice> {
-        let bounces = scene.integrator.max_bounces;
         let sides =
             [false, true].into_iter().filter(|behind| leaves.iter().any(|leaf| leaf.active[usize::from(*behind)]));
         let choices = sides.map(|behind| LobeChoice::from_side(scene, material, leaves, behind, &by_shares));
         // From which channels differ more.
-        let of = |choice: LobeChoice| (choice.largest_excess(bounces), choice);
-        choices.map(of).reduce(|a, b| if b.0 > a.0 { b } else { a }).map(|(_, choice)| choice)
+        choices.reduce(|a, b| if b.excess > a.excess { b } else { a })
     }
 
     fn from_side(
@@ -90,22 +90,10 @@ impl LobeChoice {
         let ways = ways(leaves);
         let count = ways.iter().max().map_or(0, |last| last + 1);
         let channels = scene.channels.len();
-        let shares: Vec<f64> = leaves
-            .iter()
-            .map(|leaf| {
-                let share = |(texture, missing): &textures::Share| {
-                    let mean = textures::mean_number(&scene.textures[*texture]);
-                    if *missing { 1.0 - mean } else { mean }
-                };
-                leaf.shares.iter().map(share).product()
-            })
-            .collect();
+        let shares: Vec<f64> = leaves.iter().map(|leaf| textures::mean_share(scene, &leaf.shares)).collect();
         let node = |i: usize| {
             let cosine = ((i as f64 + 0.5) / NODES as f64).sqrt();
-            let albedo = |leaf: &Leaf, k: usize| match leaf.active[usize::from(behind)] {
-                true => f64::from(leaf.lobe.weight) * (leaf.albedo)(behind, cosine, k).max(0.0),
-                false => 0.0,
-            };
+            let albedo = |leaf: &Leaf, k: usize| leaf.scattered(behind, cosine, k);
             let mut albedos = vec![0.0; channels * count];
             for k in 0..channels {
                 for ((way, leaf), share) in ways.iter().zip(leaves).zip(&shares) {
@@ -120,7 +108,11 @@ impl LobeChoice {
             }
             Node { measure: 1.0 / NODES as f64, albedos, common }
         };
-        LobeChoice { material: material.to_owned(), nodes: (0..NODES).map(node).collect(), count }
+        let nodes = (0..NODES).map(node).collect();
+        let mut choice = LobeChoice { material: material.to_owned(), nodes, count, excess: 1.0 };
+        let of_channel = |k: usize| excess(choice.moments(k, None), scene.integrator.max_bounces);
+        choice.excess = choice.channels().map(of_channel).fold(1.0, f64::max);
+        choice
     }
 
     fn channels(&self) -> Range<usize> {
@@ -143,11 +135,6 @@ impl LobeChoice {
             moments[1] += node.measure * terms.map(|(a, q)| a * a / q).sum::<f64>();
         }
         moments
-    }
-
-    /// Of a world of nothing else, in the channel that has most of it, by shares.
-    fn largest_excess(&self, bounces: u32) -> f64 {
-        self.channels().map(|k| excess(self.moments(k, None), bounces)).fold(1.0, f64::max)
     }
 
     /// Of each lobe, in each channel: the logarithm of its chance over that by shares, times what the material scatters, as dark ones
@@ -213,40 +200,24 @@ impl LobeChoices {
 
 /// Lets the lobes of all materials ask, and tells which have chances by technique. In a factored render nobody knows what
 /// spectra will be.
-pub(super) fn ask(scene: &Scene, mut choices: Vec<Option<LobeChoice>>, asking: &mut Asking) -> Vec<bool> {
-    let bounces = scene.integrator.max_bounces;
+pub(super) fn ask(scene: &Scene, choices: Vec<Option<LobeChoice>>, asking: &mut Asking) -> Vec<bool> {
+    let nobody = vec![false; choices.len()];
     let least = if asking.is_demanded() { NO_EXCESS } else { SMALL_EXCESS_OF_ONE };
-    let mut differ: Vec<bool> = choices
-        .iter()
-        .map(|choice| choice.as_ref().is_some_and(|choice| choice.largest_excess(bounces) >= least))
-        .collect();
-    if asking.most() < 2 || scene.is_factored() && !asking.is_demanded() || !differ.contains(&true) {
-        return vec![false; differ.len()];
+    let differs = |choice: &Option<LobeChoice>| choice.as_ref().is_some_and(|choice| choice.excess >= least);
+    if asking.most() < 2 || scene.is_factored() && !asking.is_demanded() || !choices.iter().any(differs) {
+        return nobody;
     }
     let areas = areas(scene);
-    let all: f64 = areas.iter().sum();
-    let share = |area: &f64| area / all.max(f64::MIN_POSITIVE);
-    let names: Vec<String> = choices
-        .iter()
-        .zip(&differ)
-        .zip(&areas)
-        .filter(|((_, differs), area)| **differs && **area > 0.0)
-        .filter_map(|((choice, _), _)| choice.as_ref().map(|choice| choice.material.clone()))
-        .collect();
-    for (differs, area) in differ.iter_mut().zip(&areas) {
-        *differs &= *area > 0.0;
-    }
-    let coordinates: Vec<Vec<f64>> = choices
-        .iter()
-        .zip(&differ)
-        .filter_map(|(choice, differs)| choice.as_ref().filter(|_| *differs))
-        .flat_map(LobeChoice::coordinates)
-        .collect();
-    let choices =
-        choices.iter_mut().zip(&areas).filter_map(|(choice, area)| Some((share(area), choice.take()?))).collect();
-    let choices = LobeChoices { choices, bounces, channels: scene.channels.len() };
+    let differ: Vec<bool> = choices.iter().zip(&areas).map(|(choice, area)| differs(choice) && *area > 0.0).collect();
+    let of_those =
+        || choices.iter().zip(&differ).filter(|(_, differs)| **differs).filter_map(|(choice, _)| choice.as_ref());
+    let names: Vec<String> = of_those().map(|choice| choice.material.clone()).collect();
+    let coordinates: Vec<Vec<f64>> = of_those().flat_map(LobeChoice::coordinates).collect();
+    let all: f64 = areas.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+    let choices = choices.into_iter().zip(areas).filter_map(|(choice, area)| Some((area / all, choice?))).collect();
+    let choices = LobeChoices { choices, bounces: scene.integrator.max_bounces, channels: scene.channels.len() };
     if names.is_empty() || !asking.is_demanded() && choices.largest_excess() < SMALL_EXCESS {
-        return vec![false; differ.len()];
+        return nobody;
     }
     asking.ask_for_lobes(choices, names, coordinates);
     differ

@@ -37,6 +37,16 @@ pub(super) struct Leaf {
     pub records: u32,
 }
 
+impl Leaf {
+    /// Of flux that arrives at `cosine` from before or `behind`: what its material scatters by it in channel `k`.
+    pub fn scattered(&self, behind: bool, cosine: f64, k: usize) -> f64 {
+        match self.active[usize::from(behind)] {
+            true => f64::from(self.lobe.weight) * (self.albedo)(behind, cosine, k).max(0.0),
+            false => 0.0,
+        }
+    }
+}
+
 impl Surfaces {
     pub(super) fn diffuse(&mut self, scene: &Scene, reflectance: Reflectance) -> Vec<Leaf> {
         let means = match reflectance {

@@ -495,10 +495,7 @@ fn chances(scene: &Scene, leaves: &[Leaf]) -> (Vec<Vec<f32>>, f64) {
     for side in 0..2 {
         for node in 0..=INTERVALS {
             let cosine = node as f64 / INTERVALS as f64;
-            let albedo = |leaf: &Leaf, k: usize| match leaf.active[side] {
-                true => f64::from(leaf.lobe.weight) * (leaf.albedo)(side == 1, cosine, k).max(0.0),
-                false => 0.0,
-            };
+            let albedo = |leaf: &Leaf, k: usize| leaf.scattered(side == 1, cosine, k);
             let (q, largest) = probabilities(leaves, scene.channels.len(), &albedo);
             survival = survival.max(largest);
             for (l, q) in q.iter().enumerate() {

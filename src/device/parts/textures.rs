@@ -170,8 +170,17 @@ pub fn visible_place() -> Curve {
 }
 
 /// The mean over the texels of one number.
-pub fn mean_number(texture: &Texture) -> f64 {
+fn mean_number(texture: &Texture) -> f64 {
     texture.texels.iter().map(|v| f64::from(*v)).sum::<f64>() / texture.texels.len() as f64
+}
+
+/// What blend textures leave of something, on the mean.
+pub fn mean_share(scene: &Scene, shares: &[Share]) -> f64 {
+    let mean = |&(texture, missing): &Share| {
+        let mean = mean_number(&scene.textures[texture]);
+        if missing { 1.0 - mean } else { mean }
+    };
+    shares.iter().map(mean).product()
 }
 
 /// Numbers of a texture above 0 that stand for all of them, each with its share of the texels: the largest of some of equally

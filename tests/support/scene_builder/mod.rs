@@ -56,7 +56,6 @@ impl Builder {
         self
     }
 
-    /// A film without crop.
     /// 3 x 3 pixels of a room between (-1, -1, -1) and (1, 1, 3), seen from its open end.
     pub fn into_room(self) -> Self {
         let projection = Projection::Perspective { tan_half: DVec2::splat(0.5) };
@@ -64,6 +63,14 @@ impl Builder {
         self.camera(camera).film(3, 3, Filter::Box)
     }
 
+    /// 7 x 5 pixels of what stands in a corner around the origin, in six channels of the visible.
+    pub fn into_corner(self) -> Self {
+        let projection = Projection::Perspective { tan_half: DVec2::new(0.7, 0.5) };
+        let camera = look(DVec3::new(0.2, 0.3, 2.2), DVec3::ZERO, DVec3::Y, projection);
+        self.camera(camera).film(7, 5, Filter::Box).channels(Channels::equal(400.0, 700.0, 6)).bounces(4)
+    }
+
+    /// A film without crop.
     pub fn film(mut self, width: u32, height: u32, filter: Filter) -> Self {
         self.0.film = Film { width, height, filter, crop: [0, 0, width, height] };
         self
