@@ -4,8 +4,8 @@ makes of it.
     measure.py --spectile PROGRAM [-o FOLDER] [--scenes NAMES] [--channels K,K] [--choices NAMES]
                [--rounds N] [--minutes N] [--gas FOLDER]
 
-What was measured is kept in FOLDER/measured.jsonl, a line a render, and not measured again: so it can be done in parts. Each choice renders the same picture for some epochs. Time is that of the epochs, compilation and the pilot apart; processor time on
-software devices. The choices of a scene and number of channels take turns. Error is the cube's own estimate from the spread of its epochs, one for each channel:
+What was measured is kept in FOLDER/measured.jsonl, a line a render, and not measured again: so it can be done in parts. Each choice renders the same picture for some epochs. Time is the median of the epochs'
+after the first, so compilation and the pilot are apart; processor time on software devices. The choices of a scene and number of channels take turns. Error is the cube's own estimate from the spread of its epochs, one for each channel:
 efficiency is 1 / (mean over channels of error² x time a path), of which ratios to all paths at one wavelength are told. Needs nothing
 but Python 3.9 and the program.
 """
@@ -16,7 +16,6 @@ import html
 import json
 import math
 import pathlib
-import resource
 import shutil
 import statistics
 import subprocess
@@ -59,17 +58,24 @@ class Program:
         self.folder = pathlib.Path(tempfile.mkdtemp())
 
     def run(self, *arguments):
-        done = subprocess.run([self.path, *arguments], capture_output=True, text=True)
-        if done.returncode != 0:
-            raise RuntimeError(done.stderr.strip().splitlines()[0])
-        return [json.loads(line) for line in done.stdout.splitlines()]
+        return [event for event, _ in self.timed(*arguments)]
 
-    def seconds(self, *arguments):
-        """Of a run: processor time on software devices, of which a machine with other things to do takes hardly more."""
-        times = lambda: (time.monotonic(), sum(resource.getrusage(resource.RUSAGE_CHILDREN)[:2]))
-        before = times()
-        self.run(*arguments)
-        return [after - before for after, before in zip(times(), before)][self.is_software]
+    def timed(self, *arguments):
+        """Events of a run, each with the seconds at which it came: processor time of the run on software devices (so on Linux), of which
+        a machine with other things to do takes hardly more."""
+        with tempfile.TemporaryFile("w+") as errors:
+            process = subprocess.Popen([self.path, *arguments], stdout=subprocess.PIPE, stderr=errors, text=True)
+            events = [(json.loads(line), self.seconds(process)) for line in process.stdout]
+            if process.wait() != 0:
+                errors.seek(0)
+                raise RuntimeError(errors.readline().strip())
+        return events
+
+    def seconds(self, process):
+        if not self.is_software:
+            return time.monotonic()
+        # What clock_getcpuclockid(3) gives on Linux: the clock of all threads of a process.
+        return time.clock_gettime((~process.pid << 3) | 2)
 
     def of_scene(self, scene):
         """Its file, and what is set in it."""
@@ -97,20 +103,19 @@ class Program:
             arguments += ["--set", f"channels.false_colour=[{channels - 1},{channels // 2},0]"]
         for name, value in settings.items():
             arguments += ["--set", f"integrator.{name}={value}"]
-        self.run(*arguments, "--spp", "1")
-        chosen = cube / ".spectile/choices.json"
         if choice.scale:
+            self.run(*arguments, "--spp", "1")
+            chosen = cube / ".spectile/choices.json"
             written = json.loads(chosen.read_text())
             if written["scale"] is None:
                 raise RuntimeError(written["reason"])
             written["scale"] *= choice.scale
             chosen.write_text(json.dumps(written))
-        arguments.append("--resume")
-        # Setting up takes the same both times.
-        few, few_s = EPOCH - 1, self.seconds(*arguments, "--spp", str(EPOCH))
-        many, many_s = EPOCH * (EPOCHS - 1), self.seconds(*arguments, "--spp", str(EPOCH * EPOCHS))
+            arguments.append("--resume")
+        ends = [seconds for event, seconds in self.timed(*arguments, "--spp", str(EPOCH * EPOCHS)) if event["event"] == "epoch"]
+        # Setting up is before the end of the first.
         width, height = map(int, SIZE.split("x"))
-        seconds = (many_s - few_s) / ((many - few) * width * height)
+        seconds = statistics.median(after - before for before, after in zip(ends, ends[1:])) / (EPOCH * width * height)
         info = self.run("info", str(cube), "--json")[-1]
         errors = [channel["error_estimate"] for channel in info["channels"]]
         return seconds, errors, info["choices"]
