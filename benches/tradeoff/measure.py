@@ -53,6 +53,7 @@ def choices(channels, sweep):
 class Program:
     def __init__(self, path, scenes, gas):
         self.path, self.scenes, self.gas = path, scenes, gas.resolve()
+        self.is_software = False
         adapter = next(event for event in self.run("devices", "--json") if event["event"] == "device")
         self.device, self.is_software = adapter["name"], adapter["is_software"]
         self.folder = pathlib.Path(tempfile.mkdtemp())
@@ -74,8 +75,11 @@ class Program:
     def seconds(self, process):
         if not self.is_software:
             return time.monotonic()
-        # What clock_getcpuclockid(3) gives on Linux: the clock of all threads of a process.
-        return time.clock_gettime((~process.pid << 3) | 2)
+        # What clock_getcpuclockid(3) gives on Linux: the clock of all threads of a process, while there is one.
+        try:
+            return time.clock_gettime((~process.pid << 3) | 2)
+        except OSError:
+            return math.nan
 
     def of_scene(self, scene):
         """Its file, and what is set in it."""
@@ -113,6 +117,7 @@ class Program:
             chosen.write_text(json.dumps(written))
             arguments.append("--resume")
         ends = [seconds for event, seconds in self.timed(*arguments, "--spp", str(EPOCH * EPOCHS)) if event["event"] == "epoch"]
+        ends = [seconds for seconds in ends if not math.isnan(seconds)]
         # Setting up is before the end of the first.
         width, height = map(int, SIZE.split("x"))
         seconds = statistics.median(after - before for before, after in zip(ends, ends[1:])) / (EPOCH * width * height)
