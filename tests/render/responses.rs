@@ -54,6 +54,8 @@ fn directly_visible_light_is_weighted() {
     let text = scene("responses = \"s.csv\"\nfalse_colour = [2, 0, 1]");
     // Nothing but the sky.
     let head = text.split("[[objects]]").next().expect("a head");
+    // Drawn evenly: by emission single samples vary less, and nets of them more.
+    let head = head.replace("[integrator]", "[integrator]\nwavelengths = \"uniform\"");
     let place = Place::of(&format!("{head}[environment]\nradiance = \"lamp\"\n"));
     fs::write(place.path().join("s.csv"), RESPONSES).expect("written");
     let cube = place.render("cube.zarr", &["--spp", "1024"]);
@@ -75,7 +77,7 @@ fn directly_visible_light_is_weighted() {
     for (k, expected) in [(0, expected(&red)), (2, expected(&infrared))] {
         for (x, y) in [(0, 0), (11, 7), (23, 19)] {
             let got = f64::from(spectrum(&cube, x, y)[k]);
-            // 1,024 stratified wavelengths in each of 16 strata: far below 1e-4.
+            // 1,024 stratified wavelengths in each stratum: far below 1e-4.
             assert!((got / expected - 1.0).abs() < 1e-4, "channel {k}: {got} {expected}");
         }
     }
@@ -108,7 +110,7 @@ fn sensors_of_the_data_pack_are_cheap() {
         let responses = features.iter().find(|f| f["name"] == "responses").expect("a feature");
         let strata = responses["effect"].as_str().and_then(|text| text.split(' ').next()?.parse::<u32>().ok());
         println!("{file}: {strata:?} strata");
-        assert!(strata.is_some_and(|n| n >= 16 * channels && n < 64 * channels), "{file}: {responses}");
+        assert!(strata.is_some_and(|n| n >= 4 * channels && n <= 16 * channels), "{file}: {responses}");
     }
 }
 

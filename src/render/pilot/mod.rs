@@ -157,11 +157,11 @@ impl Pilot<'_> {
             if cost >= MOST_COST_OF_ONE {
                 return Ok(Several { means, ..Several::unasked(1, costs_so_much(cost)) });
             }
-            let one = net_variances(&mut worker, prepared.channels, pilot.scene)?;
+            let one = net_variances(&mut worker, prepared, pilot.scene)?;
             drop(worker);
             let tried = TRIED_WAVELENGTHS.min(most_wavelengths(each));
             set_wavelengths(prepared, tried)?;
-            let several = net_variances(&mut start(prepared)?, prepared.channels, pilot.scene)?;
+            let several = net_variances(&mut start(prepared)?, prepared, pilot.scene)?;
             let counts = (0..=most_wavelengths(each).ilog2()).map(|bits| 1 << bits);
             let time = |count| means.whole(&costs, prepared.channels, count);
             let found = Several::of(counts, time, [&one, &several], tried, costs_so_much(cost));
@@ -300,8 +300,9 @@ fn one_by_rule(scene: &Scene, prepared: &Prepared, software: bool) -> Option<Str
     // Wavelengths that are drawn by emission make that even.
     let drawn = if prepared.warp.bits() > 0 { sources(scene) } else { Vec::new() };
     let curves = (0..scene.spectra.len()).filter(|spectrum| !drawn.contains(spectrum));
+    let channels = prepared.integration.as_ref().map_or(&scene.channels, |responses| &responses.inner);
     let varies = |spectrum: usize| {
-        let bounds = &scene.channels.bounds;
+        let bounds = &channels.bounds;
         bounds.iter().any(|b| scene.spectra[spectrum].curve.variation(b[0], b[1]) > LEAST_VARIATION)
     };
     let none = !curves.into_iter().any(varies);
@@ -325,11 +326,14 @@ fn sources(scene: &Scene) -> Vec<usize> {
     surfaces.chain(lights).chain(scene.environment.iter().filter_map(|sky| sky.uniform())).collect()
 }
 
-/// Of each channel: variance of a sample as the nets of the render's sampler make it, from the difference of two.
-fn net_variances(worker: &mut Worker, channels: usize, scene: &Scene) -> Result<Vec<f64>> {
+/// Of each channel of the cube: variance of a sample as the nets of the render's sampler make it, from the difference of two.
+fn net_variances(worker: &mut Worker, prepared: &Prepared, scene: &Scene) -> Result<Vec<f64>> {
     let net = net_samples(scene);
-    let [first, second] = nets(worker, &pixels(&scene.film), net)?;
-    Ok(differences(&first, &second, channels, net))
+    let [first, second] = nets(worker, &pixels(&scene.film), net)?.map(|means| match &prepared.integration {
+        Some(responses) => responses.sums(&means),
+        None => means,
+    });
+    Ok(differences(&first, &second, scene.channels.len(), net))
 }
 
 /// Samples of a net: those of a full epoch of the render, as far as they are tried.
