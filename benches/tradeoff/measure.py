@@ -24,6 +24,8 @@ import time
 
 # Scene, and the epochs and pixels that its noise asks for.
 SCENES = ["cornell/cornell", "statues/statues", "aircraft/aircraft", "conference/conference", "aircraft/aircraft-infrared", "aircraft/aircraft-lines"]
+# What an imaging spectrometer sees of these: `channels` are its bands, by responses.
+SCENES += ["conference/conference-bands", "aircraft/aircraft-bands"]
 # The infrared aircraft with a plume line by line: the scene that it is made of, and what is set there. Absorption at 1 atm in steps of 0.02
 # and 0.01 cm-1, 25,000 nodes at each of five temperatures; CO as of a poor combustion.
 LINES = ["lbl_co_2000-2300cm_1atm.csv", "lbl_h2o_2000-2100cm_1atm.csv"]
@@ -36,14 +38,14 @@ class Choice:
         self.name, self.settings, self.scale = name, settings, scale
 
 
-def choices(channels, sweep):
+def choices(scene, channels, sweep):
     """What is compared, all paths at one wavelength first."""
     found = [
         Choice("all", {"evaluation": "all", "wavelengths_per_channel": 1}),
         Choice("auto", {"evaluation": "auto", "wavelengths_per_channel": "auto"}),
         Choice("roulette", {"evaluation": "roulette", "wavelengths_per_channel": 1}),
     ]
-    if channels <= 32:
+    if channels <= 32 or scene.endswith("-bands"):
         found += [Choice(f"m={m}", {"evaluation": "all", "wavelengths_per_channel": m}) for m in (2, 4, 8, 16)]
     if sweep:
         found += [Choice(f"s x {factor:g}", {"evaluation": "roulette", "wavelengths_per_channel": 1}, factor) for factor in (0.125, 0.5, 2, 8)]
@@ -81,30 +83,49 @@ class Program:
         except OSError:
             return math.nan
 
-    def of_scene(self, scene):
+    def of_scene(self, scene, channels):
         """Its file, and what is set in it."""
+        if scene.endswith("-bands"):
+            return self.scenes / f"{scene.removesuffix('-bands')}.toml", [f'channels={{ responses = "{self.bands(channels)}" }}']
         if not scene.endswith("-lines"):
-            return self.scenes / f"{scene}.toml", []
+            return self.scenes / f"{scene}.toml", self.count(self.scenes / f"{scene}.toml", channels)
         tables = [self.gas / name for name in LINES]
         missing = [str(table) for table in tables if not table.exists()]
         if missing:
             raise RuntimeError(f"{missing[0]} is not there (--gas)")
         species = ", ".join(f'{{ table = "{table}", fraction = {fraction} }}' for table, fraction in zip(tables, (0.01, 0.034)))
         settings = [f"media.plume.species=[{species}]", "channels.equal.from=4350", "channels.equal.to=4990"]
-        return self.scenes / "aircraft/aircraft-infrared.toml", settings
+        file = self.scenes / "aircraft/aircraft-infrared.toml"
+        return file, settings + self.count(file, channels)
+
+    @staticmethod
+    def count(file, channels):
+        """Settings for so many channels where the scene has them."""
+        text = file.read_text()
+        key = "wavenumber" if "\nwavenumber" in text else "equal"
+        settings = [f"channels.{key}.count={channels}"]
+        if "false_colour" in text:
+            settings.append(f"channels.false_colour=[{channels - 1},{channels // 2},0]")
+        return settings
+
+    def bands(self, count):
+        """A file of bands side by side from 400 to 700 nm, bells that are 1.2 times as wide at half their height as they are apart."""
+        file, step = self.folder / f"bands-{count}.csv", 300 / count
+        bell = [(1.2 * step * i / 16, math.exp(-4 * math.log(2) * (i / 16) ** 2)) for i in range(-24, 25)]
+        centres = [400 + step * (k + 0.5) for k in range(count)]
+        rows = [f"{k},{centre + x:.6f},{value:.6f}" for k, centre in enumerate(centres) for x, value in bell]
+        file.write_text("\n".join(["band,wavelength_nm,response", *rows, ""]))
+        return file
 
     def render(self, scene, channels, choice, seed):
         """Seconds a path, error of every channel, what was chosen."""
-        file, set_in_scene = self.of_scene(scene)
-        key = "wavenumber" if "\nwavenumber" in file.read_text() else "equal"
+        file, set_in_scene = self.of_scene(scene, channels)
         cube = self.folder / "cube.zarr"
         shutil.rmtree(cube, ignore_errors=True)
         settings = {**choice.settings, "epoch": EPOCH}
         arguments = ["render", str(file), "-o", str(cube), "--size", SIZE, "--seed", str(seed), "--json"]
-        for setting in [*set_in_scene, f"channels.{key}.count={channels}"]:
+        for setting in set_in_scene:
             arguments += ["--set", setting]
-        if "false_colour" in file.read_text():
-            arguments += ["--set", f"channels.false_colour=[{channels - 1},{channels // 2},0]"]
         for name, value in settings.items():
             arguments += ["--set", f"integrator.{name}={value}"]
         if choice.scale:
@@ -152,7 +173,7 @@ def measure(program, measured, scenes, channel_counts, wanted, rounds, until):
     for turn in range(rounds):
         for scene in scenes:
             for channels in channel_counts:
-                for choice in choices(channels, channels == max(channel_counts)):
+                for choice in choices(scene, channels, channels == max(channel_counts)):
                     if wanted and choice.name not in wanted:
                         continue
                     what = (scene, channels, choice.name, turn)
@@ -174,7 +195,7 @@ def table_of(measured):
     known = {(scene, channels) for scene, channels, _, _ in measured.found}
     for scene, channels in sorted(known, key=lambda s: (SCENES.index(s[0]), s[1])):
         base = measured.turns(scene, channels, "all")
-        for choice in choices(channels, True):
+        for choice in choices(scene, channels, True):
             turns = measured.turns(scene, channels, choice.name)
             if turns is not None and base is not None and (isinstance(turns, str) or not isinstance(base, str)):
                 rows.append(row(scene, channels, choice, turns, base))
