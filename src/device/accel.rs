@@ -10,13 +10,14 @@ use obvhs::bvh2::node::Bvh2Node;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::cwbvh::CwBvh;
 use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
+use obvhs::cwbvh::node::CwBvhNode;
 use obvhs::ploc::PlocBuilder;
 use obvhs::{Boundable, BvhBuildParams};
 
 use crate::device::words::{
     HAS_COORDINATES, HAS_NORMALS, KIND_CYLINDER, KIND_DISK, KIND_INSTANCE, KIND_SPHERE, NONE, Primitive,
 };
-use crate::scene::{Attributes, Object, Scene, Shape, box_around};
+use crate::scene::{Attributes, Object, Scene, Shape, box_around, box_around_all};
 
 /// The largest number of materials: ids have 24 bits beside the primitive's kind, and one stands for none.
 pub const MAX_MATERIALS: usize = (1 << 24) - 1;
@@ -108,6 +109,13 @@ impl Tree {
         let (nodes, order, depth) = build_nodes(boxes);
         Tree { nodes, depth, primitives: order.iter().map(|&i| loose[i as usize]).collect() }
     }
+
+    /// Boxes that hold everything: those of the children of its root.
+    fn upper_boxes(&self) -> Vec<[DVec3; 2]> {
+        let root: CwBvhNode = bytemuck::cast(self.nodes[0]);
+        let children = (0..8).filter(|&child| !root.is_child_empty(child)).map(|child| root.child_aabb(child));
+        children.map(|Aabb { min, max }| [min, max].map(|corner| corner.as_dvec3())).collect()
+    }
 }
 
 /// What is collected of a scene's objects.
@@ -188,13 +196,14 @@ impl Accel {
             let own = DeviceSpace::around(scene.bounds_of(id).unwrap_or_default());
             let parts = collected.primitives(&scene.objects, Some(id), &own);
             let of_parts: Vec<Aabb> = parts.iter().map(Boundable::aabb).collect();
-            let around = of_parts.iter().fold(Aabb::INVALID, |all, one| all.union(one));
-            assemblies.push(Tree::over(&parts, &of_parts));
+            let tree = Tree::over(&parts, &of_parts);
+            let around = tree.upper_boxes();
+            assemblies.push(tree);
             let of_own = own.of_world().inverse();
             // Whose material and boundary it is does not matter: a ray meets what is in it.
             let object = scene.objects.iter().position(|object| object.assembly == Some(id)).unwrap_or(0);
             let placed = assembly.instances.iter();
-            stubs.extend(placed.map(|to_world| stub(space.of_world() * *to_world * of_own, around, id, object)));
+            stubs.extend(placed.map(|to_world| stub(space.of_world() * *to_world * of_own, &around, id, object)));
         }
         for (i, stub) in stubs.iter().enumerate() {
             // Its number, for now.
@@ -262,6 +271,18 @@ impl Accel {
         }
     }
 
+    /// The assembly of an instance, and which of that assembly's it is.
+    pub fn instance_of(&self, scene: &Scene, instance: &Primitive) -> (usize, usize) {
+        let mut number = ((instance.attributes - 5 * self.node_count as u32) / PLACEMENT_VECTORS) as usize;
+        for (assembly, instances) in scene.assemblies.iter().map(|assembly| assembly.instances.len()).enumerate() {
+            if number < instances {
+                return (assembly, number);
+            }
+            number -= instances;
+        }
+        unreachable!("an instance is one of some assembly")
+    }
+
     /// From the units of its assembly to the device's of the world, of the instance that stands among the primitives.
     pub fn placement(&self, instance: u32) -> DAffine3 {
         let place = self.primitives[instance as usize].attributes as usize;
@@ -318,12 +339,13 @@ impl Accel {
     }
 }
 
-/// An instance of `assembly`, which fills `bounds` in its own units; `to_device` leads from those to the world's.
-fn stub(to_device: DAffine3, bounds: Aabb, assembly: usize, object: usize) -> Stub {
+/// An instance of `assembly`, which fills `boxes` in its own units; `to_device` leads from those to the world's.
+fn stub(to_device: DAffine3, boxes: &[[DVec3; 2]], assembly: usize, object: usize) -> Stub {
     let m = to_device.matrix3.as_mat3();
     let at = to_device.translation.as_vec3();
-    let (low, high) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
-    let [low, high] = box_around(&to_device, [low, high]).map(|p| p.as_vec3a());
+    // Several, since a box that is turned needs a larger one around it.
+    let moved = boxes.iter().map(|one| box_around(&to_device, *one));
+    let [low, high] = box_around_all(moved).unwrap_or_default().map(|p| p.as_vec3a());
     // Rays are moved into it in f32.
     let reach =
         low.abs().max(high.abs()).max_element() + (m.x_axis.abs() + m.y_axis.abs() + m.z_axis.abs()).max_element();

@@ -281,6 +281,13 @@ impl Exhibit {
         self.add_medium(grid(1.0), grid(1.0));
     }
 
+    pub fn add_placed_voxels(&mut self) {
+        self.add_voxels();
+        self.last().assembly = Some(self.scene.assemblies.len());
+        let name = "example of voxels".to_owned();
+        self.scene.assemblies.push(Assembly { name, instances: vec![DAffine3::IDENTITY; 2] });
+    }
+
     /// Fog of two kinds, in voxels.
     pub fn add_cloud(&mut self) {
         let coefficient = self.spectrum(Curve::Constant(DARK));

@@ -87,6 +87,7 @@ pub const PARTS: &[&Part] = &[
     &opacity::IN_VACUUM,
     &media::CAMERA_CUT,
     &media::VOXELS,
+    &media::PLACED,
     &media::PLANCK,
     &scattering::SCATTERING,
     &techniques::TECHNIQUES,

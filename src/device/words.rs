@@ -212,9 +212,11 @@ constants! {
         PHASE_RAYLEIGH = 1;
         PHASE_TABLE = 2;
     }
-    /// What lies behind a primitive: the number of a volume + 1, and whether it is nothing but a boundary.
+    /// What lies behind a primitive: the number of a volume + 1, whether it is nothing but a boundary, and whether the number is that of the
+    /// first instance, to which what stands for the instance is added.
     BOUNDARIES {
         NULL_BOUNDARY = 0x8000_0000;
+        PLACED_VOLUME = 0x4000_0000;
     }
     /// Volumes that a path may be in, of 8 bits each.
     NESTING {

@@ -279,10 +279,25 @@ impl Scene {
         if self.assemblies.is_empty() {
             return Cow::Borrowed(self);
         }
+        // What is copied has surfaces of its own.
+        let bodies = self.objects.iter().filter_map(|object| object.interior).map(|interior| interior.body + 1);
+        let bodies = bodies.max().unwrap_or(0);
+        // Numbers of all instances, from 1: of each assembly that of the first.
+        let mut first_of_each = Vec::with_capacity(self.assemblies.len());
+        let mut next = 1;
+        for assembly in &self.assemblies {
+            first_of_each.push(next);
+            next += assembly.instances.len();
+        }
         let copies = self.objects.iter().flat_map(|object| {
-            self.placed(object).map(|to_world| match to_world {
+            let first = object.assembly.map_or(0, |assembly| first_of_each[assembly]);
+            self.placed(object).enumerate().map(move |(i, to_world)| match to_world {
                 None => object.clone(),
-                Some(to_world) => copy(object, to_world),
+                Some(to_world) => {
+                    let mut copy = copy(object, to_world);
+                    copy.interior.iter_mut().for_each(|interior| interior.body += bodies * (first + i));
+                    copy
+                }
             })
         });
         let objects = copies.collect();

@@ -106,19 +106,6 @@ impl<'a> Media<'a> {
         Some(id)
     }
 
-    /// The medium that `item` names, for something that is placed several times: without grids, which fill one box.
-    pub fn take_placed(&mut self, item: &Item<'a>, spectra: &mut Spectra<'a>) -> Option<MediumId> {
-        let id = self.take(item, spectra)?;
-        if self.scene[id].grid_size().is_some() {
-            item.error_help(
-                format!("\"{}\" has a grid, which fills one box, not that of every instance", self.scene[id].name),
-                "use numbers, or write the object as one of `[[objects]]`",
-            );
-            return None;
-        }
-        Some(id)
-    }
-
     pub fn finish(self) -> Vec<Medium> {
         self.scene
     }

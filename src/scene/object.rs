@@ -231,10 +231,7 @@ impl<'s, 'a> Objects<'s, 'a> {
     /// What `interior` says of an object whose shape, in its own space, is `local`.
     fn filling(&mut self, fields: &Fields<'a>, local: &Shape) -> Option<Option<Filling>> {
         let item = fields.get("interior")?;
-        let medium = match self.assembly {
-            None => self.media.take(&item, self.spectra),
-            Some(_) => self.media.take_placed(&item, self.spectra),
-        };
+        let medium = self.media.take(&item, self.spectra);
         if let Some(opening) = closed::opening(local) {
             item.error_help(
                 format!("fills closed shapes only, but {opening}"),

@@ -5,7 +5,7 @@ use spectile::scene::{Attributes, Field, Scene, Shape, Sides, TextureKind, Weigh
 use spectile::spectral::Channels;
 
 use crate::device::{self, Settings};
-use crate::scene_builder::heat::{cuboid, infrared};
+use crate::scene_builder::heat::{cuboid, grid, infrared};
 use crate::scene_builder::*;
 use crate::statistics::*;
 
@@ -76,6 +76,25 @@ fn room_with(thing: &str) -> Scene {
             let around_camera = DAffine3::from_translation(DVec3::new(0.0, 0.1, 2.7));
             b.null(sphere(DVec3::ZERO, 0.6)).placed(1, similar.into_iter().chain([around_camera]).collect())
         }
+        "voxels" => {
+            let phase = b.henyey_greenstein(0.4);
+            let density = grid([2, 3, 4], |[x, y, z]| [0.0, 2.0, 5.0, 1.0][((x + 2 * y + 3 * z) % 4) as usize]);
+            let b = b.medium(absorbing(), None, density).scattering(table(&[400.0, 700.0], &[1.0, 2.0]), phase);
+            // One around the camera, and two within one another.
+            let around_camera = DAffine3::from_translation(DVec3::new(0.1, 0.0, 2.6));
+            let within = places(DVec3::ONE)[3] * DAffine3::from_scale(DVec3::splat(0.5));
+            let b = b.null_box(DVec3::splat(-0.5), DVec3::splat(0.5));
+            b.placed(1, stretched.into_iter().chain([around_camera, within]).collect())
+        }
+        "voxels in glass" => {
+            let density = grid([3, 1, 2], |[x, _, z]| f64::from(x + 2 * z));
+            let b = b.medium(absorbing(), None, density);
+            let b = b.dielectric(cuboid(DVec3::splat(-0.5), DVec3::splat(0.5)), 1.5, 0.0);
+            let b = b.filled_from(DVec3::splat(-0.5), DVec3::splat(0.5));
+            // Beside it what every instance has the same.
+            let b = b.gas(0.8).null(sphere(DVec3::new(0.0, 1.0, 0.0), 0.3));
+            b.placed(2, similar)
+        }
         "filled glass" => {
             let b = b.gas(absorbing()).dielectric(cuboid(DVec3::splat(-0.5), DVec3::splat(0.5)), 1.5, 0.0).filled();
             b.placed(1, stretched)
@@ -118,6 +137,12 @@ fn lit_by(thing: &str) -> Scene {
             .conductor(cuboid(DVec3::splat(-0.5), DVec3::splat(0.5)), 2.0, 3.0, [0.3; 2])
             .at_kelvin(600.0)
             .placed(1, stretched),
+        "hot voxels" => {
+            let kelvin = grid([2, 2, 3], |[x, y, z]| 300.0 + 100.0 * f64::from(x + y + z));
+            let density = grid([2, 2, 3], |[x, ..]| 1.0 + f64::from(x));
+            let b = b.channels(infrared()).medium(1.5, Some(kelvin), density);
+            b.null_box(DVec3::splat(-0.5), DVec3::splat(0.5)).placed(1, stretched)
+        }
         "hot by place" => {
             let kelvin = b.texture([2, 2], &[300.0, 500.0, 700.0, 400.0], TextureKind::Number);
             b.channels(infrared()).diffuse(sheet, 0.4).attributes(quad_uv()).heated_by(kelvin).placed(1, stretched)
@@ -127,14 +152,7 @@ fn lit_by(thing: &str) -> Scene {
     .build()
 }
 
-const LIGHTS: [&str; 6] = ["sheets", "several", "round", "masked", "hot metal", "hot by place"];
-
-fn all() -> impl Iterator<Item = (&'static str, Scene)> {
-    THINGS
-        .into_iter()
-        .map(|thing| (thing, room_with(thing)))
-        .chain(LIGHTS.into_iter().map(|thing| (thing, lit_by(thing))))
-}
+const LIGHTS: [&str; 7] = ["sheets", "several", "round", "masked", "hot metal", "hot voxels", "hot by place"];
 
 /// Columns that take +y to `axis`.
 fn axes_to(axis: DVec3) -> DMat3 {
@@ -147,7 +165,7 @@ fn tube(from: DVec3, to: DVec3, radius: f64) -> Shape {
     Shape::Cylinder { from, to, radius }
 }
 
-const THINGS: [&str; 12] = [
+const THINGS: [&str; 14] = [
     "boxes",
     "normals",
     "coordinates",
@@ -159,16 +177,24 @@ const THINGS: [&str; 12] = [
     "in gas",
     "gas",
     "fog",
+    "voxels",
+    "voxels in glass",
     "filled glass",
 ];
 
 /// The reference copies what is placed.
 #[test]
 fn pictures_are_those_of_the_reference() {
-    for (thing, scene) in all() {
-        let bound = Bound { resolution: 0.2, allowance: 4e-3 };
-        device::assert_as_reference(thing, &scene, [16, 256], 2500, bound);
-    }
+    THINGS.into_iter().for_each(|thing| assert_as_reference(thing, &room_with(thing)));
+}
+
+#[test]
+fn light_is_that_of_the_reference() {
+    LIGHTS.into_iter().for_each(|thing| assert_as_reference(thing, &lit_by(thing)));
+}
+
+fn assert_as_reference(thing: &str, scene: &Scene) {
+    device::assert_as_reference(thing, scene, [16, 256], 2500, Bound { resolution: 0.2, allowance: 4e-3 });
 }
 
 /// The same paths, but where rounding decides: nine in ten pixels and channels are within 1e-4, and the mean within 1e-3.

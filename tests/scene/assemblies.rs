@@ -108,7 +108,7 @@ fn interiors_are_placed_too() {
     assert_eq!((own.assembly, own.material, own.interior.unwrap().medium), (Some(0), None, 0));
     let copies = scene.copied();
     let copy = copies.objects.last().unwrap();
-    assert_eq!(copy.interior.unwrap().body, own.interior.unwrap().body);
+    assert_ne!(copy.interior.unwrap().body, own.interior.unwrap().body);
     // The box of the placed ball is the unit cube.
     for (world, grid) in
         [(DVec3::new(0.0, 1.0, -2.0), DVec3::ZERO), (DVec3::new(4.0, 5.0, 0.0), DVec3::new(1.0, 1.0, 0.5))]

@@ -5,6 +5,8 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use spectile::Error;
+use spectile::device::prepared::Prepared;
+use spectile::device::words::VOLUME_WORDS;
 use spectile::scene::{self, Field, Scene};
 use spectile::spectral::{Curve, Outside};
 use zarrs::array::builder::ArrayBuilderFillValue;
@@ -128,15 +130,25 @@ fn cross_sections_count_the_molecules_of_the_gas() {
     assert!(error.to_string().contains("p / (k T)"), "{error}");
 }
 
-/// A grid has one box; a ball that is placed somewhere is there as often as it is placed.
+/// A grid fills the box of each instance, and its voxels are on a device once; so many instances that devices cannot number them are
+/// refused by name.
 #[test]
-fn grids_fill_one_box() {
+fn grids_fill_each_instance() {
     let text = "[media.gas]\nabsorption = 1\ndensity = { grid = \"d.zarr\" }\n[[assemblies.balls.objects]]\n\
         sphere = { center = [0, 0, 0], radius = 1 }\ninterior = \"gas\"\n[[instances]]\nassembly = \"balls\"\n";
-    let error = with_grids(&format!("{BASE}{text}")).unwrap_err().to_string();
-    assert!(error.contains("assemblies.balls.objects.0.interior") && error.contains("every instance"), "{error}");
-    let numbers = with_grids(&format!("{BASE}{text}").replace("{ grid = \"d.zarr\" }", "2")).unwrap();
-    assert_eq!(numbers.assemblies.len(), 1);
+    let placed = |count: usize| {
+        let places = (0..count)
+            .map(|i| format!("[[instances]]\nassembly = \"balls\"\ntransform = {{ translate = [{i}, 0, 0] }}\n"));
+        with_grids(&format!("{BASE}{text}{}", places.collect::<String>())).unwrap_or_else(|e| panic!("{e}"))
+    };
+    let words = |scene: &Scene| Prepared::new(scene, 0).map(|prepared| prepared.media.unwrap().volumes.len());
+    let [one, many] = [0, 252].map(|more| words(&placed(more)).unwrap());
+    // A line of VOLUME_WORDS and a list of its one kind of matter each.
+    assert_eq!(many, one + 252 * (VOLUME_WORDS as usize + 9));
+    let error = words(&placed(254)).unwrap_err().to_string();
+    for words in ["254", "assembly \"balls\" with \"gas\" is placed 255 times", "place it less often"] {
+        assert!(error.contains(words), "{error}");
+    }
 }
 
 #[test]

@@ -63,7 +63,8 @@ fn traverse(ray: Ray, limit: f32, any_hit: bool, overflow: ptr<function, bool>) 
     // In the units of the instance that the ray is in, if it is in one; the rest of the world waits below `floor`.
     let of_world = sheared(ray);
     var sheared_ray = of_world;
-    var across = slabs(ray.origin, ray.direction);
+    let across_world = slabs(ray.origin, ray.direction);
+    var across = across_world;
     var begin = 0.0;
     var instance = NONE;
     var floor = 0u;
@@ -138,6 +139,10 @@ fn traverse(ray: Ray, limit: f32, any_hit: bool, overflow: ptr<function, bool>) 
             nodes_left = vec2<u32>(0u, 0u);
         }
 
+#if INSTANCES
+        var entering = false;
+        var stub: Primitive;
+#endif
         while (primitives_left.y != 0u) {
             steps += 1u;
             let bit = firstTrailingBit(primitives_left.y);
@@ -160,12 +165,8 @@ fn traverse(ray: Ray, limit: f32, any_hit: bool, overflow: ptr<function, bool>) 
                     stack_size += 1u;
                 }
                 instance = primitive;
-                floor = stack_size;
-                let inside = entered(ray, p, primitive);
-                across = slabs(inside.ray.origin, inside.ray.direction);
-                sheared_ray = sheared(inside.ray);
-                begin = inside.begin;
-                nodes_left = vec2<u32>(inside.root, 0x80000000u);
+                entering = true;
+                stub = p;
                 primitives_left.y = 0u;
                 break;
             }
@@ -198,6 +199,17 @@ fn traverse(ray: Ray, limit: f32, any_hit: bool, overflow: ptr<function, bool>) 
 #endif
         }
 
+#if INSTANCES
+        if (entering) {
+            floor = stack_size;
+            let inside = entered(ray, stub, instance);
+            across = slabs(inside.ray.origin, inside.ray.direction);
+            sheared_ray = sheared(inside.ray);
+            begin = inside.begin;
+            nodes_left = vec2<u32>(inside.root, 0x80000000u);
+        }
+#endif
+
         if (any_hit && hit.primitive != NONE) {
             break;
         }
@@ -209,7 +221,7 @@ fn traverse(ray: Ray, limit: f32, any_hit: bool, overflow: ptr<function, bool>) 
 #if INSTANCES
             if (instance != NONE && stack_size == floor) {
                 instance = NONE;
-                across = slabs(ray.origin, ray.direction);
+                across = across_world;
                 sheared_ray = of_world;
                 begin = 0.0;
             }

@@ -14,7 +14,7 @@ fn volumes_at(start: vec3<f32>, overflow: ptr<function, bool>) -> vec2<u32> {
         }
         let surface = surface_at(ray, hit);
         let entering = dot(surface.normal, ray.direction) < 0.0;
-        let number = boundaries[hit.primitive] & 0xffu;
+        let number = volume_met(hit);
         if (number != 0u && !cross_boundary(&around, number, entering)) {
             *overflow = true;
         }

@@ -1,9 +1,21 @@
 // Media along a path: which volume it is in, and the way through each as records. Boundaries without material are passed as if
 // they were not there.
 
-// For every primitive: the number of the volume behind it + 1, and whether it is nothing but a boundary.
+// For every primitive: the number of the volume behind it + 1, and whether it is nothing but a boundary; of instances what is added to
+// numbers that are marked with PLACED_VOLUME.
 @group(0) @binding(60) var<storage, read> boundaries: array<u32>;
-#constants NULL_BOUNDARY
+#constants BOUNDARIES
+
+// The number of the volume behind what was met + 1, or 0.
+fn volume_met(hit: Hit) -> u32 {
+    let boundary = boundaries[hit.primitive];
+#if PLACED_VOLUMES
+    if ((boundary & PLACED_VOLUME) != 0u) {
+        return (boundary & 0xffu) + boundaries[hit.instance];
+    }
+#endif
+    return boundary & 0xffu;
+}
 
 // The volumes that a path is in, the innermost in the low byte, numbers + 1; deeper ones above it, in the second word last.
 #constants MOST_NESTED
@@ -110,7 +122,7 @@ fn walk(ray: Ray, limit: f32, around: ptr<function, vec2<u32>>, way: ptr<functio
 #endif
         let surface = surface_at(walked.ray, walked.hit);
         let entering = dot(surface.normal, ray.direction) < 0.0;
-        let number = boundaries[walked.hit.primitive] & 0xffu;
+        let number = volume_met(walked.hit);
         if (number != 0u && !cross_boundary(around, number, entering)) {
             *overflow = true;
         }

@@ -56,7 +56,7 @@ fn volume_behind(site: Site) -> u32 {
         return 0u;
     }
 #endif
-    return boundaries[site.hit.primitive] & 0xffu;
+    return volume_met(site.hit);
 }
 
 // Whether a light is seen through media; notes them.

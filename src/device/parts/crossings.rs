@@ -3,21 +3,36 @@
 use glam::DVec3;
 
 use crate::device::accel::Accel;
-use crate::device::words::{KIND_INSTANCE, Primitive};
+use crate::device::words::{KIND_INSTANCE, PLACED_VOLUME, Primitive};
 use crate::scene::Scene;
 
 /// What bounds the volumes of a scene: primitives of the world, and those of assemblies at each place where they are.
 pub struct Boundaries<'a> {
     accel: &'a Accel,
-    /// Primitives and the numbers of what is behind them.
+    /// Primitives and what `boundaries` says of them.
     of_world: Vec<(u32, u32)>,
     /// Of each assembly, and the instances of those that have some.
     of_assemblies: Vec<Vec<(u32, u32)>>,
-    instances: Vec<(u32, usize)>,
+    instances: Vec<Instance>,
+}
+
+struct Instance {
+    /// Its place among [`Accel::primitives`].
+    primitive: u32,
+    assembly: usize,
+    /// What is added to the numbers of volumes that are there once for each instance.
+    added: u32,
+}
+
+impl Instance {
+    fn number(&self, boundary: u32) -> u32 {
+        (boundary & 0xff) + if boundary & PLACED_VOLUME != 0 { self.added } else { 0 }
+    }
 }
 
 impl<'a> Boundaries<'a> {
-    /// `boundaries`: for each primitive the number of the volume behind it in the low byte, or 0.
+    /// `boundaries`: for each primitive the number of the volume behind it in the low byte, or 0, and [`PLACED_VOLUME`] where that counts
+    /// from what it says of the instance.
     pub fn new(scene: &Scene, accel: &'a Accel, boundaries: &[u32]) -> Self {
         let mut found = Boundaries {
             accel,
@@ -26,39 +41,40 @@ impl<'a> Boundaries<'a> {
             instances: Vec::new(),
         };
         let assembly = |primitive: usize| scene.objects[accel.objects[primitive] as usize].assembly;
-        for (primitive, number) in boundaries.iter().map(|boundary| boundary & 0xff).enumerate() {
-            if number != 0 {
-                let list = assembly(primitive).map_or(&mut found.of_world, |of| &mut found.of_assemblies[of]);
-                list.push((primitive as u32, number));
+        for (i, (primitive, &boundary)) in accel.primitives.iter().zip(boundaries).enumerate() {
+            let of = assembly(i);
+            if let (KIND_INSTANCE, Some(assembly)) = (primitive.tag >> 24, of) {
+                found.instances.push(Instance { primitive: i as u32, assembly, added: boundary });
+            } else if boundary & 0xff != 0 {
+                of.map_or(&mut found.of_world, |of| &mut found.of_assemblies[of]).push((i as u32, boundary));
             }
         }
-        let is_instance = |(_, primitive): &(usize, &Primitive)| primitive.tag >> 24 == KIND_INSTANCE;
-        let instances = accel.primitives.iter().enumerate().filter(is_instance);
-        let of = instances.filter_map(|(instance, _)| Some((instance as u32, assembly(instance)?)));
-        found.instances = of.filter(|(_, of)| !found.of_assemblies[*of].is_empty()).collect();
+        found.instances.retain(|instance| !found.of_assemblies[instance.assembly].is_empty());
         found
     }
 
     /// All of them, in device units of the world.
     pub fn each(&self, mut f: impl FnMut(&Primitive, u32)) {
-        for &(primitive, number) in &self.of_world {
-            f(&self.accel.primitives[primitive as usize], number);
+        for &(primitive, boundary) in &self.of_world {
+            f(&self.accel.primitives[primitive as usize], boundary & 0xff);
         }
-        for &(instance, assembly) in &self.instances {
-            for &(primitive, number) in &self.of_assemblies[assembly] {
-                f(&self.placed(primitive, instance), number);
+        for instance in &self.instances {
+            for &(primitive, boundary) in &self.of_assemblies[instance.assembly] {
+                f(&self.placed(primitive, instance.primitive), instance.number(boundary));
             }
         }
     }
 
     /// A place on the surface of volume `number`; of one that is there several times, of the first.
     pub fn place_on(&self, number: u32) -> Option<DVec3> {
-        let of_number = |list: &[(u32, u32)]| list.iter().find(|(_, other)| *other == number).map(|(first, _)| *first);
-        let in_instance = || {
-            let mut placed = self.instances.iter();
-            placed.find_map(|(instance, of)| Some(self.placed(of_number(&self.of_assemblies[*of])?, *instance)))
+        let in_instance = |instance: &Instance| {
+            let mut parts = self.of_assemblies[instance.assembly].iter();
+            let (part, _) = parts.find(|(_, boundary)| instance.number(*boundary) == number)?;
+            Some(self.placed(*part, instance.primitive))
         };
-        let of_world = of_number(&self.of_world).map(|primitive| self.accel.primitives[primitive as usize]);
+        let in_instance = || self.instances.iter().find_map(in_instance);
+        let of_world = self.of_world.iter().find(|(_, boundary)| boundary & 0xff == number);
+        let of_world = of_world.map(|(primitive, _)| self.accel.primitives[*primitive as usize]);
         of_world.or_else(in_instance).map(|primitive| place_on(&primitive))
     }
 

@@ -1,5 +1,7 @@
 //! Media of a scene as devices get them: volumes in their places, and what lies behind each primitive.
 
+use std::sync::Arc;
+
 use glam::{DAffine3, DVec3};
 
 use crate::device::accel::Accel;
@@ -9,12 +11,12 @@ use crate::device::parts::origins::{Cut, Origins};
 use crate::device::parts::surfaces::{Needed, wavelength};
 use crate::device::text::{Module, module};
 use crate::device::words::{
-    KIND_INSTANCE, NONE, NULL_BOUNDARY, Primitive, VOLUME_EMITS, VOLUME_GRID, VOLUME_SCATTERS, VOLUME_WORDS,
-    VOLUMES_HEAD,
+    KIND_INSTANCE, NONE, NULL_BOUNDARY, PLACED_VOLUME, Primitive, VOLUME_EMITS, VOLUME_GRID, VOLUME_SCATTERS,
+    VOLUME_WORDS, VOLUMES_HEAD,
 };
 use crate::scene::{
-    Absorber, AssemblyId, Bsdf, Component, Field, Interior, Line, MaterialId, Medium, MediumId, Object, Projection,
-    Scene, SpectrumId, box_around, box_around_all,
+    Absorber, Assembly, AssemblyId, Bsdf, Component, Field, Interior, Line, MaterialId, Medium, MediumId, Object,
+    Projection, Scene, SpectrumId, box_around, box_around_all,
 };
 use crate::spectral::{Curve, planck};
 use crate::{Error, Result};
@@ -108,6 +110,16 @@ pub const VOXELS: Part = Part {
     ..Part::NOTHING
 };
 
+pub const PLACED: Part = Part {
+    name: "media of voxels in instances",
+    used: |scene| scene.media.as_ref().is_some_and(|media| media.is_placed),
+    effect: |_| "a volume for each instance, which share voxels".into(),
+    is_planned: true,
+    defines: |_, _, defines| _ = defines.set("PLACED_VOLUMES", true),
+    example: Some(|exhibit| exhibit.add_placed_voxels()),
+    ..Part::NOTHING
+};
+
 /// Absorption and emission that evaluation works out.
 pub const PLANCK: Part = Part {
     name: "emission where paths are evaluated",
@@ -131,6 +143,8 @@ pub struct Media {
     pub outer: u32,
     /// Whether camera rays start in different media.
     pub camera_is_cut: bool,
+    /// Whether some volumes are there once for each instance of an assembly.
+    is_placed: bool,
     /// Gases of a kind of matter in a volume of voxels, and columns of their tables.
     pub most_absorbers: u32,
     pub most_columns: u32,
@@ -139,7 +153,7 @@ pub struct Media {
     /// Spectra of a volume of voxels whose amounts on a way tell its transmittance; and iterations of going through their list.
     pub most_terms: u32,
     pub most_listed: u32,
-    /// Stretches of one way, voxels that it may go through, and those among them that evaluation marches through.
+    /// Stretches of one way, voxels that it may go through, and those among them that evaluation marches through, at most.
     pub stretches: u32,
     pub cells: u32,
     pub marched: u32,
@@ -149,8 +163,10 @@ pub struct Media {
     pub wavelength: Option<u32>,
     /// Words of `volumes` that are positions in `spectra`.
     spectrum_words: Vec<usize>,
-    /// Voxels that are to stand at the end of `volumes`, and words there that count from the first of them.
+    /// Voxels that are to stand at the end of `volumes`, where in them each grid begins, and words of `volumes` that count from the first
+    /// of them.
     voxels: Vec<f32>,
+    grids: Vec<(Arc<Vec<f32>>, u32)>,
     voxel_words: Vec<usize>,
 }
 
@@ -162,6 +178,8 @@ pub struct Filled {
     pub densities: Vec<[u32; 2]>,
     /// Metres from end to end.
     pub extent: f64,
+    /// Whether it is there for another instance of what the volume before it is of.
+    pub is_repeated: bool,
 }
 
 /// Words that are to stand behind the volumes.
@@ -202,6 +220,8 @@ struct Volume<'a> {
     id: MediumId,
     medium: &'a Medium,
     interior: Option<Interior>,
+    /// The instance whose it is, where each has voxels in places of their own; else it is that of all.
+    instance: Option<(AssemblyId, usize)>,
     /// The index of refraction behind its surface over that before, where that is a dielectric; then the index there, of all
     /// bodies around it: radiance in matter is n² of that in a vacuum, and so are sources.
     index: Option<Curve>,
@@ -210,7 +230,7 @@ struct Volume<'a> {
 impl Volume<'_> {
     /// How often it is in the scene.
     fn times(&self, scene: &Scene) -> usize {
-        let Some(interior) = self.interior else { return 1 };
+        let Some(interior) = self.interior.filter(|_| self.instance.is_none()) else { return 1 };
         let mut assemblies: Vec<Option<AssemblyId>> = of_body(scene, &interior).map(|object| object.assembly).collect();
         assemblies.dedup();
         let times = |assembly: Option<AssemblyId>| assembly.map_or(1, |of| scene.assemblies[of].instances.len());
@@ -228,32 +248,53 @@ impl Media {
         let mut of_object = vec![0u32; scene.objects.len()];
         for (object, number) in scene.objects.iter().zip(&mut of_object) {
             let Some(interior) = object.interior else { continue };
-            let known = volumes.iter().position(|v| v.interior.is_some_and(|i| i.body == interior.body));
+            let medium = &scene.media[interior.medium];
+            let assembly = object.assembly.filter(|_| medium.grid_size().is_some());
+            let is_of_body = |v: &Volume| {
+                v.interior.is_some_and(|i| i.body == interior.body) && v.instance.map(|(of, _)| of) == assembly
+            };
+            let known = volumes.iter().position(is_of_body);
             let index = known.unwrap_or_else(|| {
-                let index = object.material.and_then(|material| index(scene, material));
-                volumes.push(Volume {
+                let volume = |instance| Volume {
                     id: interior.medium,
-                    medium: &scene.media[interior.medium],
+                    medium,
                     interior: Some(interior),
-                    index,
-                });
-                volumes.len() - 1
+                    instance,
+                    index: object.material.and_then(|material| index(scene, material)),
+                };
+                let first = volumes.len();
+                match assembly {
+                    None => volumes.push(volume(None)),
+                    Some(of) => {
+                        // One more than there may be is said to be too many.
+                        let instances = 0..scene.assemblies[of].instances.len().min(MOST_VOLUMES + 1);
+                        volumes.extend(instances.map(|i| volume(Some((of, i)))));
+                    }
+                }
+                first
             });
-            *number = index as u32 + 1;
+            *number = (index as u32 + 1) | if assembly.is_some() { PLACED_VOLUME } else { 0 };
         }
         let mut outer = NONE;
         if let Some(medium) = scene.camera_medium {
             outer = volumes.len() as u32;
-            volumes.push(Volume { id: medium, medium: &scene.media[medium], interior: None, index: None });
+            volumes.push(Volume {
+                id: medium,
+                medium: &scene.media[medium],
+                interior: None,
+                instance: None,
+                index: None,
+            });
         }
         if volumes.len() > MOST_VOLUMES {
-            let message = format!("{} interiors with media, at most {MOST_VOLUMES} are supported", volumes.len());
-            return Err(Error::input(&scene.file, message));
+            return Err(Error::input(&scene.file, too_many(scene, &volumes)));
         }
+        let mut is_of_each = vec![false; scene.assemblies.len()];
+        volumes.iter().filter_map(|volume| volume.instance).for_each(|(assembly, _)| is_of_each[assembly] = true);
         let boundary = |(primitive, &object): (&Primitive, &u32)| {
-            // What bounds is in it.
             if primitive.tag >> 24 == KIND_INSTANCE {
-                return 0;
+                let (assembly, instance) = accel.instance_of(scene, primitive);
+                return if is_of_each[assembly] { instance as u32 } else { 0 };
             }
             let null = scene.objects[object as usize].material.is_none();
             of_object[object as usize] | if null { NULL_BOUNDARY } else { 0 }
@@ -267,6 +308,7 @@ impl Media {
             spectra: Vec::new(),
             outer,
             camera_is_cut: false,
+            is_placed: is_of_each.contains(&true),
             most_absorbers: 0,
             most_columns: 0,
             most_kinds: 0,
@@ -279,13 +321,15 @@ impl Media {
             wavelength: None,
             spectrum_words: Vec::new(),
             voxels: Vec::new(),
+            grids: Vec::new(),
             voxel_words: Vec::new(),
         };
         media.volumes.resize(HEAD + WORDS * volumes.len(), 0);
         media.volumes[0] = (1.0 / accel.space.scale as f32).to_bits();
-        let within: Vec<Option<Curve>> = (0..volumes.len())
-            .map(|i| product_of_indices(scene, &volumes, &media.bodies_around(i as u32 + 1, &world)))
-            .collect();
+        let has_indices = volumes.iter().any(|volume| volume.index.is_some());
+        let around = |i: usize| if has_indices { media.bodies_around(i as u32 + 1, &world) } else { Vec::new() };
+        let within: Vec<Option<Curve>> =
+            (0..volumes.len()).map(|i| product_of_indices(scene, &volumes, &around(i))).collect();
         for (index, (volume, within)) in volumes.iter_mut().zip(within).enumerate() {
             volume.index = within;
             let densities = media.fill(scene, accel, index, volume);
@@ -293,8 +337,10 @@ impl Media {
                 medium: volume.id,
                 densities,
                 extent: extent(scene, accel, volume.interior.as_ref()),
+                is_repeated: volume.instance.is_some_and(|(_, instance)| instance > 0),
             });
         }
+        (media.cells, media.marched) = most_walked(&volumes, media.stretches as usize);
         media.place_camera(scene, accel, &world)?;
         Ok(Some(media))
     }
@@ -411,7 +457,9 @@ impl Media {
         let interior = volume.interior.expect("grids fill interiors");
         let from_device = DAffine3::from_translation(accel.space.center)
             * DAffine3::from_scale(DVec3::splat(1.0 / accel.space.scale));
-        let scaled = DAffine3::from_scale(DVec3::from(size.map(f64::from))) * interior.to_grid * from_device;
+        let to_world = volume.instance.map_or(DAffine3::IDENTITY, |(of, i)| scene.assemblies[of].instances[i]);
+        let to_grid = interior.to_grid * to_world.inverse();
+        let scaled = DAffine3::from_scale(DVec3::from(size.map(f64::from))) * to_grid * from_device;
         let rows = scaled.matrix3.transpose();
         for (i, value) in [rows.x_axis, rows.y_axis, rows.z_axis, scaled.translation].iter().enumerate() {
             let bits = value.as_vec3().to_array().map(f32::to_bits);
@@ -422,11 +470,6 @@ impl Media {
             medium.components.iter().map(|component| self.field(Some(&component.density))).collect();
         words[23] = self.components(scene, medium, &densities);
         self.most_terms = self.most_terms.max(words[23]);
-        let cells = size.iter().sum::<u32>() + 3;
-        self.cells += cells;
-        if medium.temperature.is_some() {
-            self.marched += cells;
-        }
         if self.wavelength.is_none() {
             self.wavelength = Some(self.spectra.len() as u32);
             self.spectra.push(wavelength(scene));
@@ -477,8 +520,13 @@ impl Media {
     fn field(&mut self, field: Option<&Field>) -> [u32; 2] {
         match field {
             Some(Field::Grid(grid)) => {
-                self.voxels.extend_from_slice(&grid.values);
-                [(self.voxels.len() - grid.values.len()) as u32, 0]
+                let known = self.grids.iter().find(|(values, _)| Arc::ptr_eq(values, &grid.values));
+                let first = known.map_or(self.voxels.len() as u32, |(_, first)| *first);
+                if known.is_none() {
+                    self.voxels.extend_from_slice(&grid.values);
+                    self.grids.push((grid.values.clone(), first));
+                }
+                [first, 0]
             }
             Some(Field::Constant(value)) => [NONE, (*value as f32).to_bits()],
             None => [NONE, 0],
@@ -560,6 +608,36 @@ impl Media {
         let outer = (self.outer != NONE).then(|| self.outer + 1);
         boundaries.bodies_around(point).into_iter().chain(outer).collect()
     }
+}
+
+/// Why there are more volumes than numbers for them.
+fn too_many(scene: &Scene, volumes: &[Volume]) -> String {
+    let placed = volumes.iter().filter_map(|volume| Some((volume.instance?.0, volume.medium)));
+    let most = placed.max_by_key(|(assembly, _)| scene.assemblies[*assembly].instances.len());
+    match most {
+        None => format!("{} interiors with media, at most {MOST_VOLUMES} are supported", volumes.len()),
+        Some((assembly, medium)) => {
+            let Assembly { name, instances } = &scene.assemblies[assembly];
+            format!(
+                "more than {MOST_VOLUMES} interiors with media, of which each instance of a medium with a grid is one: assembly \"{name}\" \
+                 with \"{}\" is placed {} times; place it less often, or use numbers instead of its grids",
+                medium.name,
+                instances.len()
+            )
+        }
+    }
+}
+
+/// The most voxels that a way of so many stretches goes through, and those among them that evaluation marches through.
+fn most_walked(volumes: &[Volume], stretches: usize) -> (u32, u32) {
+    let sum = |is_walked: fn(&Medium) -> bool| {
+        let walked = volumes.iter().filter(|volume| is_walked(volume.medium));
+        let cells = |size: [u32; 3]| size.iter().sum::<u32>() + 3;
+        let mut all: Vec<u32> = walked.filter_map(|volume| volume.medium.grid_size().map(cells)).collect();
+        all.sort_unstable_by(|a, b| b.cmp(a));
+        all.iter().take(stretches).sum()
+    };
+    (sum(|_| true), sum(|medium| medium.temperature.is_some()))
 }
 
 /// What sources are multiplied with twice in a body of `material`: its index; the mean over channels where it does not disperse.

@@ -348,7 +348,7 @@ impl ComponentCoefficients {
 fn ask(scene: &Scene, places: &[Filled], coefficients: &[OfMedium], asking: &mut Asking) {
     let channels = scene.channels.len();
     let mut ratio: f64 = 1.0;
-    for place in places.iter().filter(|place| scene.media[place.medium].scatters()) {
+    for place in places.iter().filter(|place| scene.media[place.medium].scatters() && !place.is_repeated) {
         let of = &coefficients[place.medium];
         let mut spread = |depth: &dyn Fn(usize) -> f64| {
             let depths: Vec<f64> = (0..channels).map(|k| (depth(k) * place.extent).max(LEAST_DEPTH)).collect();

@@ -133,8 +133,9 @@ material = "ball"
 assembly = "tree"
 "#],
     notes: "What emits does so in every place, with the same radiance whatever its size: each instance is one light of those \
-            that paths aim at. An `interior` fills every instance, with as much per metre of the world whatever its size; its \
-            medium has no grids, and where instances overlap it is there once.",
+            that paths aim at. An `interior` fills every instance, with as much per metre of the world whatever its size; \
+            where instances overlap it is there once. Grids of its medium are carried along by each instance: their voxels are \
+            kept once, but each instance is then an interior of its own among the [254](#limits) of a scene.",
 };
 
 pub static INSTANCE: Section = Section {
