@@ -9,7 +9,7 @@ use super::scene::parse_override;
 use super::sensor::refuse_itself;
 use crate::cube::{self, Cube, Existing, NewCube, Relighted};
 use crate::files::shown;
-use crate::scene::{self, NewChannels, Relit};
+use crate::scene::{self, Files, NewChannels, Relit};
 use crate::{Error, Result};
 
 /// A cube under other lamps, paints, temperatures or channels, without rendering it again
@@ -81,7 +81,9 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         (None, [file]) => NewChannels::Scene(Path::new(file)),
         (None, _) => return Err(Error::Usage("--channels: give one scene, or keys such as equal.count=1000".into())),
     };
-    let relit = scene::relight(&basis, cube.channels(), &args.sets, wanted)?;
+    let (remainder, beside) = (cube.header().remainder(), cube.header().spectra_of_remainder());
+    let rendered = scene::Rendered { basis: &basis, channels: cube.channels(), remainder: &remainder, beside: &beside };
+    let relit = scene::relight(rendered, &args.sets, wanted, Files::Disk)?;
     for warning in &relit.warnings {
         output.warn(warning)?;
     }

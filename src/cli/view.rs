@@ -13,6 +13,8 @@ use crate::Result;
 /// as brightness temperature; a click shows the spectrum of a pixel. The cube may be one that is being rendered, or larger than
 /// memory: zoomed out only its overview is read. docs/http.md describes what else can be asked of the server.
 ///
+/// Cubes of `render --factored` can be looked at under other lamps and paints, as `relight` makes them; docs/RELIGHT.md says more.
+///
 /// Counts of a sensor (`sensor --model`) are shown as they are, or with --noise off as the detector would count without noise and patterns.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = "\

@@ -163,11 +163,15 @@ impl Header {
     }
 
     /// The same cube, with weights of products of spectra of `basis`, of so many factors at most, instead of radiance; and where
-    /// something does not separate, which `remainder` has in words, a remainder in channels.
-    pub fn with_weights(mut self, basis: &Basis, most_factors: u32, remainder: &[String]) -> Header {
+    /// something does not separate, which `remainder` has in words, a remainder in channels; `beside` are named spectra that are in that
+    /// alone.
+    pub fn with_weights(mut self, basis: &Basis, most_factors: u32, remainder: &[String], beside: &[String]) -> Header {
         let mut factored = json!({ "most_factors": most_factors, "basis": basis });
         if !remainder.is_empty() {
             factored["remainder"] = json!(remainder);
+        }
+        if !beside.is_empty() {
+            factored["remainder_spectra"] = json!(beside);
         }
         self.attributes.insert(FACTORED.into(), factored);
         self
@@ -175,7 +179,16 @@ impl Header {
 
     /// What of a factored cube's scene does not separate, in words: it lies in the array `remainder`.
     pub fn remainder(&self) -> Vec<String> {
-        let written = self.attributes.get(FACTORED).and_then(|of| of.get("remainder"));
+        self.words_of_factored("remainder")
+    }
+
+    /// The named spectra of a factored cube that are in no product, but in what does not separate; none in cubes of older versions.
+    pub fn spectra_of_remainder(&self) -> Vec<String> {
+        self.words_of_factored("remainder_spectra")
+    }
+
+    fn words_of_factored(&self, name: &str) -> Vec<String> {
+        let written = self.attributes.get(FACTORED).and_then(|of| of.get(name));
         written.and_then(|words| serde_json::from_value(words.clone()).ok()).unwrap_or_default()
     }
 

@@ -52,7 +52,7 @@ fn header(kind: Kind) -> Header {
     .with_layers(&LayerNames::new(&LAYERS, vec!["objects.0".into()], Vec::new()));
     match kind {
         Kind::Radiance => header,
-        Kind::Weights => header.with_weights(&basis(), 2, &["matter".into()]),
+        Kind::Weights => header.with_weights(&basis(), 2, &["matter".into()], &[]),
     }
 }
 

@@ -172,6 +172,17 @@ impl<'a> CubeState<'a> {
         if has { self.chunk(TileArray::RemainderError, tile) } else { Ok(None) }
     }
 
+    /// The remainder of a pixel of a cube that has one.
+    pub(super) fn remainder_of(&self, x: u32, y: u32) -> Result<Vec<f32>> {
+        let (grid, channels) = (self.cube.grid(), self.cube.channels().len());
+        let tile = grid.tile_at(x, y);
+        let rect = grid.rect(tile);
+        let mut remainder = vec![0.0f32; channels];
+        let pixel = self.cube.layout().pixel(grid.tile, x - rect.x0, y - rect.y0) as u64;
+        self.read(TileArray::Remainder, tile, pixel * channels as u64 * 4, &mut remainder)?;
+        Ok(remainder)
+    }
+
     /// The K channels of a pixel, in one contiguous read; `None` before the first unit of its tile. The pixel must lie in
     /// the picture.
     pub fn spectrum(&self, x: u32, y: u32) -> Result<Option<Vec<f32>>> {
@@ -186,10 +197,7 @@ impl<'a> CubeState<'a> {
             let pixel = ((y - rect.y0) * grid.tile[0] + x - rect.x0) as usize;
             let mut spectrum = weights.spectrum(pixel, self.cube.expander()?);
             if self.cube.header().has_remainder() {
-                let mut remainder = vec![0.0f32; channels];
-                let pixel = self.cube.layout().pixel(grid.tile, x - rect.x0, y - rect.y0) as u64;
-                self.read(TileArray::Remainder, tile, pixel * channels as u64 * 4, &mut remainder)?;
-                add(&mut spectrum, &remainder);
+                add(&mut spectrum, &self.remainder_of(x, y)?);
             }
             return Ok(Some(spectrum));
         }
@@ -451,7 +459,7 @@ pub(super) fn add(values: &mut [f32], others: &[f32]) {
 }
 
 /// Weighted sums over blocks of `factor` x `factor` pixels.
-struct Sums {
+pub(super) struct Sums {
     factor: u32,
     /// Column and row of the first block, and how many there are.
     first: [u32; 2],
@@ -462,7 +470,7 @@ struct Sums {
 }
 
 impl Sums {
-    fn new(rect: Rect, factor: u32, planes: usize) -> Sums {
+    pub(super) fn new(rect: Rect, factor: u32, planes: usize) -> Sums {
         let first = [rect.x0 / factor, rect.y0 / factor];
         let size = [rect.x1.div_ceil(factor) - first[0], rect.y1.div_ceil(factor) - first[1]];
         let blocks = size[0] as usize * size[1] as usize;
@@ -470,13 +478,13 @@ impl Sums {
     }
 
     /// The pixels of the picture in these blocks.
-    fn pixels(&self, grid: Grid) -> Rect {
+    pub(super) fn pixels(&self, grid: Grid) -> Rect {
         let [x0, y0] = self.first.map(|block| block * self.factor);
         let end = |axis: usize| ((self.first[axis] + self.size[axis]) * self.factor).min(grid.size[axis]);
         Rect { x0, y0, x1: end(0), y1: end(1) }
     }
 
-    fn add(&mut self, x: u32, y: u32, weight: u32, values: &[f32]) {
+    pub(super) fn add(&mut self, x: u32, y: u32, weight: u32, values: &[f32]) {
         let [column, row] = [x / self.factor - self.first[0], y / self.factor - self.first[1]];
         let block = row as usize * self.size[0] as usize + column as usize;
         let sums = &mut self.sums[block * self.planes..][..self.planes];
@@ -489,7 +497,7 @@ impl Sums {
         self.weights[block] += weight;
     }
 
-    fn means(mut self) -> Window {
+    pub(super) fn means(mut self) -> Window {
         for (sums, &weight) in self.sums.chunks_exact_mut(self.planes).zip(&self.weights) {
             match weight {
                 0 => sums.fill(f32::NAN),

@@ -182,6 +182,23 @@ impl Weights {
         merged
     }
 
+    /// Without what is of which group of epochs: means alone.
+    pub(super) fn without_shares(self) -> Weights {
+        Weights { shares: Vec::new(), groups: 1, ..self }
+    }
+
+    /// Each entry of a pixel: the place of its product, and its weight.
+    #[inline(always)]
+    pub(super) fn of_pixel(&self, pixel: usize) -> impl Iterator<Item = (usize, f32)> + '_ {
+        self.entries(pixel).map(|i| (self.product[i] as usize, self.weight[i]))
+    }
+
+    /// Bytes that it takes in memory.
+    pub(super) fn bytes(&self) -> u64 {
+        let of_products = size_of::<Product>() * self.products.len();
+        (of_products + 4 * (self.starts.len() + self.product.len() + self.weight.len() + self.shares.len())) as u64
+    }
+
     /// The same among `products`, which must hold all of its own.
     fn over(mut self, products: &[Product]) -> Weights {
         let places = places(&self.products, products);

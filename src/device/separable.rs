@@ -238,6 +238,14 @@ impl Separated {
         Ok(separated)
     }
 
+    /// The names of spectra of `scene` that are in no product: those of what does not separate.
+    pub fn spectra_of_remainder(&self, scene: &Scene) -> Vec<String> {
+        let is_in_products = |name: &str| self.basis.spectra.iter().any(|leaf| leaf.is_named && leaf.name == name);
+        let names = scene.spectra.iter().filter_map(|spectrum| spectrum.definition.as_ref().map(|of| of.name.as_str()));
+        let beside: BTreeSet<&str> = names.filter(|name| !is_in_products(name)).collect();
+        beside.into_iter().map(str::to_owned).collect()
+    }
+
     /// By the ids that `tables` gave to spectra. `needed`: those that materials of general scenes asked for.
     pub fn by_id(&self, ids: &SpectrumIds, needed: &[Needed], tables: &SpectralTables) -> Separable {
         let (mut factors, mut sources) = (vec![Factor::Mixed; tables.ids.len()], vec![None; tables.ids.len()]);

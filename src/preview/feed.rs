@@ -238,6 +238,13 @@ impl Feed {
         self.publish(|state| state.progress.estimate = estimate);
     }
 
+    /// Something that who watches has a hand in has changed: the revision that it then has.
+    pub fn touched(&self) -> u64 {
+        let mut revision = 0;
+        self.publish(|state| revision = state.revision);
+        revision
+    }
+
     pub fn snapshot(&self) -> Snapshot {
         self.state().snapshot()
     }

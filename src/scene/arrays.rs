@@ -33,6 +33,11 @@ pub enum Data {
         name: String,
         read: Result<SpectrumTable, Box<Problem>>,
     },
+    /// What a file of this name holds, which is not on this machine.
+    File {
+        name: String,
+        content: Vec<u8>,
+    },
 }
 
 /// What an array says of its numbers.
@@ -79,7 +84,10 @@ pub enum Corners<const N: usize> {
 impl Data {
     pub fn name(&self) -> &str {
         match self {
-            Data::Numbers { name, .. } | Data::Mesh { name, .. } | Data::Spectrum { name, .. } => name,
+            Data::Numbers { name, .. }
+            | Data::Mesh { name, .. }
+            | Data::Spectrum { name, .. }
+            | Data::File { name, .. } => name,
             Data::Table(table) => &table.name,
         }
     }
@@ -91,6 +99,7 @@ impl Data {
             Data::Mesh { .. } => "a mesh",
             Data::Table(_) => "a table",
             Data::Spectrum { .. } => "a spectrum",
+            Data::File { .. } => "a file",
         }
     }
 

@@ -51,7 +51,7 @@ pub use transform::box_around;
 
 pub use crate::format::mtf::MtfTable;
 pub use crate::format::phase::PhaseTable;
-pub use relight::{NewChannels, Relit, relight};
+pub use relight::{Changeable, Choice, Chosen, Files, NewChannels, Relit, Rendered, changeable, choose, relight};
 pub use sensor::{Blur, Detector, Optics, Seen, SensorModel, load_sensor, parse_sensor};
 pub use spectrum::{Quantity, irradiance};
 

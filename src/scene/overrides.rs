@@ -256,7 +256,7 @@ fn rivals(parents: &[&str], key: &str) -> Vec<&'static str> {
                 // A texture stands in the place of a spectrum, with keys of its own.
                 "texture" | "endmembers" => {
                     rivals.extend(keys::SPECTRUM.one_of());
-                    rivals.extend(["column", "scale", "outside"]);
+                    rivals.extend(["column", "share", "scale", "outside"]);
                 }
                 _ if is_one_of(&keys::SPECTRUM) => rivals.extend(["texture", "endmembers"]),
                 _ => {}
@@ -264,7 +264,10 @@ fn rivals(parents: &[&str], key: &str) -> Vec<&'static str> {
             if is_one_of(&keys::SPECTRUM) && key != "file" {
                 rivals.push("column");
             }
-            if matches!(key, "constant" | "blackbody") {
+            if is_one_of(&keys::SPECTRUM) && key != "mix" {
+                rivals.push("share");
+            }
+            if matches!(key, "constant" | "blackbody" | "illuminant" | "named" | "mix") {
                 rivals.push("outside");
             }
             rivals

@@ -1,9 +1,15 @@
 //! Other spectra, temperatures and channels for the products of a factored cube, written as in a scene file.
 
+mod choice;
+
 use std::path::Path;
+use std::sync::Arc;
+
+pub use self::choice::{Changeable, Choice, Chosen, changeable, choose};
+use super::arrays::Data;
 
 use super::context::Context;
-use super::decode::{Item, did_you_mean, list};
+use super::decode::{Item, did_you_mean, join, list};
 use super::spectrum::{Quantity, Spectra};
 use super::tree::{Entry, Node, Origin, Value};
 use super::{channels, overrides};
@@ -12,6 +18,26 @@ use crate::format::response::{self, Responses};
 use crate::spectral::product::{Basis, Leaf, Term};
 use crate::spectral::{Channels, Curve, Outside};
 use crate::{Result, files};
+
+/// A factored cube as it was rendered.
+#[derive(Debug, Clone, Copy)]
+pub struct Rendered<'a> {
+    pub basis: &'a Basis,
+    pub channels: &'a Channels,
+    /// What does not separate, in words.
+    pub remainder: &'a [String],
+    /// Names of spectra that light meets nowhere else.
+    pub beside: &'a [String],
+}
+
+/// Where the files are that spectra name.
+#[derive(Debug, Clone, Copy)]
+pub enum Files<'a> {
+    /// On this machine.
+    Disk,
+    /// Here, each under its name; others are refused.
+    Given(&'a [(String, String)]),
+}
 
 /// The channels that are wanted.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,13 +65,14 @@ pub struct Relit {
 /// Where mistakes of an option are said to stand.
 const OPTION: &str = "--set";
 
-/// `basis` and `channels` with what `sets` changes: `spectra.NAME` and what may stand below it in a scene file, and
-/// `materials.NAME.temperature`.
+/// What `rendered` is made of with what `sets` changes: `spectra.NAME` and what may stand below it in a scene file, and
+/// `materials.NAME.temperature`. Names within spectra (`named`, `mix`) are of spectra as they were rendered.
 ///
 /// # Errors
 /// What a cube cannot change, and mistakes as in scene files.
-pub fn relight(basis: &Basis, channels: &Channels, sets: &[(String, String)], wanted: NewChannels) -> Result<Relit> {
+pub fn relight(rendered: Rendered, sets: &[(String, String)], wanted: NewChannels, files: Files) -> Result<Relit> {
     let mut warnings = Vec::new();
+    let Rendered { basis, channels, .. } = rendered;
     let channels = new_channels(channels, wanted, &mut warnings)?;
     let (names, materials) = (names(basis), materials(basis));
     let mut spectra: Vec<&str> = Vec::new();
@@ -64,7 +91,7 @@ pub fn relight(basis: &Basis, channels: &Channels, sets: &[(String, String)], wa
                 hot.extend(materials.iter().find(|n| **n == name));
                 normal.push((format!("materials.\"{}\".temperature", name.escape_default()), value.clone()));
             }
-            _ => return Err(refusal(key, &path, &names, &materials)),
+            _ => return Err(refusal(key, &path, &names, &materials, rendered)),
         }
     }
     [&mut spectra, &mut hot].into_iter().for_each(|all| {
@@ -82,7 +109,14 @@ pub fn relight(basis: &Basis, channels: &Channels, sets: &[(String, String)], wa
     let Some(mut root) = cx.document() else { return Err(Error::Input(cx.finish().0)) };
     overrides::apply(&cx, &mut root, &normal);
     let mut relit = basis.clone();
-    decode(&cx, &root, &channels, &users, &hot, &mut relit);
+    let are_all_there = match files {
+        Files::Disk => true,
+        Files::Given(files) => root.iter_mut().all(|entry| give(&cx, entry, "", files)),
+    };
+    if are_all_there {
+        let known = names.iter().map(|name| (*name, &leaf(basis, name).curve)).collect::<Vec<_>>();
+        decode(&cx, &root, &channels, &users, &known, &hot, &mut relit);
+    }
     let (problems, more) = cx.finish();
     if !problems.is_empty() {
         return Err(Error::Input(problems));
@@ -103,6 +137,37 @@ fn names(basis: &Basis) -> Vec<&str> {
     names
 }
 
+/// The first spectrum of that name, which there is.
+fn leaf<'b>(basis: &'b Basis, name: &str) -> &'b Leaf {
+    basis.spectra.iter().find(|leaf| leaf.is_named && leaf.name == name).expect("a name of the basis")
+}
+
+/// Puts what `files` hold in the places of their names, wherever below `entry` there is one; false where one is not among them, which is
+/// said.
+fn give(cx: &Context, entry: &mut Entry, parent: &str, files: &[(String, String)]) -> bool {
+    let path = join(parent, &entry.key);
+    let Value::String(name) = &entry.node.value else { return give_below(cx, &mut entry.node, &path, files) };
+    if entry.key != "file" {
+        return true;
+    }
+    let Some((name, content)) = files.iter().find(|(known, _)| known == name) else {
+        let message = format!("names the file \"{name}\", but no file of this machine is read here");
+        cx.error(&entry.node.origin, &path, message, Some("send what it holds along".to_owned()));
+        return false;
+    };
+    let data = Data::File { name: name.clone(), content: content.clone().into_bytes() };
+    entry.node.value = Value::Data(Arc::new(data));
+    true
+}
+
+fn give_below(cx: &Context, node: &mut Node, path: &str, files: &[(String, String)]) -> bool {
+    match &mut node.value {
+        Value::Table(entries) => entries.iter_mut().all(|entry| give(cx, entry, path, files)),
+        Value::Array(items) => items.iter_mut().all(|item| give_below(cx, item, path, files)),
+        _ => true,
+    }
+}
+
 /// The hot materials of a basis.
 fn materials(basis: &Basis) -> Vec<&str> {
     let terms = basis.factors.iter().chain(&basis.sources).flat_map(|expression| &expression.terms);
@@ -117,8 +182,13 @@ fn materials(basis: &Basis) -> Vec<&str> {
     materials
 }
 
-fn refusal(key: &str, path: &[&str], names: &[&str], materials: &[&str]) -> Error {
+fn refusal(key: &str, path: &[&str], names: &[&str], materials: &[&str], rendered: Rendered) -> Error {
     let what = match path {
+        ["spectra", name, ..] if rendered.beside.iter().any(|beside| beside == name) => format!(
+            "the spectrum \"{name}\" reaches the picture only by what does not separate ({}), which is kept as it was rendered; what \
+             changes it needs a new render",
+            rendered.remainder.join(", ")
+        ),
         ["spectra", name, ..] => {
             let hint = did_you_mean(name, names.iter().copied());
             let known = || format!("the cube has {}", list(names.iter().copied()));
@@ -138,8 +208,7 @@ fn refusal(key: &str, path: &[&str], names: &[&str], materials: &[&str]) -> Erro
 fn document(basis: &Basis, spectra: &[&str], hot: &[&str]) -> String {
     let mut text = String::new();
     for name in spectra {
-        let leaf = basis.spectra.iter().find(|leaf| leaf.is_named && leaf.name == *name).expect("found before");
-        text += &format!("[spectra.\"{}\"]\n{}\n", name.escape_default(), written(&leaf.curve));
+        text += &format!("[spectra.\"{}\"]\n{}\n", name.escape_default(), written(&leaf(basis, name).curve));
     }
     for name in hot {
         let terms = basis.sources.iter().flat_map(|source| &source.terms);
@@ -172,12 +241,13 @@ fn decode<'a>(
     root: &'a [Entry],
     channels: &Channels,
     users: &'a [(&str, Node)],
+    known: &[(&'a str, &Curve)],
     hot: &[&str],
     basis: &mut Basis,
 ) {
     let top = |key: &str| root.iter().find(|entry| entry.key == key);
     let item = |entry: &'a Entry| Item { cx, node: &entry.node, path: entry.key.clone(), at: &entry.node.origin };
-    let mut all = Spectra::new(cx, top("spectra").map(item), Some(channels.clone()));
+    let mut all = Spectra::meaning(cx, top("spectra").map(item), Some(channels.clone()), known);
     let mut found = Vec::new();
     for (name, node) in users {
         for (i, leaf) in basis.spectra.iter().enumerate().filter(|(_, leaf)| leaf.is_named && leaf.name == *name) {
@@ -310,7 +380,12 @@ mod tests {
 
     fn set(sets: &[(&str, &str)]) -> Result<Relit> {
         let sets: Vec<_> = sets.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
-        relight(&basis(), &Channels::equal(400.0, 700.0, 3), &sets, NewChannels::Same)
+        let (basis, channels) = (basis(), Channels::equal(400.0, 700.0, 3));
+        relight(rendered(&basis, &channels), &sets, NewChannels::Same, Files::Disk)
+    }
+
+    fn rendered<'a>(basis: &'a Basis, channels: &'a Channels) -> Rendered<'a> {
+        Rendered { basis, channels, remainder: &[], beside: &[] }
     }
 
     #[test]
@@ -345,7 +420,9 @@ mod tests {
         let mut cube = basis();
         let table = Curve::Linear { nm: vec![400.0, 700.0], value: vec![1.0, 2.0], outside: Outside::Zero };
         cube.spectra[0].curve = table;
-        let relit = relight(&cube, &Channels::equal(400.0, 700.0, 3), &[], NewChannels::Set(&sets)).expect("channels");
+        let channels = Channels::equal(400.0, 700.0, 3);
+        let wanted = NewChannels::Set(&sets);
+        let relit = relight(rendered(&cube, &channels), &[], wanted, Files::Disk).expect("channels");
         assert!(relit.warnings.iter().any(|warning| warning.contains("in none of the channels, 0.4 and 0.7 nm")));
     }
 
@@ -367,11 +444,72 @@ mod tests {
         }
     }
 
+    /// Names within spectra are those of the render, also of what is being changed.
+    #[test]
+    fn spectra_are_made_of_others() {
+        let lamp = |value: &str| set(&[("spectra.lamp", value)]).map(|relit| relit.basis.spectra[0].curve.clone());
+        let dimmed = lamp("{ named = \"lamp\", scale = 0.5 }").expect("dimmed");
+        assert_eq!(dimmed, Curve::Blackbody { kelvin: 3000.0, scale: 0.25 });
+        let mixed = lamp("{ mix = [\"lamp\", { illuminant = \"E\", scale = 2 }], share = 0.25 }").expect("mixed");
+        for nm in [400.0, 512.3, 699.0] {
+            let want = 0.75 * 0.5 * crate::spectral::planck::radiance(nm, 3000.0) + 0.5;
+            assert!((mixed.eval(nm) / want - 1.0).abs() < 1e-6, "{nm}");
+        }
+        let swapped = set(&[("spectra.lamp", "1.0"), ("spectra.paint", "{ named = \"paint\", scale = 0.1 }")]);
+        let want = basis().spectra[1].curve.scaled(0.1);
+        assert_eq!(swapped.expect("swapped").basis.spectra[1].curve, want);
+        for (key, value, words) in [
+            ("spectra.lamp", "{ named = \"lmap\" }", "no spectrum is named \"lmap\""),
+            ("spectra.lamp", "{ illuminant = \"D66\" }", "\"D65\""),
+            ("spectra.lamp", "{ illuminant = \"D65\", share = 0.5 }", "goes with `mix` only"),
+            ("spectra.lamp", "{ mix = [1.0, 2.0], share = 1.5 }", "in [0, 1]"),
+            ("spectra.lamp", "{ mix = [1.0] }", "two spectra"),
+            ("spectra.paint", "{ illuminant = \"D65\" }", "the illuminant D65, which is light"),
+            ("spectra.paint", "{ named = \"paint\", scale = 2 }", "in [0, 1]"),
+        ] {
+            let said = set(&[(key, value)]).expect_err(value).to_string();
+            assert!(said.contains(words), "{value}: {said}");
+        }
+    }
+
+    #[test]
+    fn files_are_given_or_refused() {
+        let (basis, channels) = (basis(), Channels::equal(400.0, 700.0, 3));
+        let files = [("paint.csv".to_owned(), "nm,a,b\n400,0.1,0.3\n700,0.2,0.4\n".to_owned())];
+        let given = |value: &str| {
+            let sets = [("spectra.paint".to_owned(), value.to_owned())];
+            relight(rendered(&basis, &channels), &sets, NewChannels::Same, Files::Given(&files))
+        };
+        let relit = given("{ file = \"paint.csv\", column = \"b\" }").expect("given");
+        let table = Curve::Linear { nm: vec![400.0, 700.0], value: vec![0.3, 0.4], outside: Outside::Hold };
+        assert_eq!(relit.basis.spectra[1].curve, table);
+        given("{ mix = [{ file = \"paint.csv\", column = 2 }, 0.5] }").expect("within");
+        for name in ["other.csv", "/etc/hostname", "../paint.csv"] {
+            for value in [format!("{{ file = \"{name}\" }}"), format!("{{ mix = [0.5, {{ file = \"{name}\" }}] }}")] {
+                let said = given(&value).expect_err(name).to_string();
+                assert!(said.contains("no file of this machine is read here"), "{said}");
+            }
+        }
+        let said = given("{ file = \"paint.csv\" }").expect_err("two columns").to_string();
+        assert!(said.contains("paint.csv"), "{said}");
+    }
+
+    #[test]
+    fn what_is_only_in_the_remainder_is_told_so() {
+        let (basis, channels) = (basis(), Channels::equal(400.0, 700.0, 3));
+        let (remainder, beside) = (["the material \"cat\" (plastic)".to_owned()], ["varnish".to_owned()]);
+        let rendered = Rendered { remainder: &remainder, beside: &beside, ..rendered(&basis, &channels) };
+        let sets = [("spectra.varnish".to_owned(), "0.5".to_owned())];
+        let said = relight(rendered, &sets, NewChannels::Same, Files::Disk).expect_err("refused").to_string();
+        assert!(said.contains("only by what does not separate (the material \"cat\" (plastic))"), "{said}");
+    }
+
     #[test]
     fn channels_are_written_as_in_scenes() {
         let of = |channels: &Channels, key: &str, value: &str| {
             let sets = [(key.to_owned(), value.to_owned())];
-            relight(&basis(), channels, &[], NewChannels::Set(&sets)).map(|relit| relit.channels)
+            let wanted = NewChannels::Set(&sets);
+            relight(rendered(&basis(), channels), &[], wanted, Files::Disk).map(|relit| relit.channels)
         };
         let equal = Channels::equal(400.0, 700.0, 3);
         assert_eq!(of(&equal, "equal.count", "6").expect("six").bounds, Channels::equal(400.0, 700.0, 6).bounds);

@@ -21,11 +21,15 @@ use crate::format::said::Said;
 use crate::format::table::shown;
 use crate::format::text::{self, SpectrumTable};
 use crate::format::unit::{Density, Meaning, Stated};
+use crate::spectral::illuminant::illuminant;
 use crate::spectral::{Channels, Curve, Outside, SOLAR, columns, hull, upsample};
 
 /// Wavelengths, in nm, far beyond any channel, between which a curve's peak is looked for.
 const SHORTEST: f64 = 1e-3;
 const LONGEST: f64 = 1e15;
+
+/// Where black bodies of mixtures are known if there are no channels, nm.
+const BLACK_BODIES: [f64; 2] = [100.0, 1e5];
 
 /// Irradiances of the sun that need no definition, by column of the built-in table.
 const STANDARDS: [&str; 2] = ["am0", "am1.5"];
@@ -92,6 +96,8 @@ pub struct Spectra<'a> {
     cx: &'a Context<'a>,
     /// `None` where the definition is wrong, which has been said.
     named: Vec<(&'a str, Option<Source<'a>>)>,
+    /// What names stand for within spectra, where that is not `named`.
+    meant: Option<Vec<(&'a str, Option<Source<'a>>)>>,
     /// Curves already made from a name.
     by_name: HashMap<(String, Quantity), Option<Handle>>,
     checked: Vec<Checked>,
@@ -103,8 +109,15 @@ pub struct Spectra<'a> {
 impl<'a> Spectra<'a> {
     /// Decodes `[spectra]`. `channels` decide what a table leaves uncovered.
     pub fn new(cx: &'a Context<'a>, item: Option<Item<'a>>, channels: Option<Channels>) -> Self {
+        let (by_name, checked, scene) = (HashMap::new(), Vec::new(), Vec::new());
+        let mut spectra = Spectra { cx, named: Vec::new(), meant: None, by_name, checked, scene, channels };
+        spectra.define(item);
+        spectra
+    }
+
+    fn define(&mut self, item: Option<Item<'a>>) {
         let items = item.and_then(|item| item.named_items()).unwrap_or_default();
-        let needed = channels.as_ref().and_then(Channels::hull);
+        let needed = self.channel_hull();
         let define = |(name, item): (&'a str, Item<'a>)| match item.node.value {
             Value::String(_) => {
                 item.error_help(
@@ -115,14 +128,50 @@ impl<'a> Spectra<'a> {
             }
             _ => (name, source(&item, needed)),
         };
-        let named = items.into_iter().map(define).collect();
-        Spectra { cx, named, by_name: HashMap::new(), checked: Vec::new(), scene: Vec::new(), channels }
+        self.named = items.into_iter().map(define).collect();
+        // Also what nothing uses.
+        self.named.iter().flat_map(|(_, source)| source).for_each(|source| self.check_names(source));
+    }
+
+    /// What names stand for within spectra.
+    fn known(&self) -> &[(&'a str, Option<Source<'a>>)] {
+        self.meant.as_ref().unwrap_or(&self.named)
+    }
+
+    /// Refuses names that `source` is made of and that there are not.
+    fn check_names(&self, source: &Source<'a>) {
+        let known = || self.known().iter().map(|(name, _)| *name);
+        for (name, said) in source.names() {
+            if known().any(|known| known == name) {
+                continue;
+            }
+            let help = did_you_mean(name, known()).unwrap_or_else(|| match known().next() {
+                None => format!("define it: [spectra.{name}]"),
+                Some(_) => format!("[spectra] has {}", list(known())),
+            });
+            self.cx.error(said.at, &said.path, format!("no spectrum is named \"{name}\""), Some(help));
+        }
+    }
+
+    /// The same where spectra that are made of others, by `named` and `mix`, mean `known` by their names, and not each other.
+    pub fn meaning(
+        cx: &'a Context<'a>,
+        item: Option<Item<'a>>,
+        channels: Option<Channels>,
+        known: &[(&'a str, &Curve)],
+    ) -> Self {
+        let meant = known.iter().map(|(name, curve)| (*name, Some(Source::of_curve(name, curve)))).collect();
+        let mut spectra = Spectra::new(cx, None, channels);
+        spectra.meant = Some(meant);
+        spectra.define(item);
+        spectra
     }
 
     /// The spectrum that `item` names or spells, checked for what it is to describe.
     pub fn resolve(&mut self, item: &Item<'a>, quantity: Quantity) -> Option<Handle> {
         let Value::String(name) = &item.node.value else {
             let source = source(item, self.channel_hull())?;
+            self.check_names(&source);
             return self.check(&source, &item.path, item, quantity);
         };
         let Some((_, definition)) = self.named.iter().find(|(known, _)| known == name) else {
@@ -336,13 +385,28 @@ impl<'a> Spectra<'a> {
     }
 
     fn check(&mut self, source: &Source<'a>, name: &str, user: &Item<'a>, quantity: Quantity) -> Option<Handle> {
+        let mut warnings = Vec::new();
+        let curve = self.curve_of(source, name, user, quantity, &[], &mut warnings)?;
+        self.checked.push(Checked { name: name.to_owned(), curve, definition: None, warnings, taken: None });
+        Some(self.checked.len() - 1)
+    }
+
+    /// What `source` is, checked. `within`: the names in whose definitions it stands.
+    fn curve_of(
+        &self,
+        source: &Source<'a>,
+        name: &str,
+        user: &Item<'a>,
+        quantity: Quantity,
+        within: &[&str],
+        warnings: &mut Vec<String>,
+    ) -> Option<Curve> {
         let used_by =
             if source.path.starts_with(&user.path) { String::new() } else { format!("; used by `{}`", user.path) };
         let refuse = |value: String| {
             let message = format!("{}, but is {value}{used_by}", quantity.range());
             self.cx.error(source.at, &source.path, message, None);
         };
-        let mut warnings = Vec::new();
         let is_index = quantity.is_index();
         if quantity == Quantity::Emissivity && source.outside == Some(Outside::Zero) {
             let help = "remove `outside`, or write outside = \"hold\"; a reflectance may be 0 there";
@@ -356,7 +420,7 @@ impl<'a> Spectra<'a> {
             self.cx.error(source.at, &source.path, message, Some(help.to_owned()));
             return None;
         }
-        let curve = match &source.data {
+        Some(match &source.data {
             Data::Constant(value) => {
                 let scaled = value * source.scale;
                 if !quantity.allows(scaled) {
@@ -384,7 +448,7 @@ impl<'a> Spectra<'a> {
             }
             Data::Table { nm, value, file } => {
                 let table = Tabulated { nm, value, file: file.as_ref(), source, name };
-                self.tabulated(&table, user, quantity, &refuse, &mut warnings)?
+                self.tabulated(&table, user, quantity, &refuse, warnings)?
             }
             Data::Rgb(rgb) => {
                 let colour = rgb.map(|v| v * source.scale);
@@ -397,11 +461,52 @@ impl<'a> Spectra<'a> {
                 }
                 let curve =
                     if quantity.is_light() { upsample::emission(colour) } else { upsample::reflectance(colour) };
-                self.rgb_outside(curve, source.outside, name, &mut warnings)
+                self.rgb_outside(curve, source.outside, name, warnings)
             }
+            Data::Illuminant(of) => {
+                let curve = illuminant(of).filter(|_| quantity.is_light());
+                let Some(curve) = curve else {
+                    refuse(format!("the illuminant {of}, which is light"));
+                    return None;
+                };
+                if let Curve::Linear { nm, .. } = &curve {
+                    let gap = self.uncovered(nm[0], nm[nm.len() - 1]);
+                    warnings.extend(gap.map(|gap| format!("the illuminant {of} does not cover {gap}: it is 0 there")));
+                }
+                self.in_range(curve.scaled(source.scale), quantity, &refuse)?
+            }
+            Data::Named(of) => {
+                // A name that there is not has been refused.
+                let (of, definition) = self.known().iter().find(|(known, _)| known == of)?;
+                if within.contains(of) {
+                    let help = "name another, or write what it is";
+                    self.cx.error(source.at, &source.path, format!("`{of}` is made of itself"), Some(help.to_owned()));
+                    return None;
+                }
+                let curve =
+                    self.curve_of(definition.as_ref()?, of, user, quantity, &[within, &[of]].concat(), warnings)?;
+                self.in_range(curve.scaled(source.scale), quantity, &refuse)?
+            }
+            Data::Mix(parts, share) => {
+                let mut part = |i: usize| self.curve_of(&parts[i], name, user, quantity, within, warnings);
+                let (first, second) = (part(0), part(1));
+                let mixed = first?.mixed(&second?, *share, self.channel_hull().unwrap_or(BLACK_BODIES));
+                self.in_range(mixed.scaled(source.scale), quantity, &refuse)?
+            }
+        })
+    }
+
+    /// `curve`, or what of it is not allowed is refused.
+    fn in_range(&self, curve: Curve, quantity: Quantity, refuse: &dyn Fn(String)) -> Option<Curve> {
+        let wrong = match &curve {
+            Curve::Linear { value, .. } => value.iter().copied().find(|v| !quantity.allows(*v)),
+            other => Some(other.max(SHORTEST, LONGEST)).filter(|v| !quantity.allows(*v)),
         };
-        self.checked.push(Checked { name: name.to_owned(), curve, definition: None, warnings, taken: None });
-        Some(self.checked.len() - 1)
+        if let Some(value) = wrong {
+            refuse(format!("{value:e}"));
+            return None;
+        }
+        Some(curve)
     }
 
     /// The curve of a table: in the unit of `quantity`, scaled, without noise.

@@ -65,6 +65,33 @@ impl Observer {
         self.curves().each_ref().map(|curve| curve.mean(300.0, 900.0) * 600.0)
     }
 
+    /// ∫ȳ dλ over all wavelengths, nm.
+    pub fn luminous_nm(self) -> f64 {
+        self.integrals()[1]
+    }
+
+    /// X, Y and Z of light with this distribution over nm: ∫ x̄ L dλ and so on, over ∫ȳ dλ, so that a constant 1 has Y = 1. Exact where
+    /// the light is piecewise linear.
+    pub fn xyz(self, light: &Curve) -> [f64; 3] {
+        let luminous = self.integrals()[1];
+        self.curves().each_ref().map(|curve| {
+            let Curve::Linear { nm, .. } = curve else { unreachable!("observers are tables") };
+            // Between nodes of either both are lines: Simpson's rule is exact.
+            let mut nodes = nm.clone();
+            if let Curve::Linear { nm: more, .. } = light {
+                nodes.extend(more.iter().filter(|x| (nm[0]..=nm[nm.len() - 1]).contains(*x)));
+                nodes.sort_by(f64::total_cmp);
+                nodes.dedup();
+            }
+            let piece = |from: f64, to: f64| {
+                let inside = 1e-9 * (to - from);
+                let of = |at: f64| curve.eval(at) * light.eval(at);
+                (to - from) / 6.0 * (of(from + inside) + 4.0 * of(0.5 * (from + to)) + of(to - inside))
+            };
+            nodes.windows(2).map(|pair| piece(pair[0], pair[1])).sum::<f64>() / luminous
+        })
+    }
+
     /// X, Y and Z as channels whose responses are x̄, ȳ and z̄.
     pub fn channels(self) -> Channels {
         let named = ["X", "Y", "Z"].into_iter().zip(self.curves()).filter_map(|(name, curve)| match curve {
@@ -297,6 +324,32 @@ mod tests {
         // Equal energy is white for the observer of 2015 by construction.
         let [x, y, z] = Observer::Cie2015.integrals();
         assert!((x / y - 1.0).abs() < 2e-4 && (z / y - 1.0).abs() < 2e-4, "{x} {y} {z}");
+    }
+
+    /// Against channels of 1 nm in which the light is a constant, and of the nodes between: X, Y, Z by both are sums over the same pieces.
+    #[test]
+    fn light_has_the_colour_of_fine_channels() {
+        let light = Curve::Linear {
+            nm: vec![400.5, 500.25, 500.25, 700.0],
+            value: vec![1.0, 3.0, 0.5, 2.0],
+            outside: Outside::Zero,
+        };
+        let body = Curve::Blackbody { kelvin: 3000.0, scale: 1e-3 };
+        let channels = Channels::equal(360.0, 830.0, 47_000);
+        for (light, observer) in [(&light, Observer::Cie1931), (&body, Observer::Cie1964)] {
+            let weights = xyz_weights(&channels, observer);
+            let want = weights.iter().zip(&channels.bounds).fold([0.0; 3], |sum, (w, [from, to])| {
+                let mean = light.mean(*from, *to);
+                std::array::from_fn(|i| sum[i] + w[i] * mean)
+            });
+            // Within 0.01 nm both are lines: means of products are products of means to their slopes' product over twelve.
+            for (got, want) in observer.xyz(light).into_iter().zip(want) {
+                assert!((got / want - 1.0).abs() < 1e-6, "{got} {want}");
+            }
+        }
+        let integrals = Observer::Cie1931.integrals();
+        let white = Observer::Cie1931.xyz(&Curve::Constant(1.0));
+        assert!((0..3).all(|i| (white[i] / (integrals[i] / integrals[1]) - 1.0).abs() < 1e-12));
     }
 
     #[test]

@@ -176,6 +176,75 @@ impl Curve {
         }
     }
 
+    /// (1 - `share`) of this curve and `share` of `other`. Black bodies beside curves of another kind become lines between [from, to] nm,
+    /// right to 1e-6 of their values, and end there.
+    pub fn mixed(&self, other: &Curve, share: f64, range: [f64; 2]) -> Curve {
+        let (first, second) = (self.scaled(1.0 - share), other.scaled(share));
+        match (&first, &second) {
+            _ if share == 0.0 => return first,
+            _ if share == 1.0 => return second,
+            (Curve::Constant(a), Curve::Constant(b)) => return Curve::Constant(a + b),
+            (Curve::Blackbody { kelvin, scale }, Curve::Blackbody { kelvin: same, scale: more }) if kelvin == same => {
+                return Curve::Blackbody { kelvin: *kelvin, scale: scale + more };
+            }
+            _ => {}
+        }
+        let parts = [first, second].map(|curve| curve.as_lines(range));
+        let mut places: Vec<f64> = parts.iter().flat_map(Curve::knots).copied().collect();
+        places.sort_by(f64::total_cmp);
+        places.dedup();
+        let (mut nm, mut value) = (Vec::new(), Vec::new());
+        for &place in &places {
+            let limits = parts.each_ref().map(|part| part.limits(place));
+            let [below, above] = [0, 1].map(|side| limits[0][side] + limits[1][side]);
+            nm.push(place);
+            value.push(below);
+            if above != below {
+                nm.push(place);
+                value.push(above);
+            }
+        }
+        let goes_on = |end: Option<&f64>| end.is_some_and(|value| *value != 0.0);
+        let outside = if goes_on(value.first()) || goes_on(value.last()) { Outside::Hold } else { Outside::Zero };
+        Curve::Linear { nm, value, outside }
+    }
+
+    /// Wavelengths between which it is a line.
+    pub fn knots(&self) -> &[f64] {
+        match self {
+            Curve::Linear { nm, .. } => nm,
+            Curve::Constant(_) | Curve::Blackbody { .. } => &[],
+        }
+    }
+
+    /// A black body as lines, of which none is off by more than 1e-6 of its value; zero outside of the range.
+    fn as_lines(&self, [from, to]: [f64; 2]) -> Curve {
+        let Curve::Blackbody { kelvin, .. } = self else { return self.clone() };
+        let (mut nm, mut at) = (Vec::new(), from);
+        while at < to {
+            nm.push(at);
+            // Planck's law L bends by less than (x + 5)² L / λ², x = c₂ / (λ T); a chord is off by an eighth of that times its square.
+            let x = 1e9 * planck::C2 / (at * kelvin);
+            at *= 1.0 + (7e-6f64).sqrt() / (x.min(300.0) + 5.0);
+        }
+        nm.push(to);
+        let value = nm.iter().map(|nm| self.eval(*nm)).collect();
+        Curve::Linear { nm, value, outside: Outside::Zero }
+    }
+
+    /// The values that it has below and above `place`, which differ at steps and ends.
+    fn limits(&self, place: f64) -> [f64; 2] {
+        let Curve::Linear { nm, value, outside } = self else { return [self.eval(place); 2] };
+        let at = nm.partition_point(|x| *x < place)..nm.partition_point(|x| *x <= place);
+        if at.is_empty() {
+            return [self.eval(place); 2];
+        }
+        let beyond = |end: f64| if *outside == Outside::Hold { end } else { 0.0 };
+        let below = if at.start == 0 { beyond(value[0]) } else { value[at.start] };
+        let above = if at.end == nm.len() { beyond(value[at.end - 1]) } else { value[at.end - 1] };
+        [below, above]
+    }
+
     /// Whether the value is the same at every wavelength.
     pub fn is_constant(&self) -> bool {
         match self {
@@ -224,6 +293,33 @@ mod tests {
         assert_eq!(zero.eval(600.0), 3.0);
         assert_eq!(zero.eval(601.0), 0.0);
         assert_eq!(table(Outside::Hold).eval(601.0), 3.0);
+    }
+
+    #[test]
+    fn mixtures_are_sums_everywhere() {
+        let body = |kelvin: f64| Curve::Blackbody { kelvin, scale: 0.5 };
+        let flat = Curve::Linear { nm: vec![450.0, 550.0], value: vec![2.0, 2.0], outside: Outside::Zero };
+        let range = [300.0, 900.0];
+        for (a, b) in [
+            (table(Outside::Zero), flat.clone()),
+            (table(Outside::Hold), flat.clone()),
+            (table(Outside::Zero), Curve::Constant(3.0)),
+            (Curve::Constant(1.0), Curve::Constant(3.0)),
+            (body(3000.0), flat),
+            (body(3000.0), body(6000.0)),
+            (body(3000.0), body(3000.0)),
+            (body(300.0), Curve::Constant(1e-12)),
+        ] {
+            let mixed = a.mixed(&b, 0.3, range);
+            // Between nodes: at a step a sum has the value from above, and an end belongs to its table.
+            for nm in (3001..8999).step_by(7).map(|nm| f64::from(nm) / 10.0 + 0.05) {
+                let want = 0.7 * a.eval(nm) + 0.3 * b.eval(nm);
+                assert!((mixed.eval(nm) - want).abs() <= 1e-6 * want, "{nm}: {} {want} {a:?}", mixed.eval(nm));
+            }
+            assert_eq!((a.mixed(&b, 0.0, range), a.mixed(&b, 1.0, range)), (a.scaled(1.0), b.scaled(1.0)));
+            let mean = 0.7 * a.mean(380.0, 700.0) + 0.3 * b.mean(380.0, 700.0);
+            assert!((mixed.mean(380.0, 700.0) - mean).abs() <= 1e-6 * mean);
+        }
     }
 
     #[test]

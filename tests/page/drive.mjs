@@ -1,5 +1,5 @@
 // Drives the page as somebody who looks at it would, and prints what it saw as one JSON object.
-//   node drive.mjs render|view|heat URL X Y [FOLDER FOR SCREENSHOTS]
+//   node drive.mjs render|view|heat|relight URL X Y [FOLDER FOR SCREENSHOTS]
 
 import fs from "node:fs";
 import { open } from "./browser.mjs";
@@ -35,7 +35,7 @@ const download = async (act) => {
 const against_png = () => page.evaluate(async () => {
   const { picture } = window.spectile, { tone, show } = picture;
   const [square] = picture.inSight(picture.scales().base, [0, 0, ...picture.cube.size]), [x0, y0, x1, y1] = square.rect;
-  const shown = ["temperature", "samples"].includes(show.mode) ? `low=${tone.low}&high=${tone.high}` : `ev=${tone.ev}`;
+  const shown = ["temperature", "samples", "difference"].includes(show.mode) ? `low=${tone.low}&high=${tone.high}` : `ev=${tone.ev}`;
   const url = `/api/image?${square.what}&x0=${x0}&y0=${y0}&x1=${x1}&y1=${y1}&scale=${square.scale}&${shown}`;
   const bitmap = await createImageBitmap(await (await fetch(url)).blob());
   const { width, height } = square.canvas, copy = new OffscreenCanvas(width, height).getContext("2d");
@@ -54,6 +54,7 @@ for (let i = 0; i < PATIENCE && seen.start.colours <= 20; i++) {
   seen.start = await browser.look();
 }
 seen.title = await page.title();
+seen.panel = await page.locator("#relight").isVisible();
 if (what === "view") seen.against_png = await against_png();
 
 if (what === "render") {
@@ -90,7 +91,93 @@ if (what === "render") {
   await page.locator("#save").click();
 }
 
-if (what === "heat") {
+if (what === "relight") {
+  await page.waitForFunction(() => window.spectile.relight.isThere());
+  seen.panel = await page.locator("#relight").isVisible();
+  seen.rows = await page.locator("#relight-rows legend").evaluateAll((all) => all.map((legend) => legend.firstChild.textContent));
+  await page.mouse.click(...(await browser.at(Number(x), Number(y))));
+  await page.waitForFunction(() => window.spectile.spectra.pins.length === 1);
+  // What the page holds of the pinned pixel, once the server has what was chosen and all is drawn.
+  const settles = async () => {
+    await page.waitForFunction(() => { const { relight, spectra } = window.spectile; return !relight.isBusy() && !spectra.refreshing; });
+    await browser.settled();
+  };
+  const pinned = async () => {
+    await settles();
+    return page.evaluate(() => { const { radiance, other, difference } = window.spectile.spectra.pins[0]; return { radiance, other, difference, series: window.spectile.spectra.plot.series.length - 1 }; });
+  };
+  const row = (name) => page.locator(`[data-name="${name}"]`);
+  seen.before = await pinned();
+  await page.locator('[data-choice="b"]').click();
+  seen.illuminant = await change(() => row("desk lamp").locator('[data-key="first"]').selectOption("illuminant:FL11"));
+  seen.under_illuminant = await pinned();
+  seen.scaled = await change(() => page.getByLabel("desk lamp: ×").fill("0.25"));
+  seen.under_scaled = await pinned();
+  seen.mixed = await change(async () => {
+    await row("desk lamp").locator('[data-key="second"]').selectOption("rendered");
+    const share = page.getByLabel("desk lamp: share of the second");
+    await share.focus();
+    for (let i = 0; i < 5; i++) await page.keyboard.press("ArrowRight");
+  });
+  seen.dropped = await change(async () => {
+    const data = await page.evaluateHandle(() => {
+      const data = new DataTransfer();
+      data.items.add(new File(["nm,r\n400,0.9\n700,0.1\n"], "paint.csv", { type: "text/csv" }));
+      return data;
+    });
+    await page.dispatchEvent('[data-name="paint"]', "drop", { dataTransfer: data });
+  });
+  seen.under_dropped = await pinned();
+  await shot("relight");
+  seen.command = await page.locator("#relight-command").textContent();
+  seen.sets = await page.evaluate(() => window.spectile.relight.said.b.sets);
+  // What is wrong is told, and nothing changes.
+  await row("grey").locator('[data-key="first"]').selectOption("constant");
+  await settles();
+  await page.getByLabel("grey: value").fill("1.5");
+  await page.waitForFunction(() => document.getElementById("relight-said").classList.contains("wrong"));
+  seen.wrong = await page.locator("#relight-said").textContent();
+  // The browser tells of the answer, too.
+  seen.refusals = browser.complaints.splice(0);
+  await row("grey").locator('[data-key="first"]').selectOption("rendered");
+  await settles();
+  // Between both, and how far they are apart.
+  await page.locator("#picture").focus();
+  seen.switched = await change(() => page.keyboard.press("x"));
+  seen.shown = await page.evaluate(() => window.spectile.relight.shown);
+  seen.difference = await change(() => page.keyboard.press("6"));
+  await settles();
+  await page.mouse.move(...(await browser.at(Number(x), Number(y))));
+  await page.waitForFunction(() => document.getElementById("cursor").textContent.includes("ΔE 2000"));
+  seen.cursor = await page.locator("#cursor").textContent();
+  seen.list = await page.locator("#pins .value").textContent();
+  seen.against_png = await against_png();
+  await shot("relight-difference");
+  // Beside another white.
+  seen.white = await change(() => page.locator("#white").selectOption(`${x},${y}`));
+  seen.under_white = await pinned();
+  await page.locator("#white").selectOption("");
+  await settles();
+  // Copied, there is no difference.
+  await page.locator("#copy-choice").click();
+  await settles();
+  seen.copied = await pinned();
+  await page.locator("#picture").focus();
+  await page.keyboard.press("1");
+  await page.keyboard.press("Escape");
+  await page.locator('[data-choice="a"]').click();
+  await page.locator("#reset-choice").click();
+  await settles();
+  seen.end = await browser.look();
+  // Whoever comes later sees what was chosen.
+  await page.locator('[data-choice="b"]').click();
+  await row("ceiling").locator('[data-key="first"]').selectOption("constant");
+  await page.getByLabel("ceiling: value").fill("0.02");
+  await settles();
+  await page.reload();
+  await page.waitForFunction(() => window.spectile.relight.isThere());
+  seen.forms = await page.evaluate(() => window.spectile.relight.forms.b);
+} else if (what === "heat") {
   // By itself: all channels are thermal.
   seen.opens_as = await page.evaluate(() => window.spectile.picture.show.mode);
   await browser.settled();

@@ -70,6 +70,18 @@ pub fn ask(address: SocketAddr, method: &str, target: &str, headers: &[(&str, &s
     raw(address, (request + "\r\n").as_bytes()).unwrap_or_else(|| panic!("no answer to {method} {target} {headers:?}"))
 }
 
+/// A request with a body, and with the token where there is one.
+pub fn put(address: SocketAddr, target: &str, token: Option<&str>, body: &str) -> Answer {
+    let length = body.len().to_string();
+    let bearer = token.map(|token| format!("Bearer {token}")).unwrap_or_default();
+    let mut request =
+        format!("PUT {target} HTTP/1.1\r\nConnection: close\r\nHost: {address}\r\nContent-Length: {length}\r\n");
+    if token.is_some() {
+        request += &format!("Authorization: {bearer}\r\n");
+    }
+    raw(address, (request + "\r\n" + body).as_bytes()).unwrap_or_else(|| panic!("no answer to PUT {target}"))
+}
+
 pub fn get(address: SocketAddr, target: &str) -> Answer {
     let answer = ask(address, "GET", target, &[]);
     assert_eq!(answer.status, 200, "{target}: {}", String::from_utf8_lossy(&answer.body));

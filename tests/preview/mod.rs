@@ -4,6 +4,7 @@ mod client;
 mod hostile;
 mod huge;
 mod page;
+mod relight;
 mod rendering;
 mod served;
 mod tev;

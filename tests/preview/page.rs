@@ -13,7 +13,7 @@ use tempfile::tempdir;
 
 use super::client::Running;
 use crate::binary::{command, cornell};
-use crate::cubes::{create, header, pattern, patterned, unit};
+use crate::cubes::{create, factored, header, pattern, patterned, unit};
 use crate::report::skip;
 
 /// What the page showed; `None` without a browser.
@@ -126,7 +126,7 @@ fn a_finished_cube_opens() {
     let place = [321, 77];
     let Some(seen) = drive("view", &running.url, place) else { return };
     check_looking(&seen, folder.path(), place);
-    assert_eq!(seen["stage"], "viewing");
+    assert_eq!((&seen["stage"], &seen["panel"]), (&"viewing".into(), &false.into()), "nothing to relight");
     // The page looks sRGB up in a table of 8192 steps, which are 0.05 of a value apart at most.
     for how in ["against_png", "channel_against_png"] {
         assert!(seen[how].as_u64() <= Some(1) && seen[how].is_u64(), "{how}: {}", seen[how]);
@@ -160,6 +160,68 @@ fn heat_is_shown_in_kelvins() {
     assert_eq!((&seen["samples"]["changed"], &seen["samples_against_png"]), (&json!(true), &json!(0)));
     let (cursor, range) = (seen["samples_cursor"].as_str().expect("text"), &seen["samples_range"]);
     assert!(cursor.ends_with(": 4 samples") && *range == json!([1, 4]), "{cursor} {range}");
+}
+
+/// Light and paint, by the menus of the page: what it shows is what `relight` makes of the command line that it shows.
+#[test]
+fn light_and_paint_are_chosen() {
+    let folder = tempdir().expect("folder");
+    let cube = factored(folder.path(), "cube.zarr", header([96, 64], [32, 32], 40), true);
+    let running = Running::start(folder.path(), &["view", "cube.zarr", "--listen", "127.0.0.1:0", "--json"]);
+    let [x, y] = [70, 40];
+    let Some(seen) = drive("relight", &running.url, [x, y]) else { return };
+    assert_eq!((&seen["panel"], &seen["rows"]), (&json!(true), &json!(["ceiling", "desk lamp", "grey", "paint"])));
+    let radiance = |of: &str, which: &str| -> Vec<f32> {
+        let values = seen[of][which].as_array().unwrap_or_else(|| panic!("{of} {which}: {}", seen[of]));
+        values.iter().map(|v| v.as_f64().expect("a number") as f32).collect()
+    };
+    let rendered = cube.spectrum(x, y).expect("read").expect("there");
+    assert_eq!((radiance("before", "radiance"), &seen["before"]["other"]), (rendered.clone(), &Value::Null));
+    for change in ["illuminant", "scaled", "mixed", "dropped", "switched", "difference", "white"] {
+        assert_eq!(seen[change]["changed"], true, "{change}: {}", seen[change]);
+    }
+    // B is shown, and A, as it was rendered, beside it.
+    assert_eq!(
+        (radiance("under_illuminant", "other"), &seen["under_illuminant"]["series"]),
+        (rendered.clone(), &json!(2))
+    );
+    assert_ne!(radiance("under_illuminant", "radiance"), rendered);
+    // A quarter of the luminance that was rendered, so of all but the remainder.
+    let y_of = |of: &str| seen[of]["difference"]["b"]["xyz"][1].as_f64().expect("a number");
+    assert!(y_of("under_scaled") < 0.9 * y_of("under_illuminant"));
+    assert!(
+        seen["scaled"]["after"].as_f64() < seen["scaled"]["before"].as_f64(),
+        "exposed as A is: {}",
+        seen["scaled"]
+    );
+    // The same by the command line.
+    std::fs::write(folder.path().join("paint.csv"), "nm,r\n400,0.9\n700,0.1\n").expect("written");
+    let mut arguments = vec!["relight", "cube.zarr", "-o", "relit.zarr"];
+    let sets = seen["sets"].as_array().expect("a list");
+    sets.iter().for_each(|set| arguments.extend(["--set", set.as_str().expect("text")]));
+    assert!(command(folder.path(), &arguments).output().expect("runs").status.success());
+    let relit = Cube::open(&folder.path().join("relit.zarr")).expect("a cube");
+    assert_eq!(radiance("under_dropped", "radiance"), relit.spectrum(x, y).expect("read").expect("there"));
+    let line = seen["command"].as_str().expect("text");
+    assert!(
+        line.starts_with("spectile relight cube.zarr -o relit.zarr --set '") && line.contains("paint.csv"),
+        "{line}"
+    );
+    assert!(seen["wrong"].as_str().expect("text").contains("must lie in [0, 1]"), "{}", seen["wrong"]);
+    let refusals = seen["refusals"].as_array().expect("a list");
+    assert!(refusals.len() == 1 && refusals[0].to_string().contains("400"), "{refusals:?}");
+    assert_eq!((&seen["shown"], &seen["against_png"]), (&json!("a"), &json!(0)));
+    let delta = |of: &str| seen[of]["difference"]["delta_e_2000"].as_f64();
+    let shown = format!("ΔE {:.2}", delta("under_dropped").expect("a number"));
+    assert_eq!(seen["list"], shown);
+    let cursor = seen["cursor"].as_str().expect("text");
+    assert!(cursor.ends_with(" ΔE 2000"), "{cursor}");
+    // Its own white under each choice.
+    assert!(delta("under_white").expect("a number") < 1e-9, "{}", seen["under_white"]);
+    assert_eq!((delta("copied"), &seen["copied"]["other"]), (None, &Value::Null));
+    assert_eq!(seen["end"]["hash"], seen["start"]["hash"], "reset");
+    let ceiling = &seen["forms"]["ceiling"];
+    assert_eq!((&ceiling["first"]["kind"], &ceiling["first"]["value"]), (&json!("constant"), &json!(0.02)));
 }
 
 /// Where the cube has standard errors, the plot has a band around each spectrum, and the file a column.

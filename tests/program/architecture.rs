@@ -22,7 +22,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("sensor", &["cube", "scene", "spectral"]),
     ("sky", &["cube", "spectral"]),
     ("export", &["cube", "format", "spectral"]),
-    ("preview", &["cube", "format", "spectral"]),
+    ("preview", &["cube", "scene", "format", "spectral"]),
     ("render", &["device", "gpu", "cube", "preview", "scene", "spectral"]),
     ("slurm", &["cube"]),
     ("report", &["render", "device", "gpu", "cube", "scene", "format"]),

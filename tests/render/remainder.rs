@@ -15,8 +15,11 @@ fn scene() -> String {
         r#"[spectra.other]
 constant = 0.0
 
+[spectra.varnish]
+constant = 0.6
+
 [materials.shiny.plastic]
-reflectance = 0.6
+reflectance = "varnish"
 eta = 1.5
 roughness = 0.2
 
@@ -170,6 +173,10 @@ fn what_cannot_be_changed_is_told() {
         }
     }
 
+    let output = place.run(&["relight", "cube.zarr", "-o", "out.zarr", "--set", "spectra.varnish=0.1"]);
+    let told = text(&output.stderr);
+    let why = "\"varnish\" reaches the picture only by what does not separate (the material \"shiny\" (plastic))";
+    assert!(output.status.code() == Some(2) && told.contains(why), "{told}");
     let output = place.run(&["relight", "cube.zarr", "-o", "out.zarr", "--channels", "equal.count=3"]);
     let said = text(&output.stderr);
     let words =

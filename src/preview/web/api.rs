@@ -11,22 +11,25 @@ use axum::http::header::{CACHE_CONTROL, CONTENT_TYPE, LOCATION, SET_COOKIE};
 use axum::http::{HeaderName, HeaderValue, StatusCode};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
-use axum::routing::{get, post};
+use axum::routing::{get, post, put};
 use axum::{Extension, Router};
 use serde::Deserialize;
 use serde_json::json;
 
 use super::guard::Peer;
+use super::relight::{self, LONGEST_CHOICE, Which};
 use super::{App, events, image, page};
-use crate::cube::{CubeState, Rect};
+use crate::cube::{CubeState, Rect, RegionMean};
 use crate::format::text;
 use crate::preview::Control;
 use crate::spectral::colour::{ProjectionKind, three_of};
 use crate::spectral::temperature::is_thermal;
 use crate::{Error, Result};
 
-/// Bytes of a body; no request needs one.
+/// Bytes of a body; no request needs one, but for a choice.
 const LONGEST_BODY: usize = 1024;
+/// Where choices are put.
+const CHOICES: &str = "/api/relight/";
 /// How long a request waits for its turn to read.
 const PATIENCE: Duration = Duration::from_secs(20);
 
@@ -73,6 +76,9 @@ pub fn router(app: &Arc<App>) -> Router {
         .route("/api/channels", get(channels))
         .route("/api/image", get(image::image))
         .route("/api/spectrum", get(spectrum))
+        .route("/api/relight", get(relight::what))
+        .route("/api/relight/{which}", put(relight::choose).layer(DefaultBodyLimit::max(LONGEST_CHOICE)))
+        .route("/api/difference", get(relight::difference))
         .route("/api/events", get(events::events))
         .route("/api/pause", post(pause))
         .route("/api/resume", post(resume))
@@ -94,9 +100,13 @@ async fn watch_over(
 ) -> Response {
     let peer: Option<IpAddr> = peer.map(|Extension(Peer(ip))| ip);
     let length = request.headers().get("content-length").and_then(|length| length.to_str().ok());
-    let too_long = length.is_some_and(|length| length.parse::<usize>().is_ok_and(|length| length > LONGEST_BODY));
+    let (longest, why) = match request.uri().path().starts_with(CHOICES) {
+        true => (LONGEST_CHOICE, "a choice has 1 MiB at most"),
+        false => (LONGEST_BODY, "no request needs a body"),
+    };
+    let too_long = length.is_some_and(|length| length.parse::<usize>().is_ok_and(|length| length > longest));
     let mut response = match app.guard.check(request.method(), request.uri(), request.headers(), peer) {
-        Ok(()) if too_long => Refused(StatusCode::PAYLOAD_TOO_LARGE, "no request needs a body".into()).into_response(),
+        Ok(()) if too_long => Refused(StatusCode::PAYLOAD_TOO_LARGE, why.into()).into_response(),
         Ok(()) => {
             app.busy.fetch_add(1, Ordering::SeqCst);
             let response = next.run(request).await;
@@ -221,6 +231,7 @@ struct Where {
     y: u32,
     x1: Option<u32>,
     y1: Option<u32>,
+    choice: Option<Which>,
     #[serde(default)]
     format: Format,
 }
@@ -238,8 +249,11 @@ async fn spectrum(
     place: std::result::Result<Query<Where>, axum::extract::rejection::QueryRejection>,
 ) -> std::result::Result<Response, Refused> {
     let Query(place) = place.map_err(|error| Refused::query(&error))?;
-    let format = place.format;
-    let body = app.read(move |state| read_spectrum(state, &place)).await?;
+    let (format, shared) = (place.format, Arc::clone(&app));
+    if place.choice.is_some() {
+        relight::relightable(&app)?;
+    }
+    let body = app.read(move |state| read_spectrum(state, &place, &shared.relighting)).await?;
     let body = body.ok_or_else(|| Refused(StatusCode::NOT_FOUND, "there are no samples here yet".into()))?;
     Ok(match format {
         Format::Json => json_response(body),
@@ -262,28 +276,58 @@ struct Spectrum<T> {
     standard_error: Option<Vec<T>>,
 }
 
-/// The spectrum of a pixel, or the mean over a rectangle, as text; `None` where nothing is rendered yet.
-fn read_spectrum(state: CubeState<'_>, place: &Where) -> Result<Option<String>> {
-    let ([width, height], &Where { x, y, x1, y1, .. }) = (state.cube().header().size, place);
+/// What is read of a pixel, with standard errors where there are some, or of a rectangle.
+enum Spectra {
+    Pixel(Option<(Vec<f32>, Option<Vec<f32>>)>),
+    Region(Option<RegionMean>),
+}
+
+/// A pixel, or the rectangle from it to an end that is not included, of the picture.
+pub fn rectangle(state: CubeState<'_>, [x, y]: [u32; 2], [x1, y1]: [Option<u32>; 2]) -> Result<Rect> {
+    let [width, height] = state.cube().header().size;
     let [end_x, end_y] = [(x, x1), (y, y1)].map(|(from, to)| to.unwrap_or(from.saturating_add(1)));
     if x >= end_x || y >= end_y || end_x > width || end_y > height {
         return Err(Error::Usage(format!(
             "pixels {x}..{end_x} x {y}..{end_y} are not of the picture; columns are 0..{width}, rows 0..{height}"
         )));
     }
+    Ok(Rect { x0: x, y0: y, x1: end_x, y1: end_y })
+}
+
+/// The spectrum of a pixel, or the mean over a rectangle, as text; `None` where nothing is rendered yet.
+fn read_spectrum(state: CubeState<'_>, place: &Where, relighting: &relight::Relighting) -> Result<Option<String>> {
+    let &Where { x, y, x1, y1, .. } = place;
+    let rect = rectangle(state, [x, y], [x1, y1])?;
+    let is_pixel = x1.is_none() && y1.is_none();
     let samples = state.samples(state.cube().grid().tile_at(x, y))?;
-    if x1.is_none() && y1.is_none() {
-        let Some(radiance) = state.spectrum(x, y)? else { return Ok(None) };
-        let standard_error = state.standard_error(x, y)?;
-        let spectrum = Spectrum { x, y, x1, y1, pixels: 1, samples, radiance, standard_error };
-        return Ok(Some(spectrum.text(state, place.format)));
-    }
-    let Some(mean) = state.region(Rect { x0: x, y0: y, x1: end_x, y1: end_y })? else { return Ok(None) };
+    let relit = |which: Which| {
+        relighting.changed(state, which, |relit| match is_pixel {
+            true => Ok(Spectra::Pixel(relit.spectrum(x, y)?.map(|radiance| (radiance, None)))),
+            false => Ok(Spectra::Region(relit.region(rect)?)),
+        })
+    };
+    let found = match place.choice.map(relit).transpose()?.flatten() {
+        Some(relit) => relit,
+        None if is_pixel => {
+            let radiance = state.spectrum(x, y)?;
+            let errors = if radiance.is_some() { state.standard_error(x, y)? } else { None };
+            Spectra::Pixel(radiance.map(|radiance| (radiance, errors)))
+        }
+        None => Spectra::Region(state.region(rect)?),
+    };
+    let mean = match found {
+        Spectra::Pixel(None) | Spectra::Region(None) => return Ok(None),
+        Spectra::Pixel(Some((radiance, standard_error))) => {
+            let spectrum = Spectrum { x, y, x1, y1, pixels: 1, samples, radiance, standard_error };
+            return Ok(Some(spectrum.text(state, place.format)));
+        }
+        Spectra::Region(Some(mean)) => mean,
+    };
     let spectrum = Spectrum {
         x,
         y,
-        x1: Some(end_x),
-        y1: Some(end_y),
+        x1: Some(rect.x1),
+        y1: Some(rect.y1),
         pixels: mean.pixels,
         samples,
         radiance: mean.radiance,

@@ -53,6 +53,9 @@ pub fn status(app: &App, snapshot: &Snapshot, curve: bool) -> Value {
         set("cube", cube);
         set("channels", channels);
     }
+    if app.is_relightable() {
+        set("relight", app.relighting.revisions());
+    }
     if let Some(status) = &snapshot.progress.status {
         let devices = status.devices.iter().enumerate().map(|(device, d)| {
             let work = snapshot.progress.work.iter().filter(|work| work.device == device);

@@ -13,6 +13,7 @@ use serde::Deserialize;
 
 use super::App;
 use super::api::Refused;
+use super::relight::{Which, WhiteAsked, relightable};
 use crate::cube::{BLOCK, CubeState, Rect, Window};
 use crate::format::png;
 use crate::spectral::Channels;
@@ -24,6 +25,26 @@ use crate::{Error, Result};
 const MOST_PIXELS: u64 = 4 << 20;
 /// Pixels of one side that may become one.
 const LARGEST_SCALE: u32 = 1 << 16;
+
+/// The bright end of the colour map of differences is at least here, about what two patches beside each other just let see.
+const LEAST_DIFFERENCE: f64 = 1.0;
+
+/// Pixels of a picture of `rect` in which so many squared are one.
+fn pixels_of(rect: Rect, scale: u32) -> u64 {
+    let side = |from: u32, to: u32| u64::from(to.div_ceil(scale) - from / scale);
+    side(rect.x0, rect.x1) * side(rect.y0, rect.y1)
+}
+
+/// The finest of the allowed scales at which `rect` fits into an answer.
+fn finest(rect: Rect, allowed: impl Fn(u32) -> bool) -> u32 {
+    let mut powers = (0..=LARGEST_SCALE.ilog2()).map(|n| 1 << n);
+    powers.find(|&scale| allowed(scale) && pixels_of(rect, scale) <= MOST_PIXELS).unwrap_or(LARGEST_SCALE)
+}
+
+/// The scale of a picture in colour for which none is asked.
+pub fn default_scale(rect: Rect) -> u32 {
+    finest(rect, |_| true)
+}
 
 /// Tables of brightness temperatures by channel, made when first asked for.
 #[derive(Default)]
@@ -58,7 +79,13 @@ pub struct Asked {
     #[serde(default)]
     format: Format,
     ev: Option<f64>,
-    /// Kelvins, or samples, at the ends of the colour map.
+    /// Under which of both choices.
+    choice: Option<Which>,
+    white_x: Option<u32>,
+    white_y: Option<u32>,
+    white_factor: Option<f64>,
+    white_luminance: Option<f64>,
+    /// Kelvins, samples or differences, at the ends of the colour map.
     low: Option<f64>,
     high: Option<f64>,
 }
@@ -72,6 +99,7 @@ enum Show {
     False,
     Temperature,
     Samples,
+    Difference,
 }
 
 #[derive(Deserialize, Default, Clone, Copy, PartialEq)]
@@ -92,10 +120,13 @@ pub async fn image(
             return Err(Refused::bad(format!("`{name}` must be a finite number")));
         }
     }
-    let thermometers = Arc::clone(&app);
+    if asked.choice.is_some() || asked.show == Show::Difference {
+        relightable(&app)?;
+    }
+    let (shared, revision) = (Arc::clone(&app), app.feed.snapshot().revision);
     let (window, tone, png) = app
         .read(move |state| {
-            let window = asked.window(state, &thermometers.thermometers)?;
+            let window = asked.window(state, &shared, revision)?;
             let tone = asked.tone(&window);
             let png = (asked.format == Format::Png).then(|| asked.png(&window, tone)).transpose()?;
             Ok((window, tone, png))
@@ -112,7 +143,7 @@ pub async fn image(
 }
 
 impl Asked {
-    fn window(&self, state: CubeState<'_>, thermometers: &Thermometers) -> Result<Window> {
+    fn window(&self, state: CubeState<'_>, app: &App, revision: u64) -> Result<Window> {
         let refuse = |what: String| Err(Error::Usage(what));
         let ([width, height], channels) = (state.cube().header().size, state.cube().channels());
         let [x0, y0] = [self.x0, self.y0].map(|v| v.unwrap_or(0));
@@ -120,14 +151,11 @@ impl Asked {
         if rect.x0 >= rect.x1 || rect.y0 >= rect.y1 || rect.x1 > width || rect.y1 > height {
             return refuse(format!("x0, y0, x1, y1 are no part of the picture, which has {width} x {height} pixels"));
         }
-        let side = |from: u32, to: u32, scale: u32| u64::from(to.div_ceil(scale) - from / scale);
-        let pixels = |scale: u32| side(rect.x0, rect.x1, scale) * side(rect.y0, rect.y1, scale);
-        let powers = || (0..=LARGEST_SCALE.ilog2()).map(|n| 1 << n);
+        let pixels = |scale: u32| pixels_of(rect, scale);
         // Without a wish, as fine as it may be; of single channels nothing between pixels and blocks.
-        let is_fine = matches!(self.show, Show::Colour | Show::Samples);
+        let is_fine = matches!(self.show, Show::Colour | Show::Samples | Show::Difference);
         let allowed = |scale: u32| is_fine || scale == 1 || scale >= BLOCK;
-        let default = || powers().find(|&s| allowed(s) && pixels(s) <= MOST_PIXELS).unwrap_or(LARGEST_SCALE);
-        let scale = self.scale.unwrap_or_else(default);
+        let scale = self.scale.unwrap_or_else(|| finest(rect, allowed));
         if !scale.is_power_of_two() || scale > LARGEST_SCALE {
             return refuse(format!("scale={scale}: a power of two from 1 to {LARGEST_SCALE}"));
         }
@@ -141,13 +169,37 @@ impl Asked {
             Some(k) if k < channels.len() => Ok(k),
             _ => Err(Error::Usage(format!("{name}: a channel from 0 to {} is needed", channels.len() - 1))),
         };
+        let white = WhiteAsked {
+            pixel: [self.white_x, self.white_y],
+            factor: self.white_factor,
+            luminance: self.white_luminance,
+        };
+        let has_white = white.pixel != [None; 2] || white.factor.is_some() || white.luminance.is_some();
+        if has_white && self.show != Show::Difference {
+            return refuse("white_… go with show=difference only".into());
+        }
+        // Under a choice, or as it was rendered.
+        let colour = |state: CubeState<'_>| {
+            let relit = |which| app.relighting.changed(state, which, |relit| relit.colour(rect, scale));
+            self.choice.map(relit).transpose()?.flatten().map_or_else(|| state.colour(rect, scale), Ok)
+        };
+        let in_channels = |channels: &[usize]| {
+            let relit = |which| app.relighting.changed(state, which, |relit| relit.channels(channels, rect, scale));
+            self.choice.map(relit).transpose()?.flatten().map_or_else(|| state.channels(channels, rect, scale), Ok)
+        };
         match self.show {
-            Show::Colour => state.colour(rect, scale),
+            Show::Colour => colour(state),
+            Show::Samples | Show::Difference if self.choice.is_some() => {
+                refuse("`choice` goes with what differs by choice: colour, channel, false, temperature".into())
+            }
             Show::Samples => state.sample_counts(rect, scale),
-            Show::Channel => state.channels(&[channel("k", self.k)?], rect, scale),
+            Show::Difference => {
+                app.relighting.both(state, revision, white, |[a, b], white| a.differences(&b, white, rect, scale))
+            }
+            Show::Channel => in_channels(&[channel("k", self.k)?]),
             Show::False => {
                 let rgb = [channel("r", self.r)?, channel("g", self.g)?, channel("b", self.b)?];
-                state.channels(&rgb, rect, scale)
+                in_channels(&rgb)
             }
             Show::Temperature => {
                 let k = channel("k", self.k)?;
@@ -159,8 +211,8 @@ impl Asked {
                         "k={k}: its centre is below {THERMAL_NM} nm, where nothing glows by itself"
                     ));
                 }
-                let thermometer = thermometers.of(channels, k);
-                let mut window = state.channels(&[k], rect, scale)?;
+                let thermometer = app.thermometers.of(channels, k);
+                let mut window = in_channels(&[k])?;
                 window.values.iter_mut().for_each(|v| *v = thermometer.kelvin(f64::from(*v)) as f32);
                 Ok(window)
             }
@@ -180,6 +232,10 @@ impl Asked {
                 let least = lit().reduce(f32::min).map_or(1.0, f64::from);
                 let most = lit().reduce(f32::max).map_or(1.0, f64::from).max(2.0 * least);
                 Tone::Range([self.low.unwrap_or(least), self.high.unwrap_or(most)])
+            }
+            Show::Difference => {
+                let most = percentiles(&window.values)[1].max(LEAST_DIFFERENCE);
+                Tone::Range([self.low.unwrap_or(0.0), self.high.unwrap_or(most)])
             }
             _ => Tone::Exposure(self.ev.unwrap_or_else(|| auto_exposure(&window.values, window.planes))),
         }
@@ -203,7 +259,11 @@ impl Asked {
         match tone {
             Tone::Exposure(ev) => (HeaderName::from_static("x-exposure-ev"), ev.to_string()),
             Tone::Range([low, high]) => {
-                let name = if self.show == Show::Samples { "x-range-samples" } else { "x-range-k" };
+                let name = match self.show {
+                    Show::Samples => "x-range-samples",
+                    Show::Difference => "x-range-de",
+                    _ => "x-range-k",
+                };
                 (HeaderName::from_static(name), format!("{low},{high}"))
             }
         }

@@ -8,6 +8,7 @@ mod events;
 mod guard;
 mod image;
 mod page;
+mod relight;
 
 use std::io::{ErrorKind, Write};
 use std::net::SocketAddr;
@@ -61,6 +62,7 @@ struct App {
     readers: Semaphore,
     listeners: Arc<Semaphore>,
     thermometers: image::Thermometers,
+    relighting: relight::Relighting,
     /// Requests under way, events included, and when the last one ended.
     busy: AtomicUsize,
     last_request: std::sync::Mutex<Option<Instant>>,
@@ -109,6 +111,7 @@ impl Server {
             readers: Semaphore::new(READERS),
             listeners: Arc::new(Semaphore::new(LISTENERS)),
             thermometers: image::Thermometers::default(),
+            relighting: relight::Relighting::default(),
             busy: AtomicUsize::new(0),
             last_request: std::sync::Mutex::new(None),
             began: Instant::now(),

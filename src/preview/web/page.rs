@@ -7,13 +7,14 @@ use serde_json::json;
 use crate::spectral::tone::{MAP_LEVELS, map_level, srgb8};
 
 const DOCUMENT: &str = include_str!("page/page.html");
-const PARTS: [(&str, &str); 7] = [
+const PARTS: [(&str, &str); 8] = [
     ("{{uPlot.css}}", include_str!("page/vendor/uPlot.min.css")),
     ("{{page.css}}", include_str!("page/page.css")),
     ("{{uPlot.js}}", include_str!("page/vendor/uPlot.iife.min.js")),
     ("{{picture.js}}", include_str!("page/picture.js")),
     ("{{spectra.js}}", include_str!("page/spectra.js")),
     ("{{progress.js}}", include_str!("page/progress.js")),
+    ("{{relight.js}}", include_str!("page/relight.js")),
     ("{{page.js}}", include_str!("page/page.js")),
 ];
 

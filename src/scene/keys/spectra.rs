@@ -1,7 +1,8 @@
 //! Spectra: numbers over wavelength.
 
-use super::Kind::{Choice, File, List, Number, Table, Text};
+use super::Kind::{Choice, File, List, Name, Number, Table, Text};
 use super::{Key, Section};
+use crate::spectral::illuminant::ILLUMINANTS;
 
 pub static SPECTRUM: Section = Section {
     path: "spectra.NAME",
@@ -41,6 +42,26 @@ pub static SPECTRUM: Section = Section {
              spectrum times the daylight D65, `[1, 1, 1]` with luminance Y = 1. Not for indices and absorption.",
         )
         .range("as the quantity allows"),
+        Key::one_of(
+            "illuminant",
+            Choice(&ILLUMINANTS),
+            "Light distributed as that of an illuminant of the CIE, 1 at 560 nm: incandescent light A; daylight C and D; E, the same \
+             everywhere; fluorescent lamps FL; discharge lamps HP; LEDs. Zero beyond its table, 300 to 830 nm (A), 300 to 780 nm \
+             (daylight), 380 to 780 nm (lamps). For light only.",
+        ),
+        Key::one_of(
+            "named",
+            Name("spectrum"),
+            "That one of `[spectra]`, times `scale`. For `spectile relight` it is the one that the cube was rendered with.",
+        ),
+        Key::one_of(
+            "mix",
+            List("list of two spectra"),
+            "The sum of both, by `share`. Exact where both are lines; black bodies are lines at so many wavelengths of the channels that \
+             they are right to 1e-6.",
+        ),
+        Key::default("share", Number, "0.5", "Of the second spectrum of a `mix`; the first one has the rest. With `mix` only.")
+            .range("[0, 1]"),
         Key::optional(
             "column",
             Text,
@@ -63,7 +84,7 @@ pub static SPECTRUM: Section = Section {
             Choice(&["zero", "hold"]),
             "by what it describes",
             "What holds beyond the ends of the table: nothing, or its first and last value. Without effect on \
-             constants and black bodies, which is said.",
+             constants, black bodies, illuminants, named spectra and mixtures, which is said.",
         ),
     ],
     later: &[],
@@ -99,6 +120,21 @@ regular = { from = 400, to = 700, values = [0.1, 0.4, 0.9, 0.8] }
 [spectra.lamp]
 rgb = [0.8, 0.1, 0.1]
 ",
+        r#"
+[spectra.lamp]
+illuminant = "D65"
+scale = 0.01
+"#,
+        r#"
+[spectra]
+daylight = { illuminant = "D50", scale = 0.02 }
+lamp = { named = "daylight", scale = 0.5 }
+"#,
+        r#"
+[spectra]
+tubes = { illuminant = "FL11", scale = 0.1 }
+lamp = { mix = ["tubes", { blackbody = 2700, scale = 1e-5 }], share = 0.3 }
+"#,
         r#"
 [materials.red.diffuse]
 reflectance = { file = "paints.csv", column = "red" }      # the same keys where it is used

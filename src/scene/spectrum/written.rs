@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use super::super::decode::Item;
+use super::super::arrays;
+use super::super::decode::{Item, join};
 use super::super::keys;
 use super::super::texture::is_texture;
 use super::super::tree::{Origin, Value};
@@ -11,12 +12,13 @@ use crate::format::refractive;
 use crate::format::said::Said;
 use crate::format::text::{self, Column, SpectrumTable};
 use crate::format::unit::{Stated, Unit};
-use crate::spectral::Outside;
+use crate::spectral::illuminant::ILLUMINANTS;
+use crate::spectral::{Curve, Outside};
 
 /// A spectrum as written, before it is known what it describes.
 #[derive(Debug, Clone)]
 pub(super) struct Source<'a> {
-    pub(super) data: Data,
+    pub(super) data: Data<'a>,
     pub(super) scale: f64,
     /// Whether the scene says so, and be it 1.
     pub(super) is_scaled: bool,
@@ -26,8 +28,42 @@ pub(super) struct Source<'a> {
     pub(super) at: &'a Origin,
 }
 
+impl<'a> Source<'a> {
+    /// What `name` stands for, where `item` says it.
+    fn named(name: &str, item: &Item<'a>) -> Source<'a> {
+        Source::of(Data::Named(name.to_owned()), item.path.clone(), item.at)
+    }
+
+    fn of(data: Data<'a>, path: String, at: &'a Origin) -> Source<'a> {
+        Source { data, scale: 1.0, is_scaled: false, outside: None, path, at }
+    }
+
+    /// A curve that is known, under the name of one of `[spectra]`.
+    pub(super) fn of_curve(name: &str, curve: &Curve) -> Source<'a> {
+        let path = join("spectra", name);
+        let of = |data| Source::of(data, path, &Origin::Whole);
+        match curve {
+            Curve::Constant(value) => of(Data::Constant(*value)),
+            Curve::Blackbody { kelvin, scale } => Source { scale: *scale, ..of(Data::Blackbody(*kelvin)) },
+            Curve::Linear { nm, value, outside } => {
+                let table = Data::Table { nm: nm.clone(), value: value.clone(), file: None };
+                Source { outside: Some(*outside), ..of(table) }
+            }
+        }
+    }
+
+    /// The names that it is made of, and where each is said.
+    pub(super) fn names(&self) -> Vec<(&str, &Source<'a>)> {
+        match &self.data {
+            Data::Named(name) => vec![(name, self)],
+            Data::Mix(parts, _) => parts.iter().flat_map(Source::names).collect(),
+            _ => Vec::new(),
+        }
+    }
+}
+
 #[derive(Debug, Clone)]
-pub(super) enum Data {
+pub(super) enum Data<'a> {
     Constant(f64),
     Blackbody(f64),
     Table {
@@ -37,6 +73,12 @@ pub(super) enum Data {
         file: Option<TableFile>,
     },
     Rgb([f64; 3]),
+    /// One of [`ILLUMINANTS`].
+    Illuminant(&'static str),
+    /// What a name stands for.
+    Named(String),
+    /// Two spectra, and the share of the second.
+    Mix(Box<[Source<'a>; 2]>, f64),
 }
 
 /// What a file says beside the numbers of a table.
@@ -63,15 +105,7 @@ pub(super) fn source<'a>(item: &Item<'a>, needed: Option<[f64; 2]>) -> Option<So
             );
             return None;
         }
-        let data = Data::Constant(item.number()?);
-        return Some(Source {
-            data,
-            scale: 1.0,
-            is_scaled: false,
-            outside: None,
-            path: item.path.clone(),
-            at: item.at,
-        });
+        return Some(Source::of(Data::Constant(item.number()?), item.path.clone(), item.at));
     };
     if is_texture(item) {
         item.error_help(
@@ -97,6 +131,9 @@ pub(super) fn source<'a>(item: &Item<'a>, needed: Option<[f64; 2]>) -> Option<So
         Some("blackbody") => kind.positive().map(Data::Blackbody),
         Some("samples") => samples(&kind),
         Some("regular") => regular(&kind),
+        Some("illuminant") => kind.choice(&ILLUMINANTS.map(|name| (name, name))).map(Data::Illuminant),
+        Some("named") => kind.text().map(|name| Data::Named(name.to_owned())),
+        Some("mix") => mix(&kind, fields.get("share"), needed),
         _ => kind.numbers::<3>("three numbers [r, g, b]").map(Data::Rgb),
     }?;
     for key in ["column", "unit"] {
@@ -105,15 +142,28 @@ pub(super) fn source<'a>(item: &Item<'a>, needed: Option<[f64; 2]>) -> Option<So
             return None;
         }
     }
-    if outside.is_some() && matches!(data, Data::Constant(_) | Data::Blackbody(_)) {
+    if let (Some(item), false) = (fields.get("share"), fields.has("mix")) {
+        item.error_help("goes with `mix` only", "remove it");
+        return None;
+    }
+    if outside.is_some() && !matches!(data, Data::Table { .. } | Data::Rgb(_)) {
         item.cx.warn(format!("`{}.outside` has no effect: the spectrum is not a table", item.path));
     }
     let is_scaled = fields.has("scale");
     Some(Source { data, scale: scale?, is_scaled, outside, path: kind.path, at: kind.at })
 }
 
-pub(super) fn file(item: &Item, column: Option<Item>, unit: Option<Item>, needed: Option<[f64; 2]>) -> Option<Data> {
-    if let Some(data) = item.data() {
+pub(super) fn file(
+    item: &Item,
+    column: Option<Item>,
+    unit: Option<Item>,
+    needed: Option<[f64; 2]>,
+) -> Option<Data<'static>> {
+    let given = match item.data() {
+        Some(arrays::Data::File { name, content }) => Some((PathBuf::from(name), content)),
+        _ => None,
+    };
+    if let (Some(data), None) = (item.data(), &given) {
         if let Some(key) = column.or(unit) {
             key.error_help("goes with the names of files only", "remove it");
             return None;
@@ -129,7 +179,10 @@ pub(super) fn file(item: &Item, column: Option<Item>, unit: Option<Item>, needed
             }
         };
     }
-    let path = item.cx.path(item.text()?);
+    let path = match &given {
+        Some((name, _)) => name.clone(),
+        None => item.cx.path(item.text()?),
+    };
     let column = match &column {
         None => Column::Only,
         Some(column) if matches!(column.node.value, Value::Integer(_)) => {
@@ -151,14 +204,18 @@ pub(super) fn file(item: &Item, column: Option<Item>, unit: Option<Item>, needed
         }
         None => None,
     };
-    if refractive::is_yaml(&path) {
+    if refractive::is_yaml(&path) && given.is_none() {
         if let Some(unit) = unit {
             unit.error_help("goes with tables only", "remove it: these files are in um");
             return None;
         }
         return index_file(item, path, column, needed);
     }
-    match text::read_spectrum(&path, column, unit_of_x) {
+    let read = match given {
+        Some((name, content)) => text::parse_file(content, &name, column, unit_of_x),
+        None => text::read_spectrum(&path, column, unit_of_x),
+    };
+    match read {
         Ok(table) => Some(table_data(table, path)),
         Err(problem) => {
             report_in_file(item, *problem);
@@ -168,7 +225,12 @@ pub(super) fn file(item: &Item, column: Option<Item>, unit: Option<Item>, needed
 }
 
 /// `n` (the default) or `k` of a refractiveindex.info file.
-pub(super) fn index_file(item: &Item, path: PathBuf, column: Column, needed: Option<[f64; 2]>) -> Option<Data> {
+pub(super) fn index_file(
+    item: &Item,
+    path: PathBuf,
+    column: Column,
+    needed: Option<[f64; 2]>,
+) -> Option<Data<'static>> {
     let name = match column {
         Column::Only | Column::Named("n") | Column::Number(2) => "n",
         Column::Named("k") | Column::Number(3) => "k",
@@ -206,7 +268,7 @@ pub(super) fn column_kelvin(name: &str) -> Option<f64> {
     number.get(start..)?.parse().ok().filter(|kelvin: &f64| kelvin.is_finite() && *kelvin > 0.0)
 }
 
-pub(super) fn table_data(table: SpectrumTable, path: PathBuf) -> Data {
+pub(super) fn table_data(table: SpectrumTable, path: PathBuf) -> Data<'static> {
     let SpectrumTable { nm, value, line, unit, said, notes } = table;
     Data::Table { nm, value, file: Some(TableFile { path, lines: line, unit, said, notes }) }
 }
@@ -221,7 +283,21 @@ pub fn report_in_file(item: &Item, problem: Problem) {
     }
 }
 
-pub(super) fn samples(item: &Item) -> Option<Data> {
+/// Two spectra, each as it is written in the place of one, and a share.
+fn mix<'a>(item: &Item<'a>, share: Option<Item<'a>>, needed: Option<[f64; 2]>) -> Option<Data<'a>> {
+    let share = match share {
+        Some(item) => item.number_where(|v| (0.0..=1.0).contains(&v), "in [0, 1]"),
+        None => Some(0.5),
+    };
+    let parts = item.array_of::<2>("two spectra")?.map(|part| match &part.node.value {
+        Value::String(name) => Some(Source::named(name, &part)),
+        _ => source(&part, needed),
+    });
+    let [Some(first), Some(second)] = parts else { return None };
+    Some(Data::Mix(Box::new([first, second]), share?))
+}
+
+pub(super) fn samples(item: &Item) -> Option<Data<'static>> {
     let items = item.array()?;
     if items.len() < 2 {
         item.error_help(format!("must have at least two [nm, value] pairs, but has {}", items.len()), "use `constant`");
@@ -247,7 +323,7 @@ pub(super) fn samples(item: &Item) -> Option<Data> {
     Some(Data::Table { nm, value, file: None })
 }
 
-pub(super) fn regular(item: &Item) -> Option<Data> {
+pub(super) fn regular(item: &Item) -> Option<Data<'static>> {
     let fields = item.table(&keys::REGULAR)?;
     const EXAMPLE: &str = "all of { from = 400, to = 700, values = [0.1, 0.8] }";
     let bound = |key: &str| fields.require(key, EXAMPLE).and_then(|item| item.positive());

@@ -8,8 +8,11 @@ const page = { state: null, channels: null, held: null, events: null };
 const picture = new Picture(find("picture"), () => { showTone(); showCursor(); });
 const spectra = new Spectra(find("spectrum-plot"), find("pins"), () => showPins(), (k) => choose(k));
 const progress = new Progress(find);
+const relight = new Relight(find, (choices) => relit(choices));
+spectra.choices = () => (relight.isThere() ? [relight.shown, relight.differs() ? relight.other() : null] : [null, null]);
+spectra.white = () => picture.white;
 // For scripts, such as the tests that drive this page.
-window.spectile = { page, picture, spectra, progress };
+window.spectile = { page, picture, spectra, progress, relight };
 
 // Theme -----------------------------------------------------------------------------------------------------------
 const dark = matchMedia("(prefers-color-scheme: dark)");
@@ -27,6 +30,7 @@ setTheme(dark.matches ? "dark" : "light");
 function setMode(mode) {
   const { channels } = page;
   if (!channels || (mode === "temperature" && !channels.thermal.length)) return;
+  if (mode === "difference" && !hasDifferences()) return;
   const change = { mode };
   if (mode === "temperature" && !channels.thermal.includes(picture.show.k)) change.k = channels.thermal[0];
   if (isRanged(mode)) Object.assign(picture.tone, { map: "inferno", autoRange: true });
@@ -64,13 +68,14 @@ function showControls() {
     if (button.dataset.mode === "temperature") button.hidden = !channels || !channels.thermal.length;
     if (button.dataset.mode === "colour" && page.state?.cube) button.textContent = page.state.cube.shows === "xyz" ? "True colour" : "Preview";
   }
+  document.querySelector('[data-mode="difference"]').hidden = !hasDifferences();
   const single = mode === "channel" || mode === "temperature";
   find("channel-bar").hidden = !single;
   find("rgb-bar").hidden = mode !== "false";
-  find("map-label").hidden = !single && mode !== "samples";
+  find("map-label").hidden = !single && !isRanged(mode);
   find("map").value = picture.tone.map;
   find("range-label").hidden = !isRanged(mode);
-  find("range-unit").textContent = mode === "samples" ? "samples" : "K";
+  find("range-unit").textContent = { samples: "samples", difference: "ΔE" }[mode] ?? "K";
   find("ev-label").hidden = isRanged(mode);
   if (!channels) return;
   const order = spectra.order.filter((c) => mode !== "temperature" || channels.thermal.includes(c));
@@ -129,9 +134,42 @@ find("actual").addEventListener("click", () => picture.zoomTo(window.devicePixel
 find("in").addEventListener("click", () => picture.zoomTo(picture.zoom * 1.5));
 find("out").addEventListener("click", () => picture.zoomTo(picture.zoom / 1.5));
 
+// Light and paint -------------------------------------------------------------------------------------------------
+const hasDifferences = () => relight.isThere() && relight.what.colours;
+
+// The pictures of these choices are others; null: another of both is shown.
+function relit(choices) {
+  picture.choice = relight.shown;
+  picture.setShow({});
+  if (choices) picture.relit(choices);
+  showControls();
+  if (page.channels) {
+    page.channels.isColour = relight.what.colours;
+    spectra.refresh(() => true).then(() => showPins());
+  }
+}
+
+// What is white: daylight by the picture of A, or a pixel that is pinned.
+function showWhite() {
+  const select = find("white"), chosen = select.value;
+  const pixels = spectra.pins.filter((pin) => pin.x1 === undefined).map((pin) => `${pin.x},${pin.y}`);
+  const options = [["", "daylight D65, by A's exposure"], ...pixels.map((at) => [at, `the pixel ${at.replace(",", ", ")}`])];
+  select.replaceChildren(...options.map(([value, text]) => element("option", { value, textContent: text })));
+  select.value = pixels.includes(chosen) ? chosen : "";
+  find("white-factor-label").hidden = !select.value;
+  const [x, y] = select.value.split(","), factor = find("white-factor").valueAsNumber;
+  const white = select.value ? `&white_x=${x}&white_y=${y}&white_factor=${factor > 0 ? factor : 1}` : "";
+  if (white === picture.white) return;
+  picture.white = white;
+  picture.setShow({});
+  if (relight.differs()) spectra.refresh(() => true);
+}
+for (const id of ["white", "white-factor"]) find(id).addEventListener("change", showWhite);
+
 // Pins ------------------------------------------------------------------------------------------------------------
 function showPins() {
   picture.marks = spectra.pins;
+  showWhite();
   picture.paint();
   find("csv").disabled = find("clear").disabled = !spectra.pins.length;
 }
@@ -160,7 +198,7 @@ function showCursor() {
   const found = picture.valueAt(...at), { mode } = picture.show;
   let text = `column ${at[0]}, row ${at[1]}`;
   if (found && !found.values.some(Number.isNaN)) {
-    const unit = { temperature: "K", samples: "samples", colour: "linear R, G, B" }[mode] ?? RADIANCE;
+    const unit = { temperature: "K", samples: "samples", colour: "linear R, G, B", difference: "ΔE 2000" }[mode] ?? RADIANCE;
     text += `: ${found.values.map((v) => short(v)).join(", ")} ${unit}`;
     if (found.scale > 1) text += ` (mean of ${found.scale} × ${found.scale})`;
   }
@@ -275,12 +313,13 @@ function moveCursor(dx, dy) {
 
 document.addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.metaKey || event.altKey || find("keys").open) return;
-  const { target, key } = event, typing = target.matches("input[type=number], select");
+  const { target, key } = event, typing = target.matches("input[type=number], input[type=text], select");
   if (typing && key !== "Escape") return;
   const far = event.shiftKey ? 10 : 1, onPicture = target === find("picture") || target === document.body;
   const arrows = { ArrowLeft: [-far, 0], ArrowRight: [far, 0], ArrowUp: [0, -far], ArrowDown: [0, far] };
   const act = {
     1: () => setMode("colour"), 2: () => setMode("channel"), 3: () => setMode("false"), 4: () => setMode("temperature"), 5: () => setMode("samples"),
+    6: () => setMode("difference"), x: () => relight.isThere() && relight.show(relight.other()),
     ",": () => step(-1), ".": () => step(1), "<": () => step(-10), ">": () => step(10), ";": () => step(-10), ":": () => step(10),
     e: () => expose(-0.25), E: () => expose(0.25), a: () => { setAuto(true); showTone(); },
     "+": () => picture.zoomTo(picture.zoom * 1.5), "=": () => picture.zoomTo(picture.zoom * 1.5), "-": () => picture.zoomTo(picture.zoom / 1.5),
@@ -365,6 +404,7 @@ async function hear(state) {
       page.opening = false;
     }
   }
+  relight.hear(state.relight);
   picture.work = state.stage === "rendering" ? (state.devices || []).flatMap((d) => d.work.flatMap((w) => w.tiles)) : [];
   picture.touch(state.changed || []);
   picture.paint();

@@ -20,7 +20,9 @@ const ENCODED = Uint8Array.from(TONE.srgb_steps.flatMap((steps, value) => Array(
 const encode = (v) => (v >= 1 ? 255 : v > 0 ? ENCODED[(Math.sqrt(v) * (ENCODED.length - 1) + 0.5) | 0] : 0);
 
 // Shown by a colour map between two ends.
-const isRanged = (mode) => mode === "temperature" || mode === "samples";
+const isRanged = (mode) => mode === "temperature" || mode === "samples" || mode === "difference";
+// Of which the server has every scale.
+const isFine = (mode) => mode === "colour" || mode === "difference";
 
 class Picture {
   constructor(canvas, changed) {
@@ -33,6 +35,8 @@ class Picture {
     this.bytes = 0;
     this.show = { mode: "colour", k: 0, rgb: [0, 0, 0] };
     this.tone = { auto: true, ev: 0, map: "grey", low: 0, high: 1, autoRange: true };
+    this.choice = null; // of light and paint, where there are choices
+    this.white = ""; // what differences take for white, as the server asks for it
     this.look = 1; // counts changes of tone
     this.centre = [0, 0];
     this.zoom = 1;
@@ -112,16 +116,19 @@ class Picture {
   // Squares -------------------------------------------------------------------------------------------------------
   what() {
     const { mode, k, rgb } = this.show;
-    if (mode === "colour" || mode === "samples") return `show=${mode}`;
-    if (mode === "false") return `show=false&r=${rgb[0]}&g=${rgb[1]}&b=${rgb[2]}`;
-    return `show=${mode}&k=${k}`;
+    if (mode === "samples") return "show=samples";
+    if (mode === "difference") return `show=difference${this.white}`;
+    const under = this.choice ? `&choice=${this.choice}` : "";
+    if (mode === "colour") return `show=colour${under}`;
+    if (mode === "false") return `show=false&r=${rgb[0]}&g=${rgb[1]}&b=${rgb[2]}${under}`;
+    return `show=${mode}&k=${k}${under}`;
   }
 
   // Values a pixel of the picture that are needed for this zoom, and those of the level that is always there.
   scales() {
     const [w, h] = this.cube.size, power = (v) => 2 ** Math.max(0, Math.floor(Math.log2(v)));
     const whole = 2 ** Math.max(0, Math.ceil(Math.log2(Math.max(w, h) / SIDE)));
-    if (this.show.mode === "colour") return { base: whole, fine: Math.min(whole, power(1 / this.zoom)) };
+    if (isFine(this.show.mode)) return { base: whole, fine: Math.min(whole, power(1 / this.zoom)) };
     const base = Math.max(BLOCK, whole);
     let fine = Math.min(base, power(1 / this.zoom));
     if (fine < BLOCK) {
@@ -139,13 +146,18 @@ class Picture {
       for (let i = Math.floor(sight[0] / side); i * side < sight[2]; i++) yield this.square(scale, i, j);
   }
 
-  square(scale, i, j) {
-    const what = this.what(), key = `${what}|${scale}|${i}|${j}`;
+  // What automatic exposure goes by: of two choices the first, so that they can be compared.
+  exposing() {
+    return isRanged(this.show.mode) ? this.what() : this.what().replace("choice=b", "choice=a");
+  }
+
+  square(scale, i, j, what = this.what()) {
+    const key = `${what}|${scale}|${i}|${j}`;
     let square = this.squares.get(key);
     if (!square) {
       const [w, h] = this.cube.size, side = SIDE * scale;
       const rect = [i * side, j * side, Math.min(w, (i + 1) * side), Math.min(h, (j + 1) * side)];
-      square = { key, what, scale, rect, values: null, stale: true, loading: false, look: 0, canvas: null, used: 0 };
+      square = { key, what, scale, rect, values: null, stale: true, urgent: false, loading: false, look: 0, canvas: null, used: 0 };
       this.squares.set(key, square);
     }
     square.used = performance.now();
@@ -170,6 +182,15 @@ class Picture {
     this.pump();
   }
 
+  // What is shown under these choices, and what both make together, is fetched anew as soon as it is looked at.
+  relit(choices) {
+    for (const square of this.squares.values()) {
+      const is = (part) => square.what.includes(part);
+      if (is("show=difference") || choices.some((choice) => is(`choice=${choice}`))) square.stale = square.urgent = true;
+    }
+    this.pump();
+  }
+
   // Fetches what is missing, then, at leisure, what is stale.
   pump() {
     const sight = this.cube && !document.hidden && this.sight();
@@ -182,7 +203,8 @@ class Picture {
       const far = ({ rect: r }) => Math.hypot((r[0] + r[2]) / 2 - cx, (r[1] + r[3]) / 2 - cy);
       wanted.push(...squares.sort((a, b) => far(a) - far(b)));
     }
-    for (const square of wanted) if (!square.values && !square.loading && this.loading < 3) this.load(square);
+    if (this.exposing() !== this.what()) wanted.push(this.square(base, 0, 0, this.exposing()));
+    for (const square of wanted) if ((!square.values || square.urgent) && !square.loading && this.loading < 3) this.load(square);
     if (this.refreshing || this.loading || now < this.nextRefresh) return;
     const stale = wanted.filter((square) => square.values && square.stale && !square.loading);
     if (!stale.length) return;
@@ -208,7 +230,7 @@ class Picture {
 
   async load(square) {
     square.loading = true;
-    square.stale = false;
+    square.stale = square.urgent = false;
     this.loading++;
     try {
       const [x0, y0, x1, y1] = square.rect;
@@ -220,7 +242,7 @@ class Picture {
       [square.width, square.height] = answer.headers.get("x-size").split(",").map(Number);
       square.planes = Number(answer.headers.get("x-planes"));
       square.ev = Number(answer.headers.get("x-exposure-ev"));
-      square.range = (answer.headers.get("x-range-k") || answer.headers.get("x-range-samples") || "").split(",").map(Number);
+      square.range = (answer.headers.get("x-range-k") || answer.headers.get("x-range-samples") || answer.headers.get("x-range-de") || "").split(",").map(Number);
       square.values = values;
       square.look = 0;
       if (square.scale === this.scales().base) this.adapt();
@@ -269,7 +291,7 @@ class Picture {
     if (!this.cube) return;
     const { tone } = this, ranged = isRanged(this.show.mode);
     if (ranged ? !tone.autoRange : !tone.auto) return;
-    const [whole] = this.inSight(this.scales().base, [0, 0, ...this.cube.size]);
+    const whole = this.square(this.scales().base, 0, 0, this.exposing());
     if (!whole.values) return;
     const before = [tone.ev, tone.low, tone.high];
     if (ranged) [tone.low, tone.high] = whole.range;

@@ -38,8 +38,11 @@ class Spectra {
     this.pins = [];
     this.hover = null;
     this.logX = this.logY = false;
+    this.choices = () => [null, null]; // of light and paint: the one that is shown, and the other where it is drawn, too
+    this.white = () => ""; // what differences take for white
     this.shown = null; // the channels to mark
     this.next = 0;
+    this.due = []; // what asks for pins to be fetched again
     new ResizeObserver(() => this.plot && this.plot.setSize(this.size())).observe(box);
   }
 
@@ -81,12 +84,14 @@ class Spectra {
     const series = [{}], bands = [];
     for (const item of this.items()) {
       const colour = item.colour;
-      if (item.standard_error) {
+      if (item.standard_error && !item.other) {
         bands.push({ series: [series.length, series.length + 1], fill: colour + "38" });
         series.push({ stroke: "transparent", points: { show: false } }, { stroke: "transparent", points: { show: false } });
       }
       const points = { show: this.channels.count === 1, size: 8, stroke: colour, fill: colour };
-      series.push({ stroke: colour, width: item === this.hover ? 1 : 1.75, points });
+      const width = item === this.hover ? 1 : 1.75;
+      series.push({ stroke: colour, width, points });
+      if (item.other) series.push({ stroke: colour, width, points, dash: [6, 4] });
     }
     const log = (on) => (on ? { distr: 3, log: 10 } : {});
     const lowest = (_, min, max) => {
@@ -119,11 +124,12 @@ class Spectra {
     const rows = [this.x];
     for (const item of this.items()) {
       const { radiance, standard_error: error } = item;
-      if (error) {
+      if (error && !item.other) {
         const edge = (sign) => radiance.map((v, k) => (v === null || error[k] === null ? null : v + sign * error[k]));
         for (const side of [edge(1), edge(-1)]) rows.push(this.from.map((k) => value(side, k)));
       }
       rows.push(this.from.map((k) => value(radiance, k)));
+      if (item.other) rows.push(this.from.map((k) => value(item.other, k)));
     }
     return rows;
   }
@@ -156,19 +162,26 @@ class Spectra {
   }
 
   update() {
-    const layout = this.items().map((i) => `${i.colour}${!!i.standard_error}`).join();
+    const layout = this.items().map((i) => `${i.colour}${!!i.standard_error}${!!i.other}`).join();
     if (!this.plot || layout !== this.layout) {
       this.layout = layout;
       this.build();
     } else this.plot.setData(this.data());
   }
 
-  async fetch({ x, y, x1, y1 }) {
-    const end = x1 === undefined ? "" : `&x1=${x1}&y1=${y1}`;
-    const answer = await fetch(`/api/spectrum?x=${x}&y=${y}${end}`);
-    const body = await answer.json();
-    if (!answer.ok) throw new Error(body.error);
-    return { radiance: body.radiance, standard_error: body.standard_error, samples: body.samples, pixels: body.pixels };
+  // `isPinned`: with what both choices differ by.
+  async fetch({ x, y, x1, y1 }, isPinned = true) {
+    const place = `x=${x}&y=${y}${x1 === undefined ? "" : `&x1=${x1}&y1=${y1}`}`, [own, other] = this.choices();
+    const ask = async (what) => {
+      const answer = await fetch(`/api/${what}`), body = await answer.json();
+      if (!answer.ok) throw new Error(body.error);
+      return body;
+    };
+    const under = (choice) => ask(`spectrum?${place}${choice ? `&choice=${choice}` : ""}`);
+    const differ = isPinned && other && this.channels.isColour ? ask(`difference?${place}${this.white()}`).catch(() => null) : null;
+    const [body, second, difference] = await Promise.all([under(own), other && under(other), differ]);
+    const { radiance, standard_error, samples, pixels } = body;
+    return { radiance, standard_error, samples, pixels, other: second?.radiance ?? null, difference };
   }
 
   async pin(place) {
@@ -208,7 +221,7 @@ class Spectra {
       const place = this.wanted;
       this.wanted = null;
       try {
-        this.hover = { ...place, colour: css("--soft"), ...(await this.fetch(place)) };
+        this.hover = { ...place, colour: css("--soft"), ...(await this.fetch(place, false)) };
       } catch {
         this.hover = null;
       }
@@ -226,18 +239,26 @@ class Spectra {
     }
   }
 
-  // Fetches the pins in changed tiles again.
-  async refresh(changed) {
-    for (const pin of this.pins) {
-      if (!changed(pin)) continue;
-      try {
-        Object.assign(pin, await this.fetch(pin));
-      } catch {
-        // It stays as it is until the next change.
+  // Fetches the pins for which `changed` holds again; what comes while that goes on, after it.
+  refresh(changed) {
+    this.due.push(changed);
+    const all = async () => {
+      while (this.due.length) {
+        const due = this.due.splice(0);
+        for (const pin of this.pins) {
+          if (!due.some((changed) => changed(pin))) continue;
+          try {
+            Object.assign(pin, await this.fetch(pin));
+          } catch {
+            // It stays as it is until the next change.
+          }
+        }
+        this.list_();
+        this.update();
       }
-    }
-    this.list_();
-    this.update();
+    };
+    this.refreshing ||= all().finally(() => (this.refreshing = null));
+    return this.refreshing;
   }
 
   list_() {
@@ -249,6 +270,11 @@ class Spectra {
       value.className = "value";
       const mean = pin.radiance.reduce((sum, v) => sum + v, 0) / pin.radiance.length;
       value.textContent = this.isCounts() ? `mean ${short(mean)}` : `${pin.samples} samples, mean ${short(mean)}`;
+      if (pin.difference) {
+        const { a, b, delta_e_2000: delta } = pin.difference, words = ({ lab }) => lab.map((v) => v.toFixed(1)).join(", ");
+        value.textContent = `ΔE ${delta.toFixed(2)}`;
+        value.title = `L*, a*, b* under A: ${words(a)}; under B: ${words(b)}`;
+      }
       const close = document.createElement("button");
       close.textContent = "×";
       close.title = "Forget this one";
@@ -265,11 +291,12 @@ class Spectra {
     const name = (p) => (p.x1 === undefined ? `${p.x}_${p.y}` : `${p.x}_${p.y}_to_${p.x1 - 1}_${p.y1 - 1}`);
     const one = this.pins.length === 1, quantity = this.isCounts() ? "counts" : "radiance";
     const head = this.pins.flatMap((p) => {
-      const end = one ? "" : `_${name(p)}`;
+      const end = one ? "" : `_${name(p)}`, [own, other] = this.choices();
+      if (p.other) return [`${quantity}_${own}${end}`, `${quantity}_${other}${end}`];
       return p.standard_error ? [`${quantity}${end}`, `standard_error${end}`] : [`${quantity}${end}`];
     });
     const lines = this.channels.centre_nm.map((nm, k) =>
-      [nm, ...this.pins.flatMap((p) => (p.standard_error ? [p.radiance[k], p.standard_error[k]] : [p.radiance[k]]))]
+      [nm, ...this.pins.flatMap((p) => (p.other ? [p.radiance[k], p.other[k]] : p.standard_error ? [p.radiance[k], p.standard_error[k]] : [p.radiance[k]]))]
         .map((v) => (v === null ? "NaN" : v)).join());
     return [["wavelength_nm", ...head].join(), ...lines].join("\n") + "\n";
   }
