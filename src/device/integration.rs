@@ -127,7 +127,8 @@ fn strata(responses: &[Response], counts: &[u32]) -> Vec<[f64; 2]> {
     for pair in ends.windows(2) {
         let [from, to] = [pair[0], pair[1]];
         let over = responses.iter().zip(counts).filter(|(r, _)| r.support()[0] <= from && to <= r.support()[1]);
-        let width = over.map(|(r, &count)| (r.support()[1] - r.support()[0]) / f64::from(count)).fold(f64::INFINITY, f64::min);
+        let width =
+            over.map(|(r, &count)| (r.support()[1] - r.support()[0]) / f64::from(count)).fold(f64::INFINITY, f64::min);
         if width == f64::INFINITY {
             continue;
         }
