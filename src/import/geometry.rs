@@ -4,7 +4,9 @@ use std::collections::HashMap;
 
 use glam::{DVec2, DVec3};
 
+use super::report::Deviation;
 use super::scene::Scene;
+use super::text;
 use crate::Result;
 use crate::format::mesh;
 
@@ -19,6 +21,14 @@ pub struct Mesh {
 
 /// Segments around of a full turn.
 pub const AROUND: u32 = 128;
+
+/// How far a round shape of [`AROUND`] segments is from its own: the middles of chords are at cos(π/n) of the radius, those of quads of a sphere,
+/// which is round in two directions, at its square.
+pub fn within_round(is_sphere: bool) -> Deviation {
+    let cosine = (std::f64::consts::PI / f64::from(AROUND)).cos();
+    let off = 1.0 - if is_sphere { cosine * cosine } else { cosine };
+    Deviation::at_most(format!("{} of its radius, inward", text::percent(off)))
+}
 
 impl Mesh {
     /// All parts of a file, with a vertex for each combination of what a corner has.

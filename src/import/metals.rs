@@ -70,6 +70,18 @@ pub fn glass(name: &str) -> Option<Curve> {
     }))
 }
 
+/// Of illuminants of the CIE; see the head of the file for where they are from.
+const ILLUMINANTS: &str = include_str!("data/illuminants.csv");
+
+/// The spectrum of an illuminant of the CIE, of any scale: `F1` to `F12`, `D50`, `D60`.
+pub fn illuminant(name: &str) -> Option<Curve> {
+    let mut rows = ILLUMINANTS.lines().filter(|row| !row.starts_with('#'));
+    let column = rows.next()?.split(',').position(|head| head == name).filter(|column| *column > 0)?;
+    let cell = |row: &str, column: usize| row.split(',').nth(column).and_then(|cell| cell.parse().ok()).unwrap_or(0.0);
+    let (nm, value) = rows.map(|row| (cell(row, 0), cell(row, column))).unzip();
+    Some(Curve::Linear { nm, value, outside: Outside::Zero })
+}
+
 /// The names of all metals.
 pub fn names() -> Vec<&'static str> {
     let mut names: Vec<&str> =
@@ -107,6 +119,26 @@ mod tests {
         assert!((0.204..=0.25).contains(&n) && (2.95..=3.122).contains(&k), "{n} + {k} i");
         assert_eq!((matter("Acrylic Glass"), matter("unobtainium")), (Some(1.49), None));
         assert!(metal("Xx").is_none());
+        // F11 has its line of terbium at 545 nm; chromaticities are those of CIE 15, table T.3.
+        let peak = illuminant("F11").unwrap();
+        assert!(peak.eval(545.0) > 5.0 * peak.eval(560.0) && peak.eval(900.0) == 0.0);
+        for (name, x, y) in
+            [("D50", 0.3457, 0.3585), ("F2", 0.3721, 0.3751), ("F7", 0.3129, 0.3292), ("F11", 0.3805, 0.3769)]
+        {
+            let curve = illuminant(name).unwrap();
+            let observer = crate::spectral::colour::Observer::Cie1931.curves();
+            let sum = |i: usize| {
+                (76..=156).map(|j| 5.0 * f64::from(j)).map(|nm| observer[i].eval(nm) * curve.eval(nm)).sum::<f64>()
+            };
+            let all = sum(0) + sum(1) + sum(2);
+            assert!(
+                (sum(0) / all - x).abs() < 5e-4 && (sum(1) / all - y).abs() < 5e-4,
+                "{name}: {} {}",
+                sum(0) / all,
+                sum(1) / all
+            );
+        }
+        assert!(illuminant("nm").is_none() && illuminant("F13").is_none());
         // Schott's data sheets at the d line.
         for (name, index) in [
             ("BK7", 1.5168),

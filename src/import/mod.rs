@@ -2,9 +2,14 @@
 //! textures beside it, and `IMPORT.md`, which tells what became of everything. Whatever changes the picture is translated,
 //! approximated or left out, and said with its line.
 
+mod combine;
 mod environment;
+#[cfg(test)]
+mod every_approximation;
+mod film;
 mod geometry;
 mod gltf;
+mod layers;
 mod media;
 mod metals;
 mod mitsuba;
@@ -12,6 +17,7 @@ mod pbrt;
 mod picture;
 mod report;
 mod scene;
+mod spot;
 mod surfaces;
 mod text;
 
@@ -22,8 +28,6 @@ use crate::files::output::{NewFolder, Product};
 use crate::files::parent;
 use crate::{Error, Result};
 
-pub use report::Fate;
-use report::Report;
 use scene::Scene;
 
 /// What an import made. It is never replaced: somebody may have worked on it.
@@ -77,16 +81,7 @@ pub fn import(source: &Path, folder: &Path) -> Result<Summary> {
     write("scene.toml", scene.toml(source, &assemblies))?;
     write("IMPORT.md", scene.report.page(source))?;
     new.finish()?;
-    Ok(summary(&scene.report))
-}
-
-fn summary(report: &Report) -> Summary {
-    Summary {
-        translated: report.translations(),
-        approximated: report.count(Fate::Approximated),
-        left_out: report.count(Fate::LeftOut),
-        chosen: report.count(Fate::Chosen),
-    }
+    Ok(scene.report.summary())
 }
 
 impl From<Box<Problem>> for Error {

@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-use super::report::Place;
+use glam::{DMat2, DVec2};
+
+use super::report::{Deviation, Place};
 use super::scene::Scene;
 use super::text;
 use crate::error::Problem;
@@ -84,6 +86,13 @@ impl Picture {
         Picture { size: self.size, texels: Texels::Floats(texels) }
     }
 
+    /// How far numbers of texels are beyond 0 and 1, where some are.
+    pub fn beyond_one(&self) -> Option<Deviation> {
+        let beyond = |v: f32| f64::from((v - v.clamp(0.0, 1.0)).abs());
+        let most = self.linear().into_iter().flatten().map(beyond).fold(0.0, f64::max);
+        (most > 0.0).then(|| Deviation::at_most(text::up(most)))
+    }
+
     pub fn mean(&self) -> [f64; 3] {
         let texels = self.linear();
         let sum = texels.iter().fold([0.0; 3], |sum, rgb| [0, 1, 2].map(|c| sum[c] + f64::from(rgb[c])));
@@ -103,6 +112,20 @@ impl Picture {
             Texels::Floats(texels) => Texels::Floats(moved(texels, [width, height], vertical)),
         };
         Picture { size: self.size, texels }
+    }
+
+    /// With u for v and v for u, v up.
+    fn transposed(&self) -> Picture {
+        let [width, height] = self.size.map(|side| side as usize);
+        fn moved<T: Copy>(texels: &[T], [width, height]: [usize; 2]) -> Vec<T> {
+            let places = (0..width).flat_map(|y| (0..height).map(move |x| (height - 1 - x) * width + width - 1 - y));
+            places.map(|at| texels[at]).collect()
+        }
+        let texels = match &self.texels {
+            Texels::Bytes(texels) => Texels::Bytes(moved(texels, [width, height])),
+            Texels::Floats(texels) => Texels::Floats(moved(texels, [width, height])),
+        };
+        Picture { size: [self.size[1], self.size[0]], texels }
     }
 
     /// A map of light as Mitsuba has it as one of even rows: there the first and the last row are the poles, and between texels
@@ -261,6 +284,106 @@ pub struct Texture {
     pub file: Option<PathBuf>,
 }
 
+/// What is beyond a picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Wrap {
+    Repeat,
+    /// It mirrored.
+    Mirror,
+    /// What is at its edge.
+    Clamp,
+    /// Zero.
+    Nothing,
+}
+
+/// Columns or rows of a picture that a scene may have.
+const MOST_TEXELS: u64 = 1 << 26;
+
+impl Texture {
+    /// Where `matrix` and `offset` put it, from (u, v) of the surface to those of the picture, both with v up. A quarter of a turn is one of the
+    /// picture; others are left out, and it is said how far off that is.
+    pub fn placed(mut self, matrix: DMat2, offset: DVec2) -> (Texture, Option<Deviation>) {
+        let size = matrix.to_cols_array().into_iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+        let is_none = |x: f64| x.abs() <= 1e-6 * size;
+        (self.scale, self.offset) = ([matrix.x_axis.x, matrix.y_axis.y], offset.to_array());
+        if is_none(matrix.x_axis.y) && is_none(matrix.y_axis.x) {
+            return (self, None);
+        }
+        if is_none(matrix.x_axis.x) && is_none(matrix.y_axis.y) {
+            (self.picture, self.file) = (self.picture.transposed(), None);
+            self.scale = [matrix.x_axis.y, matrix.y_axis.x];
+            self.offset = [offset.y, offset.x];
+            return (self, None);
+        }
+        self.scale = [matrix.x_axis.length(), matrix.y_axis.length()];
+        let off = self.off_elsewhere("wherever that shows another place of it");
+        (self, Some(off))
+    }
+
+    /// As a texture that repeats, by more of its picture: exact where it is mirrored, and within coordinates of the surface from 0 to 1
+    /// where it is not repeated; how far off beyond that.
+    pub fn wrapped(mut self, wrap: [Wrap; 2]) -> (Texture, Option<Deviation>) {
+        if wrap == [Wrap::Repeat; 2] {
+            return (self, None);
+        }
+        // Of each axis, texels before the picture, of it, and after it; the least is one that the edge is mixed with.
+        let of_axis = |i: usize| -> [i64; 3] {
+            let size = i64::from(self.picture.size[i]);
+            match wrap[i] {
+                Wrap::Repeat => [0, size, 0],
+                Wrap::Mirror => [0, size, size],
+                Wrap::Clamp | Wrap::Nothing => {
+                    let (from, to) = (self.offset[i], self.offset[i] + self.scale[i]);
+                    let texels = |beyond: f64| (beyond.clamp(0.0, 1e4) * size as f64).ceil() as i64 + 1;
+                    [texels(-from.min(to)), size, texels(from.max(to) - 1.0)]
+                }
+            }
+        };
+        let mut axes = [of_axis(0), of_axis(1)];
+        let count = |axes: &[[i64; 3]; 2]| axes.iter().map(|axis| axis.iter().sum::<i64>() as u64).product::<u64>();
+        let is_cut = count(&axes) > MOST_TEXELS;
+        if is_cut {
+            axes = axes
+                .map(|[before, size, after]| [before.min(1), size, after.min(if after == size { size } else { 1 })]);
+        }
+        let is_edged = wrap.iter().any(|wrap| matches!(wrap, Wrap::Clamp | Wrap::Nothing));
+        let off = is_edged.then(|| {
+            let lost = if is_cut { "wherever coordinates leave the picture" } else { "there" };
+            self.off_elsewhere(lost)
+        });
+        let size = axes.map(|axis| axis.iter().sum::<i64>());
+        // Of a column from the left or a row from the bottom, that of the picture.
+        let source = |i: usize, at: i64| -> Option<i64> {
+            let [before, size, _] = axes[i];
+            let at = at - before;
+            match wrap[i] {
+                _ if (0..size).contains(&at) => Some(at),
+                Wrap::Mirror => Some(2 * size - 1 - at),
+                Wrap::Nothing => None,
+                _ => Some(at.clamp(0, size - 1)),
+            }
+        };
+        let [width, height] = size;
+        let own = self.picture.size.map(i64::from);
+        let places = (0..height).rev().flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| {
+            let (x, y) = (source(0, x)?, source(1, y)?);
+            Some(((own[1] - 1 - y) * own[0] + x) as usize)
+        });
+        let texels = match &self.picture.texels {
+            Texels::Bytes(texels) => Texels::Bytes(places.map(|at| at.map_or([0; 3], |at| texels[at])).collect()),
+            Texels::Floats(texels) => Texels::Floats(places.map(|at| at.map_or([0.0; 3], |at| texels[at])).collect()),
+        };
+        self.picture = Picture { size: size.map(|side| side as u32), texels };
+        for i in 0..2 {
+            let share = own[i] as f64 / size[i] as f64;
+            self.scale[i] *= share;
+            self.offset[i] = self.offset[i] * share + axes[i][0] as f64 / size[i] as f64;
+        }
+        self.file = None;
+        (self, off)
+    }
+}
+
 /// GGX's α: along u and along v, or the text of a texture and its mean.
 pub enum Rough {
     Pair([f64; 2]),
@@ -330,8 +453,10 @@ impl Texture {
         // Shares are as they are written.
         let picture = if ends.is_some() { self.picture.clone().raw() } else { self.picture.clone() };
         let numbers: Vec<f64> = picture.linear().into_iter().map(of_texel).collect();
-        if numbers.iter().any(|number| !(0.0..=1.0).contains(number)) {
-            scene.report.approximated(at, format!("{what} of a texture outside of 0 to 1, which are clipped to that"));
+        let beyond = numbers.iter().map(|number| (number - number.clamp(0.0, 1.0)).abs()).fold(0.0, f64::max);
+        if beyond > 0.0 {
+            let what = format!("{what} of a texture outside of 0 to 1, which are clipped to that");
+            scene.report.approximated(at, what, Deviation::at_most(text::up(beyond)));
         }
         let values: Vec<f32> = numbers.into_iter().map(|number| value(number.clamp(0.0, 1.0)) as f32).collect();
         if let [first, rest @ ..] = &values[..]
@@ -462,6 +587,70 @@ impl Texture {
         }
         Ok(out + more + " }")
     }
+}
+
+impl Colour {
+    /// How far its mean is from what it is at places, or wavelengths.
+    pub fn off_its_mean(&self) -> Deviation {
+        match self {
+            Colour::Texture(texture) => texture.off_its_mean(),
+            Colour::Spectrum(curve, _) => {
+                let (mean, [low, high]) = (curve.mean(400.0, 700.0), range(curve));
+                let off = text::up((high - mean).max(mean - low));
+                Deviation::at_most(format!("{off}: it is from {} to {} over wavelengths", short(low), short(high)))
+            }
+        }
+    }
+}
+
+impl Texture {
+    /// The least and the largest of what its texels are.
+    pub fn range(&self) -> [f64; 2] {
+        let fold = |[low, high]: [f64; 2], v: f64| [low.min(v), high.max(v)];
+        let none = [f64::INFINITY, f64::NEG_INFINITY];
+        match &self.endmembers {
+            Some(two) => two.iter().flat_map(|colour| range(&colour.mean())).fold(none, fold),
+            None => self.picture.linear().iter().flatten().map(|v| f64::from(*v)).fold(none, fold),
+        }
+    }
+
+    /// [`Colour::off_its_mean`].
+    pub fn off_its_mean(&self) -> Deviation {
+        let [low, high] = self.range();
+        let means: Vec<f64> = match &self.endmembers {
+            Some(two) => vec![two.iter().map(|colour| colour.mean().eval(550.0)).sum::<f64>() / 2.0],
+            None => self.picture.mean().to_vec(),
+        };
+        let off = means.into_iter().map(|mean| (high - mean).max(mean - low)).fold(0.0, f64::max);
+        Deviation::at_most(format!("{}: its texels are from {} to {}", text::up(off), short(low), short(high)))
+    }
+
+    /// How far what is elsewhere on it is from what is at a place.
+    pub fn off_elsewhere(&self, lost: &str) -> Deviation {
+        let [low, high] = self.range();
+        let shown = format!("its texels are from {} to {}", short(low), short(high));
+        Deviation::at_most(format!("{} {lost}: {shown}", text::up(high - low)))
+    }
+}
+
+/// The least and the largest over the visible.
+fn range(curve: &Curve) -> [f64; 2] {
+    let all = (72..=166).map(|i| curve.eval(5.0 * f64::from(i)));
+    all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
+}
+
+/// Three digits.
+pub fn short(value: f64) -> String {
+    let short: f64 = format!("{value:.2e}").parse().unwrap_or(value);
+    text::number(short)
+}
+
+/// A placement of a picture whose v runs down, for surfaces whose v runs down too (`flip`) or up, by one whose v runs up.
+pub fn upward(matrix: DMat2, offset: DVec2, flip: bool) -> (DMat2, DVec2) {
+    // Of the surface v is 1 - v up unless it runs down as it is; of the picture it is 1 - v up.
+    let (sign, start) = if flip { (1.0, DVec2::ZERO) } else { (-1.0, DVec2::Y) };
+    let [of_surface, of_picture] = [sign, -1.0].map(|sign| DMat2::from_diagonal(DVec2::new(1.0, sign)));
+    (of_picture * matrix * of_surface, of_picture * (matrix * start + offset) + DVec2::Y)
 }
 
 /// RGB as numbers of any size: a smooth spectrum of half of their size, scaled.

@@ -4,6 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
+use super::{Summary, text};
+
 /// A place in the files of a scene.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Place {
@@ -30,13 +32,48 @@ impl Place {
     }
 }
 
-/// What can be said of a thing that is not exactly as it was.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+/// How far what stands in a thing's place is from it, in the terms of who looks at the picture.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Deviation {
+    /// No further than this: worked out from the scene, or from a closed form.
+    AtMost(String),
+    /// As far as this in the cases that were measured (tests/import/deviations.rs).
+    Measured(String),
+    /// No number bounds it: what is lost, and what that depends on.
+    Unbounded(String),
+}
+
+impl Deviation {
+    pub fn at_most(what: impl Into<String>) -> Deviation {
+        Deviation::AtMost(what.into())
+    }
+
+    pub fn measured(what: impl Into<String>) -> Deviation {
+        Deviation::Measured(what.into())
+    }
+
+    pub fn unbounded(what: impl Into<String>) -> Deviation {
+        Deviation::Unbounded(what.into())
+    }
+}
+
+impl std::fmt::Display for Deviation {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Deviation::AtMost(what) => write!(f, "off by at most {what}"),
+            Deviation::Measured(what) => write!(f, "measured off by {what}"),
+            Deviation::Unbounded(what) => write!(f, "no bound: {what}"),
+        }
+    }
+}
+
+/// What became of a thing that is not exactly as it was.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Fate {
-    /// Something near it stands in its place.
-    Approximated,
-    /// Nothing does.
+    /// Nothing stands in its place.
     LeftOut,
+    /// Something near it does, so far off.
+    Approximated(Deviation),
     /// The scene says nothing of it.
     Chosen,
 }
@@ -47,7 +84,10 @@ pub struct Report {
     /// The first places, and how many there are.
     translated: BTreeMap<String, (Vec<Place>, usize)>,
     /// Each place once, however often it was come to.
-    said: BTreeMap<(Fate, String), BTreeSet<Place>>,
+    said: BTreeMap<(String, Fate), BTreeSet<Place>>,
+    /// Where in the code approximations were made, for the test that meets them all.
+    #[cfg(test)]
+    pub made_at: BTreeSet<(&'static str, u32)>,
 }
 
 /// Places of one thing that are listed.
@@ -62,39 +102,64 @@ impl Report {
         }
     }
 
-    pub fn say(&mut self, fate: Fate, place: Option<Place>, what: impl Into<String>) {
-        self.said.entry((fate, what.into())).or_default().extend(place);
+    fn say(&mut self, fate: Fate, place: Option<Place>, what: impl Into<String>) {
+        self.said.entry((what.into(), fate)).or_default().extend(place);
     }
 
-    pub fn approximated(&mut self, place: Place, what: impl Into<String>) {
-        self.say(Fate::Approximated, Some(place), what);
+    #[track_caller]
+    pub fn approximated(&mut self, place: impl Into<Option<Place>>, what: impl Into<String>, off: Deviation) {
+        #[cfg(test)]
+        {
+            let caller = std::panic::Location::caller();
+            self.made_at.insert((caller.file(), caller.line()));
+        }
+        self.say(Fate::Approximated(off), place.into(), what);
     }
 
-    pub fn left_out(&mut self, place: Place, what: impl Into<String>) {
-        self.say(Fate::LeftOut, Some(place), what);
+    pub fn left_out(&mut self, place: impl Into<Option<Place>>, what: impl Into<String>) {
+        self.say(Fate::LeftOut, place.into(), what);
     }
 
     /// `value`, or the nearest in `range` with a word on it.
     pub fn within(&mut self, place: Place, what: &str, value: f64, range: [f64; 2]) -> f64 {
         let taken = value.clamp(range[0], range[1]);
         if taken != value {
-            self.approximated(place, format!("{what} of {value} as {taken}"));
+            let off = Deviation::at_most(text::up((value - taken).abs()));
+            self.approximated(place, format!("{what} of {value} as {taken}"), off);
         }
         taken
     }
 
-    pub fn chosen(&mut self, what: impl Into<String>) {
-        self.say(Fate::Chosen, None, what);
+    pub fn chosen(&mut self, place: impl Into<Option<Place>>, what: impl Into<String>) {
+        self.say(Fate::Chosen, place.into(), what);
     }
 
-    /// Kinds of things of this fate.
-    pub fn count(&self, fate: Fate) -> usize {
-        self.said.keys().filter(|(of, _)| *of == fate).count()
+    fn of(&self, wanted: impl Fn(&Fate) -> bool) -> impl Iterator<Item = (&str, &Fate, &BTreeSet<Place>)> {
+        self.said
+            .iter()
+            .filter(move |((_, fate), _)| wanted(fate))
+            .map(|((what, fate), places)| (&**what, fate, places))
     }
 
-    /// Things that are exactly as they were.
-    pub fn translations(&self) -> usize {
-        self.translated.values().map(|(_, count)| count).sum()
+    pub fn summary(&self) -> Summary {
+        Summary {
+            translated: self.translated.values().map(|(_, count)| count).sum(),
+            approximated: self.of(|fate| matches!(fate, Fate::Approximated(_))).count(),
+            left_out: self.of(|fate| *fate == Fate::LeftOut).count(),
+            chosen: self.of(|fate| *fate == Fate::Chosen).count(),
+        }
+    }
+
+    /// Writes a section of the page; writing into a string cannot fail.
+    fn section(&self, page: &mut String, title: &str, wanted: impl Fn(&Fate) -> bool + Copy) {
+        let _ = write!(page, "\n## {title}\n\n");
+        if self.of(wanted).next().is_none() {
+            let _ = writeln!(page, "Nothing.");
+        }
+        for (what, fate, places) in self.of(wanted) {
+            let off = if let Fate::Approximated(off) = fate { format!(": {off}") } else { String::new() };
+            let _ = writeln!(page, "- {what}{}{off}", shown(places, places.len()));
+        }
     }
 
     /// The page, for the scene in `source`.
@@ -102,20 +167,9 @@ impl Report {
         let name = source.file_name().unwrap_or_default().to_string_lossy();
         let mut page =
             format!("# Import of {name}\n\nMade by `spectile import`. Numbers behind names of files are lines.\n");
-        for (fate, title, none) in [
-            (Fate::LeftOut, "Left out", "Nothing."),
-            (Fate::Approximated, "Approximated", "Nothing."),
-            (Fate::Chosen, "Chosen", "Nothing."),
-        ] {
-            // Writing into a string cannot fail.
-            let _ = write!(page, "\n## {title}\n\n");
-            if self.count(fate) == 0 {
-                let _ = writeln!(page, "{none}");
-            }
-            for ((_, what), places) in self.said.iter().filter(|((of, _), _)| *of == fate) {
-                let _ = writeln!(page, "- {what}{}", shown(places, places.len()));
-            }
-        }
+        self.section(&mut page, "Left out", |fate| *fate == Fate::LeftOut);
+        self.section(&mut page, "Approximated", |fate| matches!(fate, Fate::Approximated(_)));
+        self.section(&mut page, "Chosen", |fate| *fate == Fate::Chosen);
         let _ = write!(page, "\n## Translated\n\n");
         for (what, (listed, count)) in &self.translated {
             let _ = writeln!(page, "- {what}{}", shown(listed, *count));
@@ -150,7 +204,8 @@ mod tests {
             report.translated("sphere", at(line));
         }
         let page = report.page(Path::new("a/scene.xml"));
-        assert_eq!((report.count(Fate::LeftOut), report.translations()), (1, 60));
+        let summary = report.summary();
+        assert_eq!((summary.left_out, summary.translated), (1, 60));
         assert!(
             page.contains("- hair (scene.xml:1, scene.xml:2, ") && page.contains("scene.xml:24, and 6 more)"),
             "{page}"

@@ -15,6 +15,23 @@ pub fn rounded(value: f64) -> String {
     number(short)
 }
 
+/// A bound for people: two digits, rounded up.
+pub fn up(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return number(value);
+    }
+    let unit = 10f64.powi(value.abs().log10().floor() as i32 - 1);
+    // What only rounding lifts above two digits stays.
+    let digits = (value / unit * (1.0 - 1e-9)).ceil();
+    let text: f64 = format!("{:.1e}", digits * unit).parse().unwrap_or(value);
+    if text.fract() == 0.0 && text.abs() < 1e15 { format!("{text}") } else { format!("{text:?}") }
+}
+
+/// A share as per cent, likewise.
+pub fn percent(share: f64) -> String {
+    format!("{} %", up(100.0 * share))
+}
+
 pub fn list(values: impl IntoIterator<Item = f64>) -> String {
     format!("[{}]", values.into_iter().map(number).collect::<Vec<_>>().join(", "))
 }
@@ -76,5 +93,7 @@ mod tests {
         }
         assert_eq!(vector(DVec3::new(1.0 / 3.0, 1e-17, -2.0)), "[0.3333333333, 0.0, -2.0]");
         assert_eq!(file_name("../a b.png"), "_a_b.png");
+        let bounds = [0.0, 0.03, 0.0301, 1.0, 99.1, 100.0, 101.0].map(up);
+        assert_eq!(bounds, ["0.0", "0.03", "0.031", "1", "100", "100", "110"]);
     }
 }

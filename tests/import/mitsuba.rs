@@ -323,7 +323,8 @@ fn scenes_of_others_are_mitsubas() {
     against_mitsuba("mi-made/spectra.xml", "mi-made/reference-spectra.npz", "256", [0.99, 1.01]);
     // A wedge of five faces under interpolated normals is darker in Mitsuba, where they face away.
     against_mitsuba("mi-made/outdoor.xml", "mi-made/reference-outdoor.npz", "256", [0.99, 1.035]);
-    against_mitsuba("mi-blender-cube/test1.xml", "mi-blender-cube/reference.npz", "256", [0.99, 1.01]);
+    // Burley's lobe is brighter than a coat's where light and view are as oblique as they are there, and darker elsewhere.
+    against_mitsuba("mi-blender-cube/test1.xml", "mi-blender-cube/reference.npz", "256", [0.96, 1.01]);
     // Plastics; and Beckmann's facets as GGX's, with indices that Mitsuba's spectral variants clamp.
     against_mitsuba("mi-staircase2/scene.xml", "mi-staircase2/reference.npz", "64", [0.99, 1.05]);
     against_mitsuba("mi-veach-mis/scene.xml", "mi-veach-mis/reference.npz", "256", [0.93, 1.12]);

@@ -1,5 +1,6 @@
 //! `spectile import`: what scenes of other programs become.
 
+mod deviations;
 mod gltf;
 mod media;
 mod mitsuba;

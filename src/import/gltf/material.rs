@@ -2,18 +2,20 @@
 
 use std::rc::Rc;
 
-use glam::DVec2;
+use glam::{DMat2, DVec2};
 
 use super::{CANDELA, Importer};
 use crate::Result;
 use crate::format::gltf::json::material::{AlphaMode, Material};
 use crate::format::gltf::json::texture::{Info, MagFilter, WrappingMode};
 use crate::format::gltf::json::validation::Checked;
-use crate::import::picture::{Colour, Picture, Rough, Texels, Texture};
+use crate::import::layers::Palette;
+use crate::import::picture::{Colour, Picture, Rough, Texels, Texture, Wrap, upward};
+use crate::import::report::Deviation;
 use crate::import::scene::Section;
-use crate::import::surfaces;
+use crate::import::surfaces::{self, Coat};
 use crate::import::text;
-use crate::spectral::upsample;
+use crate::spectral::{Curve, upsample};
 
 /// What a material became, with and without textures.
 #[derive(Debug, Clone)]
@@ -23,12 +25,18 @@ pub struct Look {
     pub textured: bool,
     pub plain: String,
     pub plain_emission: Option<String>,
+    /// How far the plain one is from the textured one.
+    pub off_plain: Deviation,
 }
+
+/// (1 - cosine)^5 of the angle to the half vector, on the mean over all pairs of diffuse directions (by a sum over a million of them).
+const MEAN_OF_SCHLICK: f64 = 0.0037;
 
 /// A picture with where it lies.
 struct Found {
     texture: Texture,
-    alpha: Option<Vec<f32>>,
+    /// The same picture's alpha, if it has some.
+    alpha: Option<Texture>,
 }
 
 impl Importer<'_, '_> {
@@ -76,21 +84,21 @@ impl Importer<'_, '_> {
             (None, None) => return Err(self.error(format!("`{at}` has no `uri` and no `bufferView`"))),
         };
         let picture = Picture::parse(&bytes).map_err(|message| self.error(format!("`{at}` {message}")))?;
-        let mut nearest = false;
+        let (mut nearest, mut wrap) = (false, [Wrap::Repeat; 2]);
         if let Some(sampler) = texture.sampler.and_then(|sampler| root.samplers.get(sampler.value())) {
             nearest = sampler.mag_filter == Some(Checked::Valid(MagFilter::Nearest));
-            let repeats = |mode: &Checked<WrappingMode>| *mode == Checked::Valid(WrappingMode::Repeat);
-            if !repeats(&sampler.wrap_s) || !repeats(&sampler.wrap_t) {
-                self.scene.report.approximated(self.place(path), "a texture that does not repeat as one that does");
-            }
+            wrap = [&sampler.wrap_s, &sampler.wrap_t].map(|mode| match mode {
+                Checked::Valid(WrappingMode::ClampToEdge) => Wrap::Clamp,
+                Checked::Valid(WrappingMode::MirroredRepeat) => Wrap::Mirror,
+                _ => Wrap::Repeat,
+            });
         }
-        let (mut scale, mut offset) = (DVec2::ONE, DVec2::ZERO);
+        let (mut matrix, mut offset) = (DMat2::IDENTITY, DVec2::ZERO);
         if let Some(transform) = transform {
-            scale = DVec2::from_array(transform.scale.0.map(f64::from));
+            let scale = DVec2::from_array(transform.scale.0.map(f64::from));
             offset = DVec2::from_array(transform.offset.0.map(f64::from));
-            if transform.rotation.0 != 0.0 {
-                self.scene.report.approximated(self.place(path), "a texture that is turned as one that is not");
-            }
+            // Counter-clockwise as it is seen, where v runs down.
+            matrix = DMat2::from_angle(-f64::from(transform.rotation.0)) * DMat2::from_diagonal(scale);
         }
         // v of the file runs down, that of the mesh here up.
         let texture = Texture {
@@ -98,11 +106,35 @@ impl Importer<'_, '_> {
             name: image.name.clone().filter(|name| !name.is_empty()).unwrap_or_else(|| format!("image-{source}")),
             endmembers: None,
             nearest,
-            scale: [scale.x, scale.y],
-            offset: [offset.x, 1.0 - scale.y - offset.y],
+            scale: [1.0; 2],
+            offset: [0.0; 2],
             file: None,
         };
-        Ok(Some(Found { texture, alpha: Picture::alpha(&bytes) }))
+        // A picture of alpha lies as that of colours does.
+        let alpha = Picture::alpha(&bytes).map(|alpha| Texture {
+            picture: Picture {
+                size: texture.picture.size,
+                texels: Texels::Floats(alpha.into_iter().map(|v| [v; 3]).collect()),
+            },
+            ..texture.clone()
+        });
+        let (matrix, offset) = upward(matrix, offset, false);
+        let mut finished = |texture: Texture| {
+            let (texture, off) = texture.placed(matrix, offset);
+            if let Some(off) = off {
+                let what = "a texture that is turned by other than quarters of a turn as one that is not";
+                self.scene.report.approximated(self.place(path), what, off);
+            }
+            let (texture, off) = texture.wrapped(wrap);
+            if let Some(off) = off {
+                let what =
+                    "a texture that does not repeat as one that does, beyond coordinates of the surface from 0 to 1";
+                self.scene.report.approximated(self.place(path), what, off);
+            }
+            texture
+        };
+        let texture = finished(texture);
+        Ok(Some(Found { texture, alpha: alpha.map(finished) }))
     }
 
     /// A linear colour times its texture.
@@ -139,9 +171,11 @@ impl Importer<'_, '_> {
         let unit = |v: f32| f64::from(v).clamp(0.0, 1.0);
         let transmission = material.extensions.as_ref().and_then(|e| e.transmission.as_ref());
         let factors = pbr.base_color_factor.0.into_iter().chain([pbr.metallic_factor.0, pbr.roughness_factor.0]);
-        let mut factors = factors.chain(transmission.map(|t| t.transmission_factor.0));
-        if factors.any(|factor| !(0.0..=1.0).contains(&factor)) {
-            self.scene.report.approximated(self.place(path), "factors outside of 0 to 1, which are clipped to that");
+        let factors = factors.chain(transmission.map(|t| t.transmission_factor.0));
+        let beyond = factors.map(|factor| f64::from((factor - factor.clamp(0.0, 1.0)).abs())).fold(0.0, f64::max);
+        if beyond > 0.0 {
+            let (what, off) = ("factors outside of 0 to 1, which are clipped to that", text::up(beyond));
+            self.scene.report.approximated(self.place(path), what, Deviation::at_most(off));
         }
         let [r, g, b, alpha] = pbr.base_color_factor.0.map(unit);
         let base_path = format!("{path}.pbrMetallicRoughness.baseColorTexture");
@@ -157,13 +191,10 @@ impl Importer<'_, '_> {
                 self.scene.report.left_out(self.place(path), what);
             }
         }
-        if !material.double_sided {
-            let what = "a material that is seen from its front only as one of both sides";
-            self.scene.report.approximated(self.place(path), what);
-        }
         let extensions = material.extensions.as_ref();
         if extensions.is_some_and(|e| e.unlit.is_some()) {
-            self.scene.report.approximated(self.place(path), "an unlit material as one that is lit");
+            let off = Deviation::unbounded("it is as bright as what shines on it makes it, not as its colour says");
+            self.scene.report.approximated(self.place(path), "an unlit material as one that is lit", off);
         }
         for (is_there, what) in [
             (extensions.is_some_and(|e| e.specular.is_some()), "KHR_materials_specular"),
@@ -182,26 +213,36 @@ impl Importer<'_, '_> {
         let metallic = unit(pbr.metallic_factor.0);
         let factor = unit(pbr.roughness_factor.0);
         let mut rough = Rough::Pair([(factor * factor).max(1e-3); 2]);
-        let mut metal_weight = (text::rounded(metallic), metallic);
+        let mut metal_weight = (text::rounded(metallic), metallic, None);
         if let Some(found) = &shares {
             let texture = Texture { picture: found.texture.picture.clone().raw(), ..found.texture.clone() };
             let said = ("roughnesses", self.place(path));
             rough = texture.rough(self.scene, said, name, &|rgb| f64::from(rgb[1]), &|v| (v * factor).powi(2))?;
             if metallic > 0.0 {
-                metal_weight = self.channel(found, 2, metallic, &format!("{name}-metal"))?;
+                let (text, mean) = self.channel(found, 2, metallic, &format!("{name}-metalness"))?;
+                metal_weight = (text, mean, Some(found.texture.picture.clone()));
             }
         }
         let what = "metallic-roughness as a coat over diffuse matter of the same brightness on the whole, and a metal whose reflectance at \
                     normal incidence is the colour";
-        self.scene.report.approximated(self.place(path), what);
+        self.scene.report.approximated(self.place(path), what, Deviation::measured(surfaces::METALLIC_ROUGHNESS));
+        let factor = transmission.map_or(0.0, |t| unit(t.transmission_factor.0));
+        let mut clear = (text::rounded(factor), factor);
+        let clear_path = format!("{path}.extensions.KHR_materials_transmission.transmissionTexture");
+        if let Some(info) = transmission.and_then(|t| t.transmission_texture.as_ref())
+            && let Some(found) = self.found(info, &clear_path)?
+        {
+            clear = self.channel(&found, 0, factor, &format!("{name}-clear"))?;
+        }
         let textured = colour.is_texture()
+            || clear.0.starts_with('{')
             || rough.is_texture()
             || metal_weight.0.starts_with('{')
             || opacity.as_ref().is_some_and(|o| o.starts_with('{'));
-        let material_name = self.surface(material, name, path, &colour, &rough, &metal_weight, opacity)?;
+        let material_name = self.surface(material, name, path, &colour, &rough, &metal_weight, &clear, opacity)?;
         let plain = if textured {
             let mean = Colour::Spectrum(colour.mean(), None);
-            let weight = (text::rounded(metal_weight.1), metal_weight.1);
+            let weight = (text::rounded(metal_weight.1), metal_weight.1, None);
             self.surface(
                 material,
                 &format!("{name}-mean"),
@@ -209,6 +250,7 @@ impl Importer<'_, '_> {
                 &mean,
                 &Rough::Pair([rough.mean(); 2]),
                 &weight,
+                &(text::rounded(clear.1), clear.1),
                 None,
             )?
         } else {
@@ -216,7 +258,12 @@ impl Importer<'_, '_> {
         };
         let (emission, plain_emission) = self.emission(material, path)?;
         let lit = emission.as_ref().is_some_and(|text| text.contains("texture ="));
-        Ok(Look { material: material_name, emission, textured: textured || lit, plain, plain_emission })
+        let off_plain = if colour.is_texture() {
+            colour.off_its_mean()
+        } else {
+            Deviation::unbounded("its numbers differ from place to place, as its textures say")
+        };
+        Ok(Look { material: material_name, emission, textured: textured || lit, plain, plain_emission, off_plain })
     }
 
     fn opacity(
@@ -240,10 +287,10 @@ impl Importer<'_, '_> {
         if mode == AlphaMode::Opaque {
             return Ok(None);
         }
-        match base.and_then(|found| found.alpha.as_ref().map(|values| (found, values))) {
-            Some((found, values)) => {
-                let values = values.iter().map(|v| share(f64::from(*v) * alpha) as f32).collect();
-                Ok(Some(found.texture.greys(self.scene, &format!("{name}-alpha"), values)?))
+        match base.and_then(|found| found.alpha.as_ref()) {
+            Some(texture) => {
+                let values = texture.picture.linear().iter().map(|v| share(f64::from(v[0]) * alpha) as f32).collect();
+                Ok(Some(texture.greys(self.scene, &format!("{name}-alpha"), values)?))
             }
             None => Ok(Some(text::rounded(share(alpha))).filter(|_| share(alpha) < 1.0)),
         }
@@ -257,34 +304,33 @@ impl Importer<'_, '_> {
         path: &str,
         colour: &Colour,
         rough: &Rough,
-        metal: &(String, f64),
+        metal: &(String, f64, Option<Picture>),
+        (clear_weight, clear): &(String, f64),
         opacity: Option<String>,
     ) -> Result<String> {
         let extensions = material.extensions.as_ref();
         let ior = extensions.and_then(|e| e.ior.as_ref()).map_or(1.5, |ior| f64::from(ior.ior.0));
         let is_index = (1.0..=1000.0).contains(&ior);
         if !is_index {
-            self.scene.report.approximated(self.place(path), format!("an `ior` of {ior} as 1.5"));
+            // As the extension has it, 0 reflects everything.
+            let straight = if ior == 0.0 { 1.0 } else { ((ior - 1.0) / (ior + 1.0)).powi(2) };
+            let off =
+                Deviation::at_most(format!("{} of reflectance at normal incidence", text::up((straight - 0.04).abs())));
+            self.scene.report.approximated(self.place(path), format!("an `ior` of {ior} as 1.5"), off);
         }
         let eta = if is_index { ior } else { 1.5 };
         let alpha = rough.even().unwrap_or_default();
-        let transmission = extensions.and_then(|e| e.transmission.as_ref());
-        let clear = transmission.map_or(0.0, |t| f64::from(t.transmission_factor.0).clamp(0.0, 1.0));
-        let [outside, _] = surfaces::diffuse_fresnel(eta);
-        let mut parts: Vec<(f64, &str, Section)> = Vec::new();
+        let clear = *clear;
+        let mut parts: Vec<(&str, Section)> = Vec::new();
         if clear < 1.0 && metal.1 < 1.0 {
-            let (base, _) = surfaces::under_coat(colour, eta, 1.0 - outside);
+            // What is below has Schlick's share of what the coat lets through, by the angle to the half vector: its mean over both directions.
+            let straight = ((eta - 1.0) / (eta + 1.0)).powi(2);
+            let through = (1.0 - straight) * (1.0 - MEAN_OF_SCHLICK);
+            let (base, _) = Coat::new(eta, rough.mean()).under(colour, |rho| through * rho);
             let section = Section::default().with("reflectance", base.toml(self.scene, &format!("{name}-base"))?);
-            parts.push((
-                1.0 - clear,
-                "plastic",
-                section.with("eta", text::rounded(eta)).with("roughness", alpha.clone()),
-            ));
+            parts.push(("plastic", section.with("eta", text::rounded(eta)).with("roughness", alpha.clone())));
         }
         if clear > 0.0 {
-            if transmission.is_some_and(|t| t.transmission_texture.is_some()) {
-                self.scene.report.approximated(self.place(path), "a transmission by a texture as its factor");
-            }
             self.scene.report.left_out(
                 self.place(path),
                 "the colour of glass, and what it absorbs (`interior` with a medium would)",
@@ -292,23 +338,21 @@ impl Importer<'_, '_> {
             let volume = extensions.and_then(|e| e.volume.as_ref()).is_some_and(|v| v.thickness_factor.0 > 0.0);
             let section = Section::default();
             if volume {
-                parts.push((
-                    clear,
-                    "dielectric",
-                    section.with("eta", text::rounded(eta)).with("roughness", alpha.clone()),
-                ));
+                parts.push(("dielectric", section.with("eta", text::rounded(eta)).with("roughness", alpha.clone())));
             } else {
-                let once = ((eta - 1.0) / (eta + 1.0)).powi(2);
-                let what = "glass without a volume as a mirror of the opacity that a pane has at normal incidence";
-                self.scene.report.approximated(self.place(path), what);
-                let section = section.comment("a pane").with("eta", "0.01").with("k", "100.0");
                 // Within a blend there is no opacity.
                 if clear == 1.0 {
-                    let section = section.with("opacity", text::rounded(2.0 * once / (1.0 + once)));
-                    return Ok(self.scene.put(name, "conductor", section));
+                    let (share, off) = surfaces::pane(eta);
+                    let what = "glass without a volume as a mirror of the opacity that a pane has at normal incidence";
+                    self.scene.report.approximated(self.place(path), what, off);
+                    let section = section.comment("a pane").with("eta", "0.01").with("k", "100.0");
+                    return Ok(self.scene.put(name, "conductor", section.with("opacity", text::rounded(share))));
                 }
+                let what = "glass without a volume, in a mixture, as glass with one: it bends light";
+                let off = Deviation::unbounded("where what is behind it is seen, which depends on how far that is");
+                self.scene.report.approximated(self.place(path), what, off);
                 let section = Section::default().with("eta", text::rounded(eta)).with("roughness", alpha.clone());
-                parts.push((clear, "dielectric", section));
+                parts.push(("dielectric", section));
             }
         }
         let named = |count: usize, kind: &str| if count == 1 { name.to_owned() } else { format!("{name}-{kind}") };
@@ -317,15 +361,15 @@ impl Importer<'_, '_> {
             Some(opacity) if is_last => section.with("opacity", opacity.clone()),
             _ => section,
         };
-        let (mut before, mut share) = (None::<String>, 0.0);
-        for (i, (weight, kind, section)) in parts.into_iter().enumerate() {
+        let mut before = None::<String>;
+        for (i, (kind, section)) in parts.into_iter().enumerate() {
             let own = self.scene.put(&named(count, kind), kind, put_opacity(section, count == 1));
-            share += weight;
             before = Some(match before {
                 None => own,
                 Some(first) => {
                     let blend = Section::default().with("a", text::quoted(&first)).with("b", text::quoted(&own));
-                    let blend = blend.with("weight", text::rounded(weight / share));
+                    // The second one is what is clear, of all that is no metal.
+                    let blend = blend.with("weight", clear_weight.clone());
                     let is_last = i + 1 == count;
                     self.scene.put(
                         &if is_last { name.to_owned() } else { format!("{name}-mix") },
@@ -336,13 +380,27 @@ impl Importer<'_, '_> {
             });
         }
         if metal.1 > 0.0 {
-            if colour.is_texture() {
-                self.scene.report.approximated(self.place(path), "the colour of a metal by a texture as its mean");
-            }
-            let index = surfaces::metal(&colour.mean());
-            let section = Section::default().with("eta", self.scene.spectrum(&index, &format!("{name}-metal"))?);
-            let section = section.with("k", "0.0").with("roughness", alpha).with("energy_compensation", "false");
-            let own = self.scene.put(&named(count, "metal"), "conductor", put_opacity(section, count == 1));
+            let section = Section::default().with("roughness", alpha).with("energy_compensation", "false");
+            let index = |colour: &Curve| [surfaces::metal(colour), Curve::Constant(0.0)];
+            let own = match colour {
+                Colour::Texture(texture) => {
+                    // Of the colours only those count where there is metal.
+                    let seen =
+                        metal.2.as_ref().filter(|shares| shares.size == texture.picture.size).map(Picture::linear);
+                    let palette = Palette::of(texture, &|i| seen.as_ref().is_none_or(|shares| shares[i][2] > 0.0));
+                    let what = "the colour of a metal by a texture as a mixture of metals";
+                    self.scene.report.approximated(self.place(path), what, palette.off.clone());
+                    let last = |section: Section| put_opacity(section, count == 1);
+                    palette.write(self.scene, texture, &named(count, "metal"), &index, &section, &last)?
+                }
+                Colour::Spectrum(curve, _) => {
+                    let [eta, _] = index(curve);
+                    let eta = self.scene.spectrum(&eta, &format!("{name}-metal"))?;
+                    let own = Section::default().with("eta", eta).with("k", "0.0");
+                    let own = Section { entries: [own.entries, section.entries].concat(), ..own };
+                    self.scene.put(&named(count, "metal"), "conductor", put_opacity(own, count == 1))
+                }
+            };
             before = Some(match before {
                 None => own,
                 Some(first) => {

@@ -9,9 +9,10 @@ use glam::{DAffine3, DVec3};
 
 use self::material::Look;
 use super::geometry::Mesh;
-use super::report::{Fate, Place};
+use super::report::{Deviation, Place};
 use super::scene::{Scene, Section};
-use super::text;
+use super::{spot, text};
+use crate::format::edges;
 use crate::format::gltf::json::camera::Type as CameraType;
 use crate::format::gltf::json::extensions::scene::khr_lights_punctual::Type as LightType;
 use crate::format::gltf::json::mesh::Semantic;
@@ -59,7 +60,7 @@ impl Importer<'_, '_> {
             let lines: usize = read.iter().map(|standing| standing.mesh.without_surface).sum();
             if lines > 0 {
                 let what = format!("{lines} primitives of points and lines, which have no surface");
-                self.scene.report.say(Fate::LeftOut, None, what);
+                self.scene.report.left_out(None, what);
             }
             for Standing { mesh, places } in &read {
                 self.standing(mesh, places)?;
@@ -71,17 +72,17 @@ impl Importer<'_, '_> {
         }
         self.cameras(&nodes, bounds)?;
         self.scene.integrator = Some(Section::new("[integrator]").with("max_bounces", "8"));
-        self.scene.report.chosen("8 bounces: glTF has no integrators");
+        self.scene.report.chosen(None, "8 bounces: glTF has no integrators");
         if !self.is_lit && self.scene.lights.is_empty() {
             let section =
                 Section::new("[environment]").comment("chosen: the file has no lights").with("radiance", "1.0");
             self.scene.environment = Some(section);
-            self.scene.report.chosen("a uniform sky of radiance 1, as the file has no lights");
+            self.scene.report.chosen(None, "a uniform sky of radiance 1, as the file has no lights");
         }
         let root = &self.file.root;
         for (what, count) in [("animation", root.animations.len()), ("skin", root.skins.len())] {
             if count > 0 {
-                self.scene.report.say(Fate::LeftOut, None, format!("{count} {what}s: everything is where its node is"));
+                self.scene.report.left_out(None, format!("{count} {what}s: everything is where its node is"));
             }
         }
         const READ: [&str; 8] = [
@@ -96,7 +97,7 @@ impl Importer<'_, '_> {
         ];
         for name in root.extensions_used.iter().filter(|name| !READ.contains(&name.as_str())) {
             let shown: String = name.chars().take(60).collect();
-            self.scene.report.say(Fate::LeftOut, None, format!("the extension {}", shown.escape_debug()));
+            self.scene.report.left_out(None, format!("the extension {}", shown.escape_debug()));
         }
         Ok(())
     }
@@ -140,11 +141,18 @@ impl Importer<'_, '_> {
         if look.textured && shape.uv.is_none() {
             // Textures need coordinates: without them glTF looks at (0, 0).
             let what = "a textured material on a mesh without TEXCOORD_0 as its mean";
-            self.scene.report.approximated(self.place(path.clone()), what);
+            self.scene.report.approximated(self.place(path.clone()), what, look.off_plain.clone());
             (material, emission) = (look.plain.clone(), look.plain_emission.clone());
         }
         if !look.textured {
             shape.uv = None;
+        }
+        let is_double = primitive.material.is_some_and(|of| self.file.root.materials[of.value()].double_sided);
+        let open = if is_double { 0 } else { edges::open(&shape.positions, &shape.triangles).len() };
+        if open > 0 {
+            let what = "an open surface that is seen from its front only (no `doubleSided`) as one of both sides";
+            let off = Deviation::unbounded("its back is seen where glTF shows what is behind it, and casts shadows");
+            self.scene.report.approximated(self.place(path.clone()), what, off);
         }
         let name =
             part.labels.object.clone().or(self.file.root.meshes[m].name.clone()).unwrap_or_else(|| format!("mesh {m}"));
@@ -194,9 +202,22 @@ impl Importer<'_, '_> {
                 });
                 let at = self.place(path.clone());
                 let half = self.scene.report.within(at.clone(), "`outerConeAngle`", outer.to_degrees(), [1e-3, 90.0]);
-                let falloff = self.scene.report.within(at.clone(), "`innerConeAngle`", inner.to_degrees(), [0.0, half]);
-                self.scene.report.approximated(at, "the edge of a spot: t² (3 - 2 t) for t², t linear in the cosine");
-                let angles = format!("half_angle = {}, falloff = {}", text::rounded(half), text::rounded(falloff));
+                let inner = self.scene.report.within(at.clone(), "`innerConeAngle`", inner.to_degrees(), [0.0, half]);
+                let (start, end) = (inner.to_radians().cos(), half.to_radians().cos());
+                // KHR_lights_punctual: the square of what is linear in the cosine.
+                let squared =
+                    |angle: f64| ((angle.to_radians().cos() - end) / (start - end).max(1e-9)).clamp(0.0, 1.0).powi(2);
+                let edge = spot::nearest(&squared, inner, half);
+                if edge.off > 1e-3 {
+                    let what = "the edge of a spot, whose intensity falls as the square of what is linear in the cosine, by the nearest one";
+                    let off = format!("{} of the intensity on its axis", text::percent(edge.off));
+                    self.scene.report.approximated(at, what, Deviation::at_most(off));
+                }
+                let mut angles =
+                    format!("half_angle = {}, falloff = {}", text::rounded(edge.half), text::rounded(edge.falloff));
+                if edge.profile != "smooth" {
+                    angles += &format!(", profile = {}", text::quoted(edge.profile));
+                }
                 (
                     "spot",
                     format!("{{ position = {position}, direction = {direction}, intensity = {light_text}, {angles} }}"),
@@ -277,7 +298,7 @@ impl Importer<'_, '_> {
         let width = (HEIGHT * aspect).round().clamp(1.0, 65_536.0);
         let section = Section::new("[film]").with("width", format!("{width}")).with("height", format!("{HEIGHT}"));
         self.scene.film = Some(section.with("filter", "\"gaussian\""));
-        self.scene.report.chosen(format!("{width} x {HEIGHT} pixels: glTF has no films"));
+        self.scene.report.chosen(None, format!("{width} x {HEIGHT} pixels: glTF has no films"));
     }
 
     /// A camera that sees everything, from the front, the right and above.
@@ -294,7 +315,7 @@ impl Importer<'_, '_> {
         let section =
             section.with("up", "[0.0, 1.0, 0.0]").with("fov", text::number(FOV)).with("fov_axis", "\"smaller\"");
         self.scene.camera = Some(section);
-        self.scene.report.chosen("a camera that sees everything, as the file has none");
+        self.scene.report.chosen(None, "a camera that sees everything, as the file has none");
         self.film(16.0 / 9.0);
     }
 }

@@ -5,10 +5,12 @@ use super::values::{self, Plugin, place};
 use super::xml::Node;
 use super::{Importer, principled};
 use crate::Result;
+use crate::import::layers;
 use crate::import::metals;
 use crate::import::picture::{Colour, Rough, grey};
+use crate::import::report::Deviation;
 use crate::import::scene::Section;
-use crate::import::surfaces;
+use crate::import::surfaces::{self, Coat};
 use crate::import::text;
 use crate::spectral::Curve;
 
@@ -202,7 +204,8 @@ impl<'n> Importer<'n, '_> {
             }
             other => {
                 let what = format!("the BSDF `{}` as a diffuse grey of 0.5", values::shown(other));
-                self.scene.report.approximated(plugin.place(), what);
+                let off = Deviation::at_most("0.5 of all light that arrives, and any other spread of it");
+                self.scene.report.approximated(plugin.place(), what, off);
                 Ok(self.put(name, "diffuse", section.with("reflectance", "0.5"), &around, true))
             }
         }
@@ -214,8 +217,8 @@ impl<'n> Importer<'n, '_> {
             return Ok(None);
         }
         if plugin.string("distribution")?.unwrap_or("beckmann") == "beckmann" {
-            let what = "facets of Beckmann's distribution as GGX's of the same alpha: the same peak, with longer tails";
-            self.scene.report.approximated(plugin.place(), what);
+            let what = "facets of Beckmann's distribution as GGX's of the same alpha";
+            self.scene.report.approximated(plugin.place(), what, surfaces::beckmann());
         }
         plugin.boolean("sample_visible", true)?;
         if let Some(texture) = self.texture_of_numbers(plugin, "alpha", flip)? {
@@ -228,7 +231,7 @@ impl<'n> Importer<'n, '_> {
         }
         let [u, v] = [u, v].map(|alpha| {
             if alpha > 1.0 {
-                self.scene.report.approximated(plugin.place(), "an alpha above 1 as 1");
+                self.scene.report.approximated(plugin.place(), "an alpha above 1 as 1", surfaces::too_rough(alpha));
             }
             alpha.min(1.0)
         });
@@ -237,6 +240,8 @@ impl<'n> Importer<'n, '_> {
 
     fn conductor(&mut self, plugin: &Plugin<'n>, name: &str, mut around: Around, flip: bool) -> Result<Made> {
         let roughness = self.roughness(plugin, name, flip)?;
+        // Beckmann's facets hide less from each other: GGX's with what they send on are nearer to them.
+        let is_beckmann = plugin.string("distribution")?.unwrap_or("beckmann") == "beckmann";
         let named = plugin.string("material")?;
         let given = [self.index(plugin, "eta", flip)?, self.index(plugin, "k", flip)?];
         let [eta, k] = match (named, given) {
@@ -262,36 +267,45 @@ impl<'n> Importer<'n, '_> {
             curve => curve,
         };
         let mut section = Section::default();
-        section.set("eta", self.scene.spectrum(&positive(eta), &format!("{name}-eta"))?);
+        let eta = positive(eta);
+        section.set("eta", self.scene.spectrum(&eta, &format!("{name}-eta"))?);
         section.set("k", self.scene.spectrum(&k, &format!("{name}-k"))?);
         if let Some(rough) = roughness {
             // Which way u runs matters to brushed ones.
             let brushed = rough.brushed();
             around.is_textured |= brushed.is_some() || rough.is_texture();
             section.set("roughness", brushed.map(text::list).or_else(|| rough.even()).unwrap_or_else(|| "0.0".into()));
-            section.set("energy_compensation", "false");
+            if !is_beckmann {
+                section.set("energy_compensation", "false");
+            }
         }
         let Some(specular) = self.colour(plugin, "specular_reflectance", Of::Reflectance, flip)? else {
             return Ok(self.put(name, "conductor", section, &around, true));
         };
-        self.dimmed(plugin, name, "conductor", section, specular, around)
+        let mut factor = specular.mean();
+        if specular.is_texture() {
+            let what = "a `specular_reflectance` by a texture as its mean";
+            self.scene.report.approximated(plugin.place(), what, specular.off_its_mean());
+        }
+        if !factor.is_constant() {
+            let (tinted, largest, off) = layers::tinted(&[eta, k], &factor);
+            let what = "a coloured `specular_reflectance` as a metal of that colour at normal incidence";
+            self.scene.report.approximated(plugin.place(), what, off);
+            for (key, curve) in ["eta", "k"].into_iter().zip(&tinted) {
+                let written = self.scene.spectrum(curve, &format!("{name}-tinted-{key}"))?;
+                section
+                    .entries
+                    .iter_mut()
+                    .filter(|(own, _)| own == key)
+                    .for_each(|(_, value)| value.clone_from(&written));
+            }
+            factor = Curve::Constant(largest);
+        }
+        self.dimmed(name, "conductor", section, factor.eval(550.0), around)
     }
 
-    /// A material times a factor: a blend with black, by its mean where it is a colour.
-    fn dimmed(
-        &mut self,
-        plugin: &Plugin<'n>,
-        name: &str,
-        kind: &str,
-        section: Section,
-        factor: Colour,
-        around: Around,
-    ) -> Result<Made> {
-        let curve = factor.mean();
-        let mean = curve.mean(400.0, 700.0);
-        if !curve.is_constant() {
-            self.scene.report.approximated(plugin.place(), "a coloured factor of a reflection as its mean");
-        }
+    /// A material times a factor: a blend with black.
+    fn dimmed(&mut self, name: &str, kind: &str, section: Section, mean: f64, around: Around) -> Result<Made> {
         if (mean - 1.0).abs() < 1e-6 {
             return Ok(self.put(name, kind, section, &around, true));
         }
@@ -315,7 +329,8 @@ impl<'n> Importer<'n, '_> {
     fn index(&mut self, plugin: &Plugin<'n>, name: &str, flip: bool) -> Result<Option<Curve>> {
         let Some(colour) = self.colour(plugin, name, Of::Unbounded, flip)? else { return Ok(None) };
         if colour.is_texture() {
-            self.scene.report.approximated(plugin.place(), format!("`{name}` by a texture as its mean"));
+            let off = colour.off_its_mean();
+            self.scene.report.approximated(plugin.place(), format!("`{name}` by a texture as its mean"), off);
         }
         Ok(Some(colour.mean()))
     }
@@ -346,10 +361,11 @@ impl<'n> Importer<'n, '_> {
         let eta = self.relative_index(plugin, "bk7")?;
         let mut section = Section::default().with("eta", text::rounded(eta));
         if let Some(rough) = roughness {
-            if matches!(rough, Rough::Pair([u, v]) if u != v) {
-                self.scene
-                    .report
-                    .approximated(plugin.place(), "two roughnesses of a dielectric as their geometric mean");
+            if let Rough::Pair(both @ [u, v]) = rough
+                && u != v
+            {
+                let what = "two roughnesses of a dielectric as their geometric mean";
+                self.scene.report.approximated(plugin.place(), what, surfaces::unbrushed(both));
             }
             around.is_textured |= rough.is_texture();
             section.set("roughness", rough.even().unwrap_or_else(|| "0.0".into()));
@@ -367,10 +383,9 @@ impl<'n> Importer<'n, '_> {
     /// A pane: what is reflected at normal incidence, to and fro, is a mirror's share; the rest passes.
     fn thin(&mut self, plugin: &Plugin<'n>, name: &str, around: Around) -> Result<Made> {
         let eta = self.relative_index(plugin, "bk7")?;
-        let once = ((eta - 1.0) / (eta + 1.0)).powi(2);
-        let share = 2.0 * once / (1.0 + once);
-        let what = "a `thindielectric` as a mirror of the opacity that it has at normal incidence: exact there, too clear at grazing angles";
-        self.scene.report.approximated(plugin.place(), what);
+        let (share, off) = surfaces::pane(eta);
+        let what = "a `thindielectric` as a mirror of the opacity that it has at normal incidence";
+        self.scene.report.approximated(plugin.place(), what, off);
         let section = Section::default().comment("a pane").with("eta", "0.01").with("k", "100.0");
         let around = Around { opacity: Some(text::rounded(share)), two_sided: true, ..around };
         Ok(self.put(name, "conductor", section, &around, true))
@@ -382,18 +397,22 @@ impl<'n> Importer<'n, '_> {
         let colour = self.colour(plugin, "diffuse_reflectance", Of::Reflectance, flip)?.unwrap_or(Colour::grey(0.5));
         around.is_textured |= colour.is_texture();
         let nonlinear = plugin.boolean("nonlinear", false)?;
-        // Linear: what comes back up under the coat is not coloured again, ρ (1 - F) / (1 - F).
-        let colour = if nonlinear { colour } else { surfaces::recoloured(&colour, eta) };
         let specular = self.colour(plugin, "specular_reflectance", Of::Reflectance, flip)?;
         if specular.is_some_and(|colour| !matches!(colour.mean(), Curve::Constant(1.0))) {
             self.scene.report.left_out(plugin.place(), "`specular_reflectance` of a plastic");
         }
         let what =
             "a plastic as diffuse matter under a coat, whose light below the coat is that of Spectile's own tables";
-        self.scene.report.approximated(plugin.place(), what);
+        self.scene.report.approximated(plugin.place(), what, Deviation::measured(surfaces::PLASTIC));
         let mut section = Section::default();
+        let eta = self.scene.report.within(plugin.place(), "the relative index of a plastic", eta, [1.0, 1000.0]);
+        let coat = Coat::new(eta, roughness.as_ref().map_or(0.0, Rough::mean));
+        // What no coat changes stays as it is written.
+        let colour = match roughness.is_none() && nonlinear {
+            true => colour,
+            false => coat.under(&colour, |rho| coat.scattered(rho, !nonlinear)).0,
+        };
         section.set("reflectance", colour.toml(self.scene, name)?);
-        let eta = self.scene.report.within(plugin.place(), "the relative index of a plastic", eta, [1.0, f64::MAX]);
         section.set("eta", text::rounded(eta));
         if let Some(rough) = roughness {
             around.is_textured |= rough.is_texture();

@@ -2,15 +2,15 @@
 
 use std::rc::Rc;
 
-use glam::DVec2;
+use glam::DMat2;
 
 use super::values::{self, Plugin, numbers, place};
 use super::xml::{Node, inside};
 use super::{Importer, at};
 use crate::Result;
 use crate::format::text as spectra;
-use crate::import::picture::{Colour, Numbers, Picture, Texels, Texture, unbounded};
-use crate::import::report::Fate;
+use crate::import::picture::{Colour, Numbers, Picture, Texels, Texture, Wrap, unbounded, upward};
+use crate::import::report::Deviation;
 use crate::import::text;
 use crate::spectral::upsample;
 use crate::spectral::{Curve, Outside};
@@ -103,7 +103,7 @@ impl<'n> Importer<'n, '_> {
                 if rgb.iter().any(|v| *v > 1.0) {
                     let what = "RGB of an index above 1 is as it is written, as in Mitsuba's RGB variants; its spectral variants (3.9.1) \
                                 take 1 in the place of what is more";
-                    self.scene.report.say(Fate::Chosen, Some(place(node)), what);
+                    self.scene.report.chosen(place(node), what);
                 }
                 Colour::Spectrum(unbounded(rgb), None)
             }
@@ -162,7 +162,11 @@ impl<'n> Importer<'n, '_> {
             "checkerboard" => self.checkerboard(&plugin, of, flip)?,
             other => {
                 let what = format!("the texture `{}` as a grey of 0.5", values::shown(other));
-                self.scene.report.approximated(plugin.place(), what);
+                let off = match of {
+                    Of::Reflectance => Deviation::at_most("0.5 of reflectance"),
+                    _ => Deviation::unbounded("its values may be any"),
+                };
+                self.scene.report.approximated(plugin.place(), what, off);
                 plugin.objects(&["texture", "spectrum", "rgb"]);
                 return Ok(Colour::grey(0.5));
             }
@@ -185,25 +189,40 @@ impl<'n> Importer<'n, '_> {
         } else if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) && is_plain_png(&path) {
             file = Some(path.clone());
         }
-        if of == Of::Reflectance && picture.linear().iter().flatten().any(|v| !(0.0..=1.0).contains(v)) {
-            self.scene.report.approximated(plugin.place(), "texels of a reflectance beyond 1, which are 1");
+        if of == Of::Reflectance
+            && let Some(off) = picture.beyond_one()
+        {
+            self.scene.report.approximated(plugin.place(), "texels of a reflectance beyond 1, which are 1", off);
             (picture, file) = (picture.map(&|v| v.clamp(0.0, 1.0)), None);
         }
-        let (scale, offset) = self.placement(plugin, flip)?;
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let texture = Texture { picture, name, endmembers: None, nearest, scale, offset, file };
-        Ok(Colour::Texture(Rc::new(texture)))
+        let texture = Texture { picture, name, endmembers: None, nearest, scale: [1.0; 2], offset: [0.0; 2], file };
+        let texture = self.placed(texture, plugin, flip)?;
+        Ok(Colour::Texture(Rc::new(self.wrapped(texture, plugin)?)))
     }
 
     fn filter(&mut self, plugin: &Plugin<'n>) -> Result<bool> {
-        match plugin.string("wrap_mode")?.unwrap_or("repeat") {
-            "repeat" => {}
-            other => {
-                let what = format!("the wrap mode `{}` as `repeat`", values::shown(other));
-                self.scene.report.approximated(plugin.place(), what);
-            }
-        }
         Ok(plugin.string("filter_type")? == Some("nearest"))
+    }
+
+    /// A texture that goes on beyond its picture as `wrap_mode` says.
+    fn wrapped(&mut self, texture: Texture, plugin: &Plugin<'n>) -> Result<Texture> {
+        let mode = plugin.string("wrap_mode")?.unwrap_or("repeat");
+        let wrap = match mode {
+            "repeat" => Wrap::Repeat,
+            "mirror" => Wrap::Mirror,
+            "clamp" => Wrap::Clamp,
+            other => {
+                let known = "`repeat`, `mirror` and `clamp` are known";
+                return Err(plugin.node.problem(format!("the wrap mode `{}`: {known}", values::shown(other))).into());
+            }
+        };
+        let (texture, off) = texture.wrapped([wrap; 2]);
+        if let Some(off) = off {
+            let what = format!("the wrap mode `{mode}` as `repeat` beyond coordinates of the surface from 0 to 1");
+            self.scene.report.approximated(plugin.place(), what, off);
+        }
+        Ok(texture)
     }
 
     /// Two colours in a pattern of two by two fields.
@@ -212,34 +231,35 @@ impl<'n> Importer<'n, '_> {
         for (part, name) in two.iter_mut().zip(["color0", "color1"]) {
             match self.colour(plugin, name, of, flip)? {
                 Some(texture @ Colour::Texture(_)) => {
-                    self.scene
-                        .report
-                        .approximated(plugin.place(), "a texture within a checkerboard as its mean colour");
+                    let what = "a texture within a checkerboard as its mean colour";
+                    self.scene.report.approximated(plugin.place(), what, texture.off_its_mean());
                     *part = Colour::Spectrum(texture.mean(), None);
                 }
                 Some(colour) => *part = colour,
                 None => {}
             }
         }
-        let (scale, offset) = self.placement(plugin, flip)?;
         // Shares: red of the first, green of the second. With v downward, the field at the top left is the first.
         let (a, b) = ([255, 0, 0], [0, 255, 0]);
         let picture = Picture { size: [2, 2], texels: Texels::Bytes(vec![a, b, b, a]) };
         let name = "checkerboard.png".to_owned();
-        let texture =
-            Texture { picture, name, endmembers: Some(Box::new(two)), nearest: true, scale, offset, file: None };
-        Ok(Colour::Texture(Rc::new(texture)))
+        let endmembers = Some(Box::new(two));
+        let (scale, offset) = ([1.0; 2], [0.0; 2]);
+        let texture = Texture { picture, name, endmembers, nearest: true, scale, offset, file: None };
+        Ok(Colour::Texture(Rc::new(self.placed(texture, plugin, flip)?)))
     }
 
-    /// (u, v) to those of the picture, whose v runs up here and down there.
-    fn placement(&mut self, plugin: &Plugin<'n>, flip: bool) -> Result<([f64; 2], [f64; 2])> {
+    /// A texture where `to_uv` puts it; v of the picture runs up here and down there.
+    fn placed(&mut self, texture: Texture, plugin: &Plugin<'n>, flip: bool) -> Result<Texture> {
         let transform = plugin.transform("to_uv")?;
-        let matrix = transform.matrix3;
-        if matrix.x_axis.y.abs() > 1e-9 || matrix.y_axis.x.abs() > 1e-9 {
-            self.scene.report.approximated(plugin.place(), "a texture that `to_uv` turns, as one that it does not");
+        let (x, y) = (transform.matrix3.x_axis.truncate(), transform.matrix3.y_axis.truncate());
+        let (matrix, offset) = upward(DMat2::from_cols(x, y), transform.translation.truncate(), flip);
+        let (texture, off) = texture.placed(matrix, offset);
+        if let Some(off) = off {
+            let what = "a texture that `to_uv` turns by other than quarters of a turn, as one that it does not";
+            self.scene.report.approximated(plugin.place(), what, off);
         }
-        let (scale, offset) = (DVec2::new(matrix.x_axis.x, matrix.y_axis.y), transform.translation.truncate());
-        Ok(upward(scale, offset, flip))
+        Ok(texture)
     }
 
     /// The picture of a number that differs over the surface, if it does.
@@ -266,7 +286,7 @@ impl<'n> Importer<'n, '_> {
         let mean = match &colour {
             Colour::Texture(texture) => {
                 let what = format!("`{name}` by a texture as its mean");
-                self.scene.report.approximated(place(node), what);
+                self.scene.report.approximated(place(node), what, texture.off_its_mean());
                 texture.picture.mean().iter().sum::<f64>() / 3.0
             }
             Colour::Spectrum(curve, _) => curve.eval(550.0),
@@ -290,13 +310,6 @@ impl<'n> Importer<'n, '_> {
             }
         }
     }
-}
-
-/// A placement of a picture whose v runs down, for surfaces whose v runs down too (`flip`) or up, by one whose v runs up.
-pub fn upward(scale: DVec2, offset: DVec2, flip: bool) -> ([f64; 2], [f64; 2]) {
-    // v there: s v + o of the v that runs down. Upward it is 1 - that, and v down is 1 - v up.
-    let (v_scale, v_offset) = if flip { (-scale.y, 1.0 - offset.y) } else { (scale.y, 1.0 - scale.y - offset.y) };
-    ([scale.x, v_scale], [offset.x, v_offset])
 }
 
 fn check(node: &Node, of: Of, values: impl IntoIterator<Item = f64>) -> Result<()> {

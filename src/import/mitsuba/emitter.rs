@@ -9,6 +9,7 @@ use super::{Importer, at};
 use crate::Result;
 use crate::import::environment;
 use crate::import::picture::{Colour, Picture, Texels};
+use crate::import::report::Deviation;
 use crate::import::scene::Section;
 use crate::import::text;
 
@@ -71,7 +72,8 @@ impl<'n> Importer<'n, '_> {
             return Ok("{ rgb = [1.0, 1.0, 1.0] }".to_owned());
         };
         if colour.is_texture() {
-            self.scene.report.approximated(plugin.place(), format!("`{key}` by a texture as its mean"));
+            let off = colour.off_its_mean();
+            self.scene.report.approximated(plugin.place(), format!("`{key}` by a texture as its mean"), off);
             let Colour::Texture(texture) = &colour else { return Ok("0.0".to_owned()) };
             return Ok(format!("{{ rgb = {} }}", text::list(texture.picture.mean())));
         }
@@ -102,11 +104,13 @@ impl<'n> Importer<'n, '_> {
         if !is_large {
             picture = picture.between_poles((512 / picture.size[1].max(1) as usize).clamp(1, 8));
         } else {
-            let what = format!(
-                "a map whose first and last row are the poles as one of even rows: up to half a row of {} off",
-                picture.size[1]
+            let rows = picture.size[1];
+            let off = format!("{} degrees, half a row of {rows}, at the poles", text::up(90.0 / f64::from(rows)));
+            self.scene.report.approximated(
+                plugin.place(),
+                "a map whose first and last row are the poles as one of even rows",
+                Deviation::at_most(off),
             );
-            self.scene.report.approximated(plugin.place(), what);
         }
         let is_map = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr") || e.eq_ignore_ascii_case("hdr"));
         let map = if is_map && !frame.mirrored && is_large {

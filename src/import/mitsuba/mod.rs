@@ -19,6 +19,7 @@ use glam::DAffine3;
 use self::values::{Plugin, place};
 use self::xml::Node;
 use super::MOST_BOUNCES;
+use super::report::Deviation;
 use super::scene::{Scene, Section};
 use super::text;
 use crate::error::Problem;
@@ -122,7 +123,9 @@ impl<'n> Importer<'n, '_> {
     fn integrator(&mut self, nodes: &[&'n Node]) -> Result<()> {
         let mut section = Section::new("[integrator]");
         let Some(node) = nodes.first() else {
-            self.scene.report.chosen("32 bounces at most, as the scene has no integrator (`integrator.max_bounces`)");
+            self.scene
+                .report
+                .chosen(None, "32 bounces at most, as the scene has no integrator (`integrator.max_bounces`)");
             self.scene.integrator = Some(section.with("max_bounces", "32").with("russian_roulette_start", "5"));
             return Ok(());
         };
@@ -142,7 +145,8 @@ impl<'n> Importer<'n, '_> {
             "direct" => section = section.comment("direct light only"),
             other => {
                 let what = format!("the integrator `{}` as a path tracer", values::shown(other));
-                self.scene.report.approximated(plugin.place(), what);
+                let off = Deviation::unbounded("light that only one of the two counts, and its noise");
+                self.scene.report.approximated(plugin.place(), what, off);
             }
         }
         let hides = plugin.boolean("hide_emitters", false)?;
@@ -158,7 +162,7 @@ impl<'n> Importer<'n, '_> {
             _ => {
                 self.scene
                     .report
-                    .chosen("32 bounces at most and Russian roulette from the fifth, in the place of no limit");
+                    .chosen(None, "32 bounces at most and Russian roulette from the fifth, in the place of no limit");
                 32
             }
         };

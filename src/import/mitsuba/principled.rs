@@ -6,8 +6,9 @@ use super::colour::Of;
 use super::values::Plugin;
 use crate::Result;
 use crate::import::picture::{Colour, Rough, grey};
+use crate::import::report::Deviation;
 use crate::import::scene::Section;
-use crate::import::surfaces;
+use crate::import::surfaces::{self, Coat};
 use crate::import::text;
 
 /// How much brighter than Lambert's law Burley's diffuse lobe is on the whole at this roughness: the mean over both directions.
@@ -79,15 +80,15 @@ pub fn principled<'n>(
         plugin.get(key);
     }
     let what = "a principled BSDF as a coat over diffuse matter of the same brightness on the whole, and metal and glass by their shares";
-    importer.scene.report.approximated(plugin.place(), what);
+    importer.scene.report.approximated(plugin.place(), what, Deviation::measured(surfaces::PRINCIPLED));
     let mut parts = Vec::new();
     if metallic < 1.0 && glass < 1.0 {
-        let (base, too_bright) = surfaces::under_coat(&colour, eta, diffuse_factor(rough.mean().sqrt()));
-        if too_bright {
-            importer
-                .scene
-                .report
-                .approximated(plugin.place(), "a principled BSDF brighter than a white base under its coat, as that");
+        let factor = diffuse_factor(rough.mean().sqrt());
+        let (base, too_bright) = Coat::new(eta, rough.mean()).under(&colour, |rho| factor * rho);
+        if too_bright > 0.0 {
+            let what = "a principled BSDF brighter than a white base under its coat, as that";
+            let off = Deviation::at_most(format!("{} of what it scatters", text::percent(too_bright)));
+            importer.scene.report.approximated(plugin.place(), what, off);
         }
         let mut section = Section::default();
         section.set("reflectance", base.toml(importer.scene, &format!("{name}-base"))?);
@@ -97,7 +98,8 @@ pub fn principled<'n>(
     }
     if metallic > 0.0 {
         if colour.is_texture() {
-            importer.scene.report.approximated(plugin.place(), "the colour of a metal by a texture as its mean");
+            let what = "the colour of a metal by a texture as its mean";
+            importer.scene.report.approximated(plugin.place(), what, colour.off_its_mean());
         }
         let metal = surfaces::metal(&colour.mean());
         let mut section = Section::default().with("eta", importer.scene.spectrum(&metal, &format!("{name}-metal"))?);

@@ -6,12 +6,14 @@ use super::Importer;
 use super::values::{self, Plugin};
 use super::xml::Node;
 use crate::Result;
+use crate::import::film::{self, CATMULL_ROM, Filter};
+use crate::import::report::Deviation;
 use crate::import::scene::Section;
 use crate::import::text;
 
 impl<'n> Importer<'n, '_> {
     pub fn default_sensor(&mut self) {
-        self.scene.report.chosen("a camera at the origin that looks along +z, as the scene has none");
+        self.scene.report.chosen(None, "a camera at the origin that looks along +z, as the scene has none");
         let camera = Section::new("[camera.perspective]").comment("chosen: the scene has no sensor");
         let camera =
             camera.with("position", "[0.0, 0.0, 0.0]").with("look_at", "[0.0, 0.0, 1.0]").with("up", "[0.0, 1.0, 0.0]");
@@ -35,7 +37,8 @@ impl<'n> Importer<'n, '_> {
             "perspective" => "perspective",
             other => {
                 let what = format!("the sensor `{}` as `perspective`", values::shown(other));
-                self.scene.report.approximated(plugin.place(), what);
+                let off = Deviation::unbounded("it sees other directions, or counts them otherwise");
+                self.scene.report.approximated(plugin.place(), what, off);
                 "perspective"
             }
         };
@@ -114,11 +117,58 @@ impl<'n> Importer<'n, '_> {
         Ok(())
     }
 
+    /// Gives a film the filter nearest to `filter`, Mitsuba's Gaussian where there is none.
+    fn pixel_filter(&mut self, filter: Option<&Plugin<'n>>, of: &Plugin<'n>, film: &mut Section) -> Result<()> {
+        let kind = filter.map_or("gaussian", |filter| filter.kind());
+        let number = |key: &str, default: f64| -> Result<f64> {
+            let found = filter.map_or(Ok(None), |filter| filter.float(key))?.unwrap_or(default);
+            if found >= 0.0 {
+                Ok(found)
+            } else {
+                Err(of.node.problem(format!("the filter's `{key}` must not be negative")).into())
+            }
+        };
+        let positive = |key: &str, default: f64| number(key, default).map(|found| found.max(1e-3));
+        let known = match kind {
+            "box" => Some(Filter::Box { radius: positive("radius", 0.5)? }),
+            "tent" => Some(Filter::Tent { radius: positive("radius", 1.0)? }),
+            "gaussian" => {
+                let stddev = positive("stddev", 0.5)?;
+                Some(Filter::Gaussian { stddev, radius: 4.0 * stddev })
+            }
+            "mitchell" => Some(Filter::Cubic { b: number("A", 1.0 / 3.0)?, c: number("B", 1.0 / 3.0)?, radius: 2.0 }),
+            "catmullrom" => Some(CATMULL_ROM),
+            "lanczos" => {
+                let lobes = positive("lobes", 3.0)?;
+                Some(Filter::Sinc { radius: lobes, lobes })
+            }
+            _ => None,
+        };
+        let shown = values::shown(kind);
+        let Some(known) = known else {
+            film.set("filter", "\"gaussian\"");
+            let off = Deviation::unbounded("it is not known how it blurs");
+            self.scene.report.approximated(
+                of.place(),
+                format!("the filter `{shown}` as a Gaussian of 0.5 pixels"),
+                off,
+            );
+            return Ok(());
+        };
+        if let Some((own, off)) = film::filter(film, [known; 2]) {
+            self.scene.report.approximated(of.place(), format!("the filter `{shown}` as {own}"), off);
+        }
+        if let Some(filter) = filter {
+            filter.finish(&mut self.scene.report);
+        }
+        Ok(())
+    }
+
     /// Translates a film; gives its width and height.
     fn film(&mut self, node: Option<&'n Node>) -> Result<[f64; 2]> {
         let Some(node) = node else {
             self.scene.film = Some(Section::new("[film]").with("width", "768").with("height", "576"));
-            self.scene.report.chosen("768 x 576 pixels, as the sensor has no film");
+            self.scene.report.chosen(None, "768 x 576 pixels, as the sensor has no film");
             return Ok([768.0, 576.0]);
         };
         let plugin = Plugin::new(node);
@@ -131,17 +181,7 @@ impl<'n> Importer<'n, '_> {
         let (width, height) = (size("width", 768)?, size("height", 576)?);
         let mut film = Section::new("[film]").with("width", width.to_string()).with("height", height.to_string());
         let filter = plugin.objects(&["rfilter"]).first().copied().map(Plugin::new);
-        match filter.as_ref().map_or("gaussian", |filter| filter.kind()) {
-            "box" => {}
-            kind => {
-                film.set("filter", "\"gaussian\"");
-                let stddev = filter.as_ref().map_or(Ok(None), |filter| filter.float("stddev"))?.unwrap_or(0.5);
-                if kind != "gaussian" || stddev != 0.5 {
-                    let what = format!("the filter `{}` as a Gaussian of 0.5 pixels", values::shown(kind));
-                    self.scene.report.approximated(plugin.place(), what);
-                }
-            }
-        }
+        self.pixel_filter(filter.as_ref(), &plugin, &mut film)?;
         let crop = ["crop_offset_x", "crop_offset_y", "crop_width", "crop_height"].map(|key| plugin.whole(key));
         let [x, y, w, h] = crop;
         let (x, y) = (x?.unwrap_or(0), y?.unwrap_or(0));

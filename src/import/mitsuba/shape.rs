@@ -11,7 +11,7 @@ use super::xml::{Node, inside};
 use super::{Importer, MOST_COPIES, at, serialized};
 use crate::Result;
 use crate::format::mesh::{self as meshes, Format};
-use crate::import::geometry::{AROUND, Mesh, similarity};
+use crate::import::geometry::{AROUND, Mesh, similarity, within_round};
 use crate::import::media::{self, Boundary};
 use crate::import::picture::Colour;
 use crate::import::scene::Section;
@@ -165,9 +165,7 @@ impl<'n> Importer<'n, '_> {
                 }
                 _ => {
                     self.copy_group(plugin, group, &to_world, depth)?;
-                    self.scene
-                        .report
-                        .approximated(plugin.place(), "an instance as a copy: the same picture, in more memory");
+                    self.scene.report.translated("shape `instance`, as a copy", plugin.place());
                 }
             }
         }
@@ -340,10 +338,8 @@ impl<'n> Importer<'n, '_> {
     }
 
     fn tessellated(&mut self, plugin: &Plugin<'n>) {
-        // A polygon of n corners within its circle has the sides' middles at cos(π/n) of the radius.
-        let off = 100.0 * (1.0 - (std::f64::consts::PI / f64::from(AROUND)).cos());
-        let what = format!("a round shape by {AROUND} segments around, up to {off:.2} % of its radius within it");
-        self.scene.report.approximated(plugin.place(), what);
+        let what = format!("a round shape by {AROUND} segments around");
+        self.scene.report.approximated(plugin.place(), what, within_round(plugin.kind() == "sphere"));
     }
 
     fn disk(&mut self, placing: Placing<'_, 'n>) -> Result<Section> {

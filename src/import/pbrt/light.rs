@@ -8,6 +8,7 @@ use super::{Importer, beside};
 use crate::Result;
 use crate::import::environment::Frame;
 use crate::import::picture::{Colour, Picture, Texels};
+use crate::import::report::Deviation;
 use crate::import::scene::Section;
 use crate::import::surfaces::luminance;
 use crate::import::text;
@@ -120,7 +121,27 @@ impl Importer<'_> {
                     section.set("scale", text::rounded(scale));
                 }
                 let what = "a map of equal areas as one in longitude and latitude of twice its resolution";
-                self.scene.report.approximated(at.place(), what);
+                // The means over all directions of both: rows of the new one are as large as their sines.
+                let mean = |map: &Picture, weight: &dyn Fn(u32) -> f64| -> f64 {
+                    let rows = map.linear();
+                    let all = rows.chunks(map.size[0] as usize).zip(0..).map(|(row, y)| {
+                        (
+                            weight(y) * row.iter().flatten().map(|v| f64::from(*v)).sum::<f64>(),
+                            weight(y) * row.len() as f64,
+                        )
+                    });
+                    let (sum, count) = all.fold((0.0, 0.0), |(sum, count), (s, c)| (sum + s, count + c));
+                    sum / count
+                };
+                let height = f64::from(map.size[1]);
+                let even = mean(&picture, &|_| 1.0);
+                let rolled = mean(&map, &|y| (std::f64::consts::PI * (f64::from(y) + 0.5) / height).sin());
+                let off = Deviation::at_most(format!(
+                    "{} degrees to the side, as edges between its texels are smoothed; {} of its light",
+                    text::up(180.0 / height),
+                    text::percent(if even > 0.0 { (rolled / even - 1.0).abs() } else { 0.0 })
+                ));
+                self.scene.report.approximated(at.place(), what, off);
             }
         }
         if self.scene.environment.is_some() {

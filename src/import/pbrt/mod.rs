@@ -20,9 +20,11 @@ use super::MOST_BOUNCES;
 use super::geometry::similarity;
 use super::media::{self, Boundary};
 use super::picture::{Colour, Texture};
+use super::report::Deviation;
 use super::scene::{Scene, Section};
 use super::text;
 use crate::error::Problem;
+use crate::format::primaries::Primaries;
 use crate::{Error, Result};
 
 /// Shapes that instances may become, and files that a scene may be made of.
@@ -57,6 +59,8 @@ struct State {
     look: Option<Look>,
     area: Option<AreaLight>,
     reversed: bool,
+    /// Of RGB, where it is not that of sRGB.
+    space: Option<Primaries>,
     /// The medium within shapes now.
     inside: Option<String>,
     /// Of `Attribute`, by what they are for.
@@ -100,7 +104,7 @@ pub struct Importer<'s> {
     files: usize,
     film: Parameters,
     camera: Option<(String, Parameters, DAffine3, At)>,
-    filter: Option<String>,
+    filter: Option<(String, Parameters, At)>,
     in_world: bool,
     default_look: Option<Look>,
 }
@@ -112,6 +116,7 @@ pub fn read(source: &Path, scene: &mut Scene) -> Result<()> {
         look: None,
         area: None,
         reversed: false,
+        space: None,
         inside: None,
         defaults: HashMap::new(),
     };
@@ -203,8 +208,7 @@ impl Importer<'_> {
             }
             "PixelFilter" => {
                 let (kind, parameters) = self.plugin(tokens, at)?;
-                parameters.ask_for_all();
-                self.filter = Some(kind);
+                self.filter = Some((kind, parameters, at.clone()));
             }
             "Integrator" => {
                 let (kind, parameters) = self.plugin(tokens, at)?;
@@ -214,9 +218,16 @@ impl Importer<'_> {
             "Option" => drop(tokens.parameters()?),
             "ColorSpace" => {
                 let name = tokens.text("a colour space", at)?;
-                if name != "srgb" {
-                    self.scene.report.approximated(at.place(), format!("colours of `{}` as sRGB", shown(&name)));
-                }
+                let d65 = [0.3127, 0.3290];
+                self.state.space = match name.as_str() {
+                    "srgb" => None,
+                    "rec2020" => Some(Primaries([[0.708, 0.292], [0.170, 0.797], [0.131, 0.046], d65])),
+                    "dci-p3" => Some(Primaries([[0.68, 0.32], [0.265, 0.69], [0.15, 0.06], d65])),
+                    "aces2065-1" => {
+                        Some(Primaries([[0.7347, 0.2653], [0.0, 1.0], [0.0001, -0.077], [0.32168, 0.33767]]))
+                    }
+                    other => return Err(at.problem(format!("the colour space `{}` is unknown", shown(other))).into()),
+                };
             }
             "Material" => {
                 let (kind, parameters) = self.plugin(tokens, at)?;
@@ -507,11 +518,21 @@ impl Importer<'_> {
     fn emission(&mut self, area: &AreaLight, form: &Form, to_world: &DAffine3, at: &At) -> Result<(String, bool)> {
         let parameters = &area.parameters;
         let both = parameters.boolean("twosided", false)?;
-        for unread in ["filename", "spread"] {
-            if parameters.get(unread).is_some() {
-                let what = format!("`{unread}` of an area light: it shines evenly, in all directions");
-                self.scene.report.left_out(area.at.place(), what);
-            }
+        if parameters.get("filename").is_some() {
+            self.scene.report.left_out(area.at.place(), "`filename` of an area light: it shines evenly");
+        }
+        if let Some(spread) = parameters.number("spread")?.filter(|spread| *spread < 90.0) {
+            // Of what shines evenly into half of space, π, a cone of half of an angle has π sin².
+            let cone = spread.max(0.0).to_radians().sin().powi(2);
+            let off = match cone > 0.0 {
+                true => format!(
+                    "nothing within {spread} degrees of its normal; beyond, all its radiance: its power is {} times as much",
+                    text::up(1.0 / cone)
+                ),
+                false => "all its radiance: it shines along its normal alone".to_owned(),
+            };
+            let what = "the `spread` of an area light as 90 degrees: its radiance is the same in all directions";
+            self.scene.report.approximated(area.at.place(), what, Deviation::at_most(off));
         }
         let unit = std::f64::consts::PI * form.area(to_world) * if both { 2.0 } else { 1.0 };
         let scale = self.photometric(parameters, "power", "L", unit)?;
@@ -570,7 +591,9 @@ impl Importer<'_> {
 
     fn integrator(&mut self, kind: &str, parameters: &Parameters, at: &At) -> Result<()> {
         if !["path", "volpath", "bdpt", "mlt", "sppm", "simplepath", "simplevolpath"].contains(&kind) {
-            self.scene.report.approximated(at.place(), format!("the integrator `{}` as a path tracer", shown(kind)));
+            let off = Deviation::unbounded("light that only one of the two counts, and its noise");
+            let what = format!("the integrator `{}` as a path tracer", shown(kind));
+            self.scene.report.approximated(at.place(), what, off);
         }
         let depth = parameters.number("maxdepth")?.unwrap_or(5.0);
         let depth = self.scene.report.within(at.place(), "`maxdepth`", depth, [0.0, MOST_BOUNCES]);

@@ -8,7 +8,8 @@ use super::token::{At, Parameters, shown};
 use super::{Importer, beside};
 use crate::Result;
 use crate::format::mesh::{self as meshes, Format};
-use crate::import::geometry::{AROUND, Mesh, similarity};
+use crate::import::geometry::{AROUND, Mesh, similarity, within_round};
+use crate::import::report::Deviation;
 use crate::import::scene::Section;
 use crate::import::text;
 
@@ -125,7 +126,7 @@ impl Importer<'_> {
                 if turn == 0.0 || low == high {
                     return Ok(self.empty(kind, at));
                 }
-                self.tessellated(at);
+                self.tessellated(kind, at);
                 let rows = (f64::from(AROUND) * (low - high) / TAU).ceil() as u32;
                 Mesh::grid(around(turn), rows, |u, v| {
                     let (azimuth, polar) = (TAU * turn * u, low + v * (high - low));
@@ -143,7 +144,7 @@ impl Importer<'_> {
                 if turn == 0.0 || inner >= radius {
                     return Ok(self.empty(kind, at));
                 }
-                self.tessellated(at);
+                self.tessellated(kind, at);
                 Mesh::grid(around(turn), 1, |u, v| {
                     let azimuth = TAU * turn * u;
                     let r = radius + v * (inner - radius);
@@ -164,7 +165,7 @@ impl Importer<'_> {
                 if turn == 0.0 {
                     return Ok(self.empty(kind, at));
                 }
-                self.tessellated(at);
+                self.tessellated(kind, at);
                 Mesh::grid(around(turn), 1, |u, v| {
                     let azimuth = TAU * turn * u;
                     let normal = DVec3::new(azimuth.cos(), azimuth.sin(), 0.0);
@@ -178,10 +179,6 @@ impl Importer<'_> {
                 let levels = self.scene.report.within(at.place(), "`levels`", levels, [0.0, 10.0]) as u32;
                 parameters.get("scheme");
                 let base = triangles(parameters, at)?;
-                self.scene.report.approximated(
-                    at.place(),
-                    format!("a `loopsubdiv` surface by {levels} refinements, without their limit"),
-                );
                 subdivided(base, levels, at)?
             }
             "plymesh" => {
@@ -225,10 +222,9 @@ impl Importer<'_> {
         None
     }
 
-    fn tessellated(&mut self, at: &At) {
-        let off = 100.0 * (1.0 - (std::f64::consts::PI / f64::from(AROUND)).cos());
-        let what = format!("a round shape by {AROUND} segments around, up to {off:.2} % of its radius within it");
-        self.scene.report.approximated(at.place(), what);
+    fn tessellated(&mut self, kind: &str, at: &At) {
+        let what = format!("a round shape by {AROUND} segments around");
+        self.scene.report.approximated(at.place(), what, within_round(kind == "sphere"));
     }
 
     /// Patches of four corners each: flat parallelograms are two triangles, others a grid.
@@ -236,11 +232,14 @@ impl Importer<'_> {
         let points = vectors(parameters, "P")?;
         let indices = indices(parameters, points.len(), 4, at)?.unwrap_or_else(|| vec![0, 1, 2, 3]);
         let corners_uv = parameters.get("uv").map(|uv| uv.numbers.as_chunks::<2>().0.to_vec());
-        for unread in ["N", "emissionfilename"] {
-            if parameters.get(unread).is_some() {
-                self.scene.report.left_out(at.place(), format!("`{unread}` of a `bilinearmesh`"));
-            }
+        if parameters.get("emissionfilename").is_some() {
+            self.scene.report.left_out(at.place(), "`emissionfilename` of a `bilinearmesh`");
         }
+        let corners_n = Some(vectors(parameters, "N")?).filter(|normals| !normals.is_empty());
+        if corners_n.as_ref().is_some_and(|normals| normals.len() != points.len()) {
+            return Err(at.problem(format!("has {} points, and another number of `N`", points.len())).into());
+        }
+        let (mut normals, mut is_shaded) = (Vec::new(), corners_n.is_some());
         const STEPS: u32 = 8;
         let mut all = Mesh { uv: Some(Vec::new()), ..Mesh::default() };
         for patch in indices.as_chunks::<4>().0 {
@@ -256,9 +255,13 @@ impl Importer<'_> {
             let is_flat = (a - b - c + d).length() <= 1e-9 * (a - d).length();
             let steps = if is_flat { 1 } else { STEPS };
             if !is_flat {
-                self.scene
-                    .report
-                    .approximated(at.place(), format!("a bent patch of a `bilinearmesh` by {STEPS} x {STEPS} quads"));
+                is_shaded = true;
+                // Of a cell that is 1/n of a patch wide, two triangles are a quarter of its twist away in the middle.
+                let off = 0.25 * (a - b - c + d).length() / f64::from(STEPS * STEPS);
+                let what = format!("a bent patch of a `bilinearmesh` by {STEPS} x {STEPS} quads");
+                let share = text::percent(off / (a - d).length().max((b - c).length()));
+                let off = format!("{} of its own units, {share} of its diagonal", text::up(off));
+                self.scene.report.approximated(at.place(), what, Deviation::at_most(off));
             }
             let first = all.positions.len() as u32;
             let ends = |s: f64, t: f64| [(1.0 - s) * (1.0 - t), s * (1.0 - t), (1.0 - s) * t, s * t];
@@ -266,6 +269,18 @@ impl Importer<'_> {
                 for i in 0..=steps {
                     let [wa, wb, wc, wd] = ends(f64::from(i) / f64::from(steps), f64::from(j) / f64::from(steps));
                     all.positions.push(wa * a + wb * b + wc * c + wd * d);
+                    let (s, t) = (f64::from(i) / f64::from(steps), f64::from(j) / f64::from(steps));
+                    let normal = match &corners_n {
+                        Some(normals) => {
+                            let [na, nb, nc, nd] = patch.map(|i| normals[i as usize]);
+                            wa * na + wb * nb + wc * nc + wd * nd
+                        }
+                        None => {
+                            let across = (1.0 - t) * (b - a) + t * (d - c);
+                            across.cross((1.0 - s) * (c - a) + s * (d - b))
+                        }
+                    };
+                    normals.push(normal.normalize_or(DVec3::Z));
                     all.uv.iter_mut().for_each(|all| all.push(wa * ua + wb * ub + wc * uc + wd * ud));
                 }
             }
@@ -275,6 +290,7 @@ impl Importer<'_> {
                 all.triangles.extend([[p, p + 1, q + 1], [p, q + 1, q]]);
             }
         }
+        all.normals = is_shaded.then_some(normals);
         Ok(all)
     }
 }
@@ -369,7 +385,74 @@ fn area(mesh: &Mesh) -> f64 {
     mesh.triangles.iter().map(of).sum()
 }
 
-/// Loop's subdivision (1987), with the rules of boundaries.
+/// Neighbours of each vertex, counter-clockwise, and whether they go all around it; of one that lies on a boundary from one end of it to the other.
+fn rings(count: usize, triangles: &[[u32; 3]]) -> Vec<(Vec<u32>, bool)> {
+    let mut pairs = vec![Vec::new(); count];
+    for t in triangles {
+        (0..3).for_each(|i| pairs[t[i] as usize].push([t[(i + 1) % 3], t[(i + 2) % 3]]));
+    }
+    let ring = |pairs: &Vec<[u32; 2]>| {
+        let begins = pairs.iter().find(|[a, _]| pairs.iter().all(|[_, b]| a != b));
+        let Some([first, _]) = begins.or(pairs.first()) else { return (Vec::new(), false) };
+        let mut ring = vec![*first];
+        while let Some([_, b]) = pairs.iter().find(|[a, _]| Some(a) == ring.last())
+            && b != first
+            && ring.len() <= pairs.len()
+        {
+            ring.push(*b);
+        }
+        (ring, begins.is_none())
+    };
+    pairs.iter().map(ring).collect()
+}
+
+/// Where the vertices lie on the surface that endless refinement would lead to, and its normals there; these point as pbrt's do, to where
+/// triangles run clockwise.
+fn to_the_limit(mesh: &mut Mesh) {
+    let rings = rings(mesh.positions.len(), &mesh.triangles);
+    let at = |positions: &[DVec3], ring: &[u32]| ring.iter().map(|i| positions[*i as usize]).collect::<Vec<DVec3>>();
+    let limits = mesh.positions.iter().zip(&rings).map(|(p, (ring, is_whole))| {
+        let near = at(&mesh.positions, ring);
+        let n = near.len() as f64;
+        match (&near[..], is_whole) {
+            ([], _) => *p,
+            (_, true) => {
+                let beta = if near.len() == 3 { 3.0 / 16.0 } else { 3.0 / (8.0 * n) };
+                let weight = 1.0 / (n + 3.0 / (8.0 * beta));
+                (1.0 - n * weight) * *p + weight * near.iter().sum::<DVec3>()
+            }
+            ([first, .., last], false) => 0.6 * *p + 0.2 * (*first + *last),
+            ([_], false) => *p,
+        }
+    });
+    let limits: Vec<DVec3> = limits.collect();
+    let normals = limits.iter().zip(&rings).map(|(p, (ring, is_whole))| {
+        let near = at(&limits, ring);
+        let n = near.len();
+        // Tangents by the eigenvectors of refinement (Hoppe and others 1994).
+        let (s, t) = match &near[..] {
+            _ if *is_whole => {
+                let turn = |j: usize| TAU * j as f64 / n as f64;
+                let sum = |f: fn(f64) -> f64| near.iter().enumerate().map(|(j, q)| f(turn(j)) * *q).sum::<DVec3>();
+                (-sum(f64::cos), sum(f64::sin))
+            }
+            [a, b] => (*b - *a, *a + *b - 2.0 * *p),
+            [a, b, c] => (*c - *a, *b - *p),
+            [a, b, c, d] => (*d - *a, 2.0 * (*b + *c) - *a - *d - 2.0 * *p),
+            [a, .., z] => {
+                let theta = PI / (n - 1) as f64;
+                let inner: DVec3 = (1..n - 1).map(|k| (k as f64 * theta).sin() * near[k]).sum();
+                (*z - *a, -(theta.sin() * (*a + *z) + (2.0 * theta.cos() - 2.0) * inner))
+            }
+            _ => (DVec3::ZERO, DVec3::ZERO),
+        };
+        s.cross(t).normalize_or(DVec3::Z)
+    });
+    mesh.normals = Some(normals.collect());
+    mesh.positions = limits;
+}
+
+/// Loop's subdivision (1987), with the rules of boundaries, and its limit.
 fn subdivided(base: Mesh, levels: u32, at: &At) -> Result<Mesh> {
     use std::collections::BTreeMap;
     let mut mesh = Mesh { normals: None, uv: None, ..base };
@@ -425,7 +508,7 @@ fn subdivided(base: Mesh, levels: u32, at: &At) -> Result<Mesh> {
         });
         mesh = Mesh { triangles: split.collect(), positions, normals: None, uv: None };
     }
-    mesh.smooth();
+    to_the_limit(&mut mesh);
     Ok(mesh)
 }
 
@@ -442,10 +525,18 @@ mod tests {
         let base = Mesh { positions, triangles, ..Mesh::default() };
         let once = subdivided(base.clone(), 1, &at).unwrap();
         assert_eq!((once.positions.len(), once.triangles.len()), (18, 32));
-        // Four neighbours: 1 - 4 · 3/32 of itself, and neighbours that cancel.
-        assert!(once.positions[..6].iter().all(|p| (p.length() - 0.625).abs() < 1e-12));
-        // Middles: 3/8 of both ends, 1/8 of the opposite corners, which cancel.
-        assert!(once.positions[6..].iter().all(|p| (p.length() - 0.375 * 2f64.sqrt()).abs() < 1e-12));
+        // A corner has 1 - 4 · 3/32 of itself, and four neighbours that cancel. Its limit, 1 - 4/8 of itself and 1/8 of each neighbour,
+        // is the same whether the mesh was refined before or not.
+        let never = subdivided(base.clone(), 0, &at).unwrap();
+        for mesh in [&once, &never] {
+            assert!(mesh.positions[..6].iter().all(|p| (p.length() - 0.5).abs() < 1e-12), "{:?}", mesh.positions);
+            // Along its axis, inward: that is where triangles run clockwise.
+            let normals = mesh.normals.as_ref().unwrap();
+            assert!((0..6).all(|i| normals[i].dot(mesh.positions[i].normalize()) < -1.0 + 1e-9), "{normals:?}");
+        }
+        // No vertex of a coarse limit is off that of a fine one.
+        let thrice = subdivided(base.clone(), 3, &at).unwrap();
+        assert!((0..18).all(|i| once.positions[i].distance(thrice.positions[i]) < 1e-12));
         let plane = Mesh {
             positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::new(1.0, 1.0, 0.0)],
             triangles: vec![[0, 1, 2], [1, 3, 2]],
@@ -453,5 +544,6 @@ mod tests {
         };
         let fine = subdivided(plane, 2, &at).unwrap();
         assert!(fine.positions.iter().all(|p| p.z == 0.0) && fine.triangles.len() == 32);
+        assert!(fine.normals.unwrap().iter().all(|n| n.z < -1.0 + 1e-9));
     }
 }
