@@ -1,5 +1,6 @@
 //! Indices of refraction by the names that formats have for them.
 
+use crate::spectral::illuminant::illuminant as of_cie;
 use crate::spectral::{Curve, Outside};
 
 /// Of metals, n and k; see the head of the file for where they are from.
@@ -70,16 +71,22 @@ pub fn glass(name: &str) -> Option<Curve> {
     }))
 }
 
-/// Of illuminants of the CIE; see the head of the file for where they are from.
-const ILLUMINANTS: &str = include_str!("data/illuminants.csv");
+/// Daylight of 6000 K; see the head of the file for where it is from.
+const D60: &str = include_str!("data/daylight_d60.csv");
 
-/// The spectrum of an illuminant of the CIE, of any scale: `F1` to `F12`, `D50`, `D60`.
+/// The spectrum of an illuminant that pbrt names, of any scale: `F1` to `F12`, `D50`, `D60`.
 pub fn illuminant(name: &str) -> Option<Curve> {
-    let mut rows = ILLUMINANTS.lines().filter(|row| !row.starts_with('#'));
-    let column = rows.next()?.split(',').position(|head| head == name).filter(|column| *column > 0)?;
-    let cell = |row: &str, column: usize| row.split(',').nth(column).and_then(|cell| cell.parse().ok()).unwrap_or(0.0);
-    let (nm, value) = rows.map(|row| (cell(row, 0), cell(row, column))).unzip();
-    Some(Curve::Linear { nm, value, outside: Outside::Zero })
+    match name {
+        "D50" => of_cie(name),
+        "D60" => {
+            let rows = D60.lines().filter(|row| !row.starts_with('#')).skip(1).filter_map(|row| row.split_once(','));
+            let number = |cell: &str| cell.parse().unwrap_or(0.0);
+            let (nm, value) = rows.map(|(nm, value)| (number(nm), number(value))).unzip();
+            Some(Curve::Linear { nm, value, outside: Outside::Zero })
+        }
+        // CIE 15:2018 calls them FL1 to FL12.
+        _ => of_cie(&format!("FL{}", name.strip_prefix('F')?)),
+    }
 }
 
 /// The names of all metals.
