@@ -148,10 +148,10 @@ impl KeptWeights {
             let remainder = match state.remainder(tile)? {
                 None => None,
                 Some(chunk) => {
-                    let (rect, width) = (chunk.rect(), state.cube().grid().tile[0]);
+                    let grid = state.cube().grid();
                     let mut planes = vec![0.0f32; 3 * weights.pixels()];
-                    for (x, y) in places(rect) {
-                        let pixel = ((y - rect.y0) * width + x - rect.x0) as usize;
+                    for (x, y) in places(chunk.rect()) {
+                        let pixel = grid.pixel_in_tile(x, y);
                         let colour = self.colours.of_spectrum(chunk.spectrum(x, y));
                         planes[3 * pixel..3 * pixel + 3].copy_from_slice(&colour.map(|v| v as f32));
                     }
@@ -239,7 +239,7 @@ impl Relit<'_> {
         &self,
         pixels: Rect,
         of: impl Fn(u32) -> Result<Option<T>> + Sync,
-        mut each: impl FnMut(T, Rect, Rect) -> Result<()>,
+        mut each: impl FnMut(T, Rect),
     ) -> Result<()> {
         let grid = self.state.cube().grid();
         if pixels.pixels() > MOST_PIXELS {
@@ -252,9 +252,8 @@ impl Relit<'_> {
         for tiles in tiles.chunks(TOGETHER) {
             let made: Vec<Option<T>> = tiles.par_iter().map(|&tile| of(tile)).collect::<Result<_>>()?;
             for (&tile, made) in tiles.iter().zip(made) {
-                let rect = grid.rect(tile);
-                if let (Some(made), Some(shared)) = (made, rect.intersection(&pixels)) {
-                    each(made, rect, shared)?;
+                if let (Some(made), Some(shared)) = (made, grid.rect(tile).intersection(&pixels)) {
+                    each(made, shared);
                 }
             }
         }
@@ -268,11 +267,10 @@ impl Relit<'_> {
         self.each_tile(
             pixels,
             |tile| self.planes(tile),
-            |planes, rect, shared| {
+            |planes, shared| {
                 for (x, y) in places(shared) {
-                    sums.add(x, y, 1, &self.kept.colours.rgb(at(&planes, rect, grid.tile, x, y)));
+                    sums.add(x, y, 1, &self.kept.colours.rgb(at(&planes, grid.pixel_in_tile(x, y))));
                 }
-                Ok(())
             },
         )?;
         Ok(sums.means())
@@ -290,10 +288,10 @@ impl Relit<'_> {
                 let rows = self.light.expander.rows(&of_tile.weights.products);
                 Ok(Some((of_tile, rows, self.state.remainder(tile)?)))
             },
-            |(of_tile, rows, remainder), rect, shared| {
+            |(of_tile, rows, remainder), shared| {
                 let mut values = vec![0.0f32; channels.len()];
                 for (x, y) in places(shared) {
-                    let pixel = ((y - rect.y0) * grid.tile[0] + x - rect.x0) as usize;
+                    let pixel = grid.pixel_in_tile(x, y);
                     values.fill(0.0);
                     for (product, weight) in of_tile.weights.of_pixel(pixel) {
                         let row = &rows[product * all..][..all];
@@ -305,7 +303,6 @@ impl Relit<'_> {
                     }
                     sums.add(x, y, 1, &values);
                 }
-                Ok(())
             },
         )?;
         Ok(sums.means())
@@ -314,10 +311,8 @@ impl Relit<'_> {
     /// As [`CubeState::spectrum`].
     pub fn spectrum(&self, x: u32, y: u32) -> Result<Option<Vec<f32>>> {
         let grid = self.state.cube().grid();
-        let tile = grid.tile_at(x, y);
-        let rect = grid.rect(tile);
-        let Some((_, of_tile)) = self.kept.tile(self.state, tile)? else { return Ok(None) };
-        let pixel = ((y - rect.y0) * grid.tile[0] + x - rect.x0) as usize;
+        let Some((_, of_tile)) = self.kept.tile(self.state, grid.tile_at(x, y))? else { return Ok(None) };
+        let pixel = grid.pixel_in_tile(x, y);
         let mut spectrum = of_tile.weights.spectrum(pixel, &self.light.expander);
         if of_tile.remainder.is_some() {
             add(&mut spectrum, &self.state.remainder_of(x, y)?);
@@ -336,11 +331,11 @@ impl Relit<'_> {
                 let Some((_, of_tile)) = self.kept.tile(self.state, tile)? else { return Ok(None) };
                 Ok(Some((of_tile, self.state.remainder(tile)?)))
             },
-            |(of_tile, remainder), rect, shared| {
+            |(of_tile, remainder), shared| {
                 let weights = &of_tile.weights;
                 let mut of_products = vec![0.0f64; weights.products.len()];
                 for (x, y) in places(shared) {
-                    let pixel = ((y - rect.y0) * grid.tile[0] + x - rect.x0) as usize;
+                    let pixel = grid.pixel_in_tile(x, y);
                     weights.of_pixel(pixel).for_each(|(product, weight)| of_products[product] += f64::from(weight));
                     if let Some(remainder) = &remainder {
                         radiance.iter_mut().zip(remainder.spectrum(x, y)).for_each(|(sum, &v)| *sum += f64::from(v));
@@ -351,7 +346,6 @@ impl Relit<'_> {
                 for (row, weight) in rows.chunks(all.max(1)).zip(of_products).filter(|(_, weight)| *weight != 0.0) {
                     radiance.iter_mut().zip(row).for_each(|(sum, &value)| *sum += weight * f64::from(value));
                 }
-                Ok(())
             },
         )?;
         radiance.iter_mut().for_each(|sum| *sum /= pixels as f64);
@@ -369,13 +363,12 @@ impl Relit<'_> {
         self.each_tile(
             rect,
             |tile| self.planes(tile),
-            |planes, rect, shared| {
+            |planes, shared| {
                 for (x, y) in places(shared) {
-                    let xyz = at(&planes, rect, grid.tile, x, y);
+                    let xyz = at(&planes, grid.pixel_in_tile(x, y));
                     (0..3).for_each(|i| sum[i] += f64::from(xyz[i]));
                 }
                 pixels += shared.pixels();
-                Ok(())
             },
         )?;
         Ok((pixels > 0).then(|| sum.map(|v| v / pixels as f64)))
@@ -404,14 +397,13 @@ impl Relit<'_> {
         self.each_tile(
             pixels,
             |tile| Ok(self.planes(tile)?.zip(other.planes(tile)?)),
-            |(a, b), rect, shared| {
+            |(a, b), shared| {
                 for (x, y) in places(shared) {
-                    let xyz = [&a, &b].map(|planes| at(planes, rect, grid.tile, x, y).map(f64::from));
+                    let xyz = [&a, &b].map(|planes| at(planes, grid.pixel_in_tile(x, y)).map(f64::from));
                     let delta_e =
                         if xyz[0] == xyz[1] && white[0] == white[1] { 0.0 } else { Difference::of(xyz, white).delta_e };
                     sums.add(x, y, 1, &[delta_e as f32]);
                 }
-                Ok(())
             },
         )?;
         Ok(sums.means())
@@ -419,7 +411,6 @@ impl Relit<'_> {
 }
 
 /// The three planes of a pixel of a tile.
-fn at(planes: &[f32], tile: Rect, size: [u32; 2], x: u32, y: u32) -> [f32; 3] {
-    let pixel = ((y - tile.y0) * size[0] + x - tile.x0) as usize;
+fn at(planes: &[f32], pixel: usize) -> [f32; 3] {
     std::array::from_fn(|i| planes[3 * pixel + i])
 }

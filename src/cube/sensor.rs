@@ -178,7 +178,7 @@ pub fn integrate(
                 let sum = |weights: &[(usize, f64)]| -> f64 {
                     weights.iter().map(|&(k, weight)| weight * f64::from(spectrum[k])).sum()
                 };
-                let pixel = ((y - rect.y0) * grid.tile[0] + (x - rect.x0)) as usize;
+                let pixel = grid.pixel_in_tile(x, y);
                 for (b, band) in bands.iter().enumerate() {
                     let (value, error) = (sum(&band.weights), sum(&band.slopes));
                     if !value.is_finite() {

@@ -194,7 +194,7 @@ impl<'a> CubeState<'a> {
         }
         if self.cube.header().is_factored() {
             let Some(weights) = self.weights(tile)? else { return Ok(None) };
-            let pixel = ((y - rect.y0) * grid.tile[0] + x - rect.x0) as usize;
+            let pixel = grid.pixel_in_tile(x, y);
             let mut spectrum = weights.spectrum(pixel, self.cube.expander()?);
             if self.cube.header().has_remainder() {
                 add(&mut spectrum, &self.remainder_of(x, y)?);

@@ -117,11 +117,10 @@ fn deviation(response: &Response, strata: &[[f64; 2]]) -> f64 {
 /// Equal strata of each run of wavelengths: runs end where a response jumps, or where strata of very different width are wanted. None
 /// is wider than the support of any response over it by that one's count.
 fn strata(responses: &[Response], counts: &[u32]) -> Vec<[f64; 2]> {
-    let mut ends: Vec<f64> = responses.iter().flat_map(|r| r.support().into_iter().chain(jumps(r))).collect();
+    let jumps: Vec<f64> = responses.iter().flat_map(jumps).collect();
+    let mut ends: Vec<f64> = responses.iter().flat_map(Response::support).chain(jumps.iter().copied()).collect();
     ends.sort_by(f64::total_cmp);
     ends.dedup();
-    let mut jumps: Vec<f64> = responses.iter().flat_map(jumps).collect();
-    jumps.sort_by(f64::total_cmp);
     // From, to, the narrowest and the widest stratum that its parts ask for.
     let mut runs: Vec<([f64; 2], [f64; 2])> = Vec::new();
     for pair in ends.windows(2) {
@@ -132,7 +131,7 @@ fn strata(responses: &[Response], counts: &[u32]) -> Vec<[f64; 2]> {
         if width == f64::INFINITY {
             continue;
         }
-        let jumps_here = jumps.binary_search_by(|jump| jump.total_cmp(&from)).is_ok();
+        let jumps_here = jumps.contains(&from);
         match runs.last_mut() {
             Some(([_, end], [least, most]))
                 if *end == from && !jumps_here && most.max(width) <= ALIKE * least.min(width) =>

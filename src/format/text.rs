@@ -81,16 +81,7 @@ pub fn values_csv<T: Debug>(name: &str, channels: &Channels, radiance: &[T], sta
 ///
 /// Errors name the line; without one, the file as a whole could not be read.
 pub fn read_spectrum(path: &Path, column: Column, unit: Option<Unit>) -> Result<SpectrumTable, Box<Problem>> {
-    let bytes = read(path)?;
-    if library::is_envi(path, &bytes) {
-        return says_its_unit(library::read_envi(path, column), path, unit);
-    }
-    let is_other = instrument::Format::of(path, &bytes).is_some() || library::is_ecostress(&bytes);
-    if library::is_usgs(&bytes) && !is_other {
-        let table = library::no_columns(path, column).and_then(|()| library::read_usgs(&bytes, path));
-        return says_its_unit(table, path, unit);
-    }
-    parse_file(&bytes, path, column, unit)
+    parse_any(&read(path)?, path, column, unit, true)
 }
 
 /// [`read_spectrum`] on the content of a file that is not there: `path` says its name only. Formats of several files are refused.
@@ -100,40 +91,44 @@ pub fn parse_file(
     column: Column,
     unit: Option<Unit>,
 ) -> Result<SpectrumTable, Box<Problem>> {
-    let several = || {
-        let message = "is one of several files that belong together".to_owned();
-        let help = Some("write the spectrum as CSV: `nm,value`".to_owned());
+    parse_any(bytes, path, column, unit, false)
+}
+
+/// `is_there`: whether `path` has what belongs to the file beside it.
+fn parse_any(
+    bytes: &[u8],
+    path: &Path,
+    column: Column,
+    unit: Option<Unit>,
+    is_there: bool,
+) -> Result<SpectrumTable, Box<Problem>> {
+    let problem = |message: &str, help: &str| {
+        let (message, help) = (message.to_owned(), Some(help.to_owned()));
         Err(Box::new(Problem { file: path.to_owned(), message, help, ..Problem::default() }))
     };
+    let several = || problem("is one of several files that belong together", "write the spectrum as CSV: `nm,value`");
     let other = if library::is_envi(path, bytes) {
-        return several();
+        if !is_there {
+            return several();
+        }
+        library::read_envi(path, column)
     } else if let Some(format) = instrument::Format::of(path, bytes) {
         format.read(bytes, path, column)
     } else if library::is_ecostress(bytes) {
         library::no_columns(path, column).and_then(|()| library::parse_ecostress(bytes, path))
     } else if library::is_usgs(bytes) {
-        return several();
+        if !is_there {
+            return several();
+        }
+        library::no_columns(path, column).and_then(|()| library::read_usgs(bytes, path))
     } else if modtran::is_tape7(path, bytes) {
         modtran::parse(bytes, path, column)
     } else {
         return parse(bytes, path, column, unit);
     };
-    says_its_unit(other, path, unit)
-}
-
-/// What was read of a file whose format has one unit of wavelength, which none may be named for.
-fn says_its_unit(
-    other: Result<SpectrumTable, Box<Problem>>,
-    path: &Path,
-    unit: Option<Unit>,
-) -> Result<SpectrumTable, Box<Problem>> {
     match unit {
         None => other,
-        Some(_) => {
-            let help = Some("remove `unit`".to_owned());
-            let message = "says by itself in which unit its wavelengths are".to_owned();
-            Err(Box::new(Problem { file: path.to_owned(), message, help, ..Problem::default() }))
-        }
+        Some(_) => problem("says by itself in which unit its wavelengths are", "remove `unit`"),
     }
 }
 

@@ -3,10 +3,10 @@
 use super::picture::{Colour, Texture, sampled};
 use super::report::Deviation;
 use super::scene::{Scene, Section};
-use super::surfaces::{COATED_CONDUCTOR, fresnel};
+use super::surfaces::COATED_CONDUCTOR;
 use super::text;
 use crate::Result;
-use crate::spectral::hemisphere::fresnel::conductor;
+use crate::spectral::hemisphere::fresnel::{conductor, dielectric};
 use crate::spectral::{Curve, upsample};
 
 /// Cosines in the middles of as many equal steps.
@@ -37,7 +37,7 @@ fn fitted(wanted: &dyn Fn(f64) -> f64) -> [f64; 2] {
 /// What a smooth coat of an index reflects by itself, and what a metal under it adds, at a cosine: light goes to and fro between both.
 /// `metal` is n and k over those of what is outside.
 fn shares(cosine: f64, coat: f64, [n, k]: [f64; 2]) -> [f64; 2] {
-    let once = fresnel(cosine, coat);
+    let once = dielectric(cosine, coat);
     let below = (1.0 - (1.0 - cosine * cosine) / (coat * coat)).max(0.0).sqrt();
     let metal = conductor(below, n / coat, k / coat);
     [once, (1.0 - once) * (1.0 - once) * metal / (1.0 - metal * once)]

@@ -7,24 +7,13 @@ use super::report::{Deviation, Place, Report};
 use super::text;
 use crate::spectral::Curve;
 use crate::spectral::colour::Observer;
+use crate::spectral::hemisphere::fresnel::dielectric;
 
 /// Y of a light: 1 where ∫L ȳ dλ = ∫ȳ dλ (CIE 1931).
 pub fn luminance(curve: &Curve) -> f64 {
     let observer = &Observer::Cie1931.curves()[1];
     let nm = || (0..=470).map(|i| 360.0 + f64::from(i));
     nm().map(|nm| observer.eval(nm) * curve.eval(nm)).sum::<f64>() / nm().map(|nm| observer.eval(nm)).sum::<f64>()
-}
-
-/// Unpolarised reflectance of a boundary of relative index `eta` at an angle of this cosine (Born and Wolf, section 1.5.2).
-pub fn fresnel(cosine: f64, eta: f64) -> f64 {
-    let sine_inside = (1.0 - cosine * cosine) / (eta * eta);
-    if sine_inside >= 1.0 {
-        return 1.0;
-    }
-    let inside = (1.0 - sine_inside).sqrt();
-    let s = (cosine - eta * inside) / (cosine + eta * inside);
-    let p = (eta * cosine - inside) / (eta * cosine + inside);
-    0.5 * (s * s + p * p)
 }
 
 /// What the facets of a coat do with diffuse light, each once, as renderers have it that count no light between facets: some is lost.
@@ -66,7 +55,7 @@ impl Coat {
             let n = DVec3::new(-y * v.z + z * v.x, x, y * v.x + z * v.z);
             let h = DVec3::new(alpha * n.x, alpha * n.y, n.z.max(1e-9)).normalize();
             let c = o.dot(h);
-            let once = fresnel(c, eta);
+            let once = dielectric(c, eta);
             let both = |i: DVec3| (1.0 + shadow(o)) / (1.0 + shadow(o) + shadow(i));
             let mirrored = 2.0 * c * h - o;
             let weight = 2.0 * cosine / f64::from(STEPS * STEPS * STEPS);
@@ -164,7 +153,7 @@ const BECKMANN: &str = "0.13 of what arrives up to 75 degrees from the normal, 0
 /// reflects at other angles; and how far off that is there.
 pub fn pane(eta: f64) -> (f64, Deviation) {
     let share = |cosine: f64| {
-        let once = fresnel(cosine, eta);
+        let once = dielectric(cosine, eta);
         2.0 * once / (1.0 + once)
     };
     let normal = share(1.0);
@@ -226,7 +215,7 @@ mod tests {
         let sum: f64 = (0..STEPS)
             .map(|i| {
                 let cosine = (f64::from(i) + 0.5) / f64::from(STEPS);
-                2.0 * cosine * fresnel(cosine, eta)
+                2.0 * cosine * dielectric(cosine, eta)
             })
             .sum();
         let outside = sum / f64::from(STEPS);
@@ -239,7 +228,7 @@ mod tests {
         // Published for n = 1.5: 0.0918 and 0.5963 (Egan and Hilgeman; Duntley 1942).
         let [outside, inside] = diffuse_fresnel(1.5);
         assert!((outside - 0.0918).abs() < 2e-4 && (inside - 0.5963).abs() < 2e-4, "{outside} {inside}");
-        assert!((fresnel(1.0, 1.5) - 0.04).abs() < 1e-12 && (fresnel(0.0, 1.5) - 1.0).abs() < 1e-12);
+        assert!((dielectric(1.0, 1.5) - 0.04).abs() < 1e-12 && (dielectric(0.0, 1.5) - 1.0).abs() < 1e-12);
         assert!((index_of(0.04) - 1.5).abs() < 1e-12);
     }
 
