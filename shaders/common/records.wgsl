@@ -22,7 +22,7 @@
 #endif
 #if REMAINDER
     // What there was before the last record, and whether what that added is no business of channels.
-    var mixed = Mixed(false, false, false, true);
+    var mixed = Mixed(false, false, false, false, false, true);
     var is_weighed = false;
 #repeat VECTORS v
     var remainder_$v = vec4<f32>(0.0);

@@ -29,6 +29,7 @@ use crate::device::words::{
 use crate::scene::{
     Attributes, Bsdf, Distortion, Evaluator, Filter, Light, Line, Projection, Reflectance, Sampler, Scene, Sides,
 };
+use crate::spectral::Channels;
 use crate::spectral::table::SpectralTables;
 use crate::spectral::warp::Warp;
 use crate::{Error, Result};
@@ -138,16 +139,22 @@ impl Prepared {
         // Weights have no channels.
         let has_channels = || evaluator != Evaluator::Factored || separable::has_remainder(scene);
         match Integration::of(&scene.channels).filter(|_| has_channels()) {
-            None => Prepared::flatten(scene, seed, evaluator, None),
+            None => Prepared::flatten(scene, seed, evaluator, &scene.channels, None),
             Some(integration) => {
                 let inner = Scene { channels: integration.inner.clone(), ..scene.clone() };
-                Prepared::flatten(&inner, seed, evaluator, Some(integration))
+                Prepared::flatten(&inner, seed, evaluator, &scene.channels, Some(integration))
             }
         }
     }
 
-    /// `scene` in the channels that the device renders.
-    fn flatten(scene: &Scene, seed: u64, evaluator: Evaluator, integration: Option<Integration>) -> Result<Prepared> {
+    /// `scene` in the channels that the device renders, for a cube of channels `wanted`.
+    fn flatten(
+        scene: &Scene,
+        seed: u64,
+        evaluator: Evaluator,
+        wanted: &Channels,
+        integration: Option<Integration>,
+    ) -> Result<Prepared> {
         let heat = heat::as_emission(scene);
         let scene = &*heat.scene;
         let mut accel = Accel::build(scene);
@@ -171,10 +178,10 @@ impl Prepared {
         let emitted = || Emitted::of(scene, &accel, &picks.lamps, environment).shares(scene, &accel);
         let needed = surfaces.as_ref().map_or(&[][..], |s| &s.spectra);
         // A factored scene may be evaluated otherwise too, in order to know how bright it is.
-        let separated = (evaluator == Evaluator::Factored).then(|| Separated::new(scene, &heat)).transpose()?;
+        let separated = (evaluator == Evaluator::Factored).then(|| Separated::new(scene, &heat, wanted)).transpose()?;
         let values = separated.as_ref().is_none_or(|separated| !separated.remainder.is_empty());
         let (tables, ids, warp) = spectral_tables(scene, &heat, needed, in_registers, values, weights, emitted)?;
-        let separable = separated.map(|separated| separated.by_id(&ids, needed, &tables));
+        let separable = separated.map(|separated| separated.by_id(&ids, needed, radiators.as_ref(), &tables));
         let factor = |s: usize| tables.ids[ids.factors[&s]];
         let source = |s: usize| tables.ids[ids.sources[&s]];
         let id = |position: usize| tables.ids[ids.needed[position]];

@@ -5,19 +5,25 @@
 //! channels as in any other render. Which of both a contribution is [`Mixed`] says by the records before it, one after the other, on the
 //! host as on the device (`shaders/parts/remainder/separates.wgsl`), so that nothing is left out and nothing counts twice.
 
+mod nodes;
+
 use std::collections::{BTreeMap, BTreeSet};
 
-use smallvec::SmallVec;
+use smallvec::{SmallVec, smallvec};
+
+pub use self::nodes::Nodes;
 
 use crate::device::instructions::{
-    MODE_ADD, MODE_ADVANCE, MODE_GATHER, MODE_KEEP, MODE_ON_F, MODE_START, OP_AMOUNTS, OP_HOLD, OP_MARCH, OP_MEDIUM,
-    OP_ONE, OP_PLAIN, OP_RESTORE, OP_SAVE, OP_SPECTRUM,
+    MODE_ADD, MODE_ADVANCE, MODE_GATHER, MODE_KEEP, MODE_ON_F, MODE_START, OP_ABSORBED, OP_AMOUNTS, OP_HELD, OP_HOLD,
+    OP_INNER, OP_MARCH, OP_MEDIUM, OP_ONE, OP_PLAIN, OP_PLANCK, OP_RESTORE, OP_SAVE, OP_SPECTRUM,
 };
 use crate::device::parts::heat::{self, Heat, HotLeaf};
+use crate::device::parts::radiators::Radiators;
 use crate::device::parts::surfaces::Needed;
 use crate::device::spectra::SpectrumIds;
 use crate::device::words::{SEPARATES_AS_FACTOR, SEPARATES_AS_SOURCE};
-use crate::scene::{Bsdf, Reflectance, Scene, SpectrumId, Temperature, TextureKind};
+use crate::scene::{Bsdf, MaterialId, Reflectance, Scene, SpectrumId, Temperature, TextureId, TextureKind};
+use crate::spectral::Channels;
 use crate::spectral::product::{Basis, Expression, Leaf, Term};
 use crate::spectral::table::SpectralTables;
 use crate::{Error, Result};
@@ -33,8 +39,21 @@ pub struct Separated {
     /// What does not separate, in words.
     pub remainder: Vec<String>,
     factors: BTreeMap<SpectrumId, u16>,
+    /// What a factor leaves of light, 1 less it, where something hot needs that.
+    complements: BTreeMap<u16, u16>,
     /// Those of an emission are added.
     sources: BTreeMap<SpectrumId, Sources>,
+    /// What is emitted by place: of each radiator, in their order, what it is in products.
+    radiators: Vec<Radiating>,
+}
+
+/// A radiator ([`Radiators`]) in products.
+#[derive(Debug, Clone)]
+enum Radiating {
+    /// Something of the remainder; or a lamp, whose spectra have ids.
+    Other,
+    /// What is hot: temperatures that are sources, and the factor of what a surface of one reflectance keeps.
+    Hot { nodes: Nodes, keeps: Option<u16> },
 }
 
 type Sources = SmallVec<[u16; 2]>;
@@ -45,7 +64,9 @@ pub enum Factor {
     /// The constant 1.
     One,
     Of(u16),
-    /// Something that is no factor of products.
+    /// A source, of what is emitted by place.
+    Source(u16),
+    /// Something that is in no product.
     Mixed,
 }
 
@@ -53,8 +74,13 @@ pub enum Factor {
 #[derive(Debug)]
 pub struct Separable {
     pub factors: Vec<Factor>,
-    /// Those that are added; `None` where what shines is no source of products.
+    /// [`Separated::complements`].
+    complements: BTreeMap<u16, u16>,
+    /// Those that are added; `None` where what shines is no source of products. Where several surfaces that emit by place are gathered
+    /// under id 0, what they multiply has sources of its own.
     pub sources: Vec<Option<Sources>>,
+    /// Of each radiator, where it is hot and in products.
+    heat: Vec<Option<Nodes>>,
     /// The same for devices: [`SEPARATES_AS_FACTOR`] and [`SEPARATES_AS_SOURCE`] of each id.
     pub bits: Vec<u32>,
     /// Whether there is something that does not separate.
@@ -66,7 +92,7 @@ impl Factor {
     pub fn of_product(self) -> Option<u16> {
         match self {
             Factor::Of(factor) => Some(factor),
-            Factor::One | Factor::Mixed => None,
+            Factor::One | Factor::Source(_) | Factor::Mixed => None,
         }
     }
 }
@@ -77,25 +103,54 @@ impl Separable {
         self.factors[(spectra & 0xffff) as usize]
     }
 
+    /// What a factor leaves of light, where something hot asks for that.
+    pub fn complement(&self, factor: u16) -> Option<u16> {
+        self.complements.get(&factor).copied()
+    }
+
+    /// Numbers of all sources, and of factors: one more than the last.
+    pub fn ends(&self) -> [usize; 2] {
+        let end = |most: Option<u16>| most.map_or(0, |most| usize::from(most) + 1);
+        let of_ids = self.factors.iter().filter_map(|factor| factor.of_product());
+        let emitted = self.factors.iter().filter_map(|factor| match factor {
+            Factor::Source(source) => Some(*source),
+            _ => None,
+        });
+        let nodes = self.heat.iter().flatten().flat_map(|nodes| nodes.sources());
+        let sources = self.sources.iter().flatten().flatten().copied().chain(emitted).chain(nodes);
+        [end(sources.max()), end(of_ids.chain(self.complements.values().copied()).max())]
+    }
+
+    /// The temperatures of what the word of an instruction for Planck's law names.
+    ///
+    /// # Panics
+    /// Of what is in no product ([`Mixed`]).
+    pub fn nodes(&self, radiator: u32) -> &Nodes {
+        self.heat[radiator as usize - 1].as_ref().expect("devices mark those that are in products")
+    }
+
     /// What the first word of an instruction that gathers names; `None` where that is no source of products.
     pub fn sources_of(&self, word: u32) -> Option<&[u16]> {
         self.sources.get((word >> 16) as usize)?.as_deref()
     }
 }
 
-/// Which registers of a path ([`crate::device::instructions`]) hold something that does not separate: T, P, F and the T put aside.
+/// Which registers of a path ([`crate::device::instructions`]) hold something that does not separate: T, P, F, Q, H and the T put aside.
 #[derive(Debug, Clone, Copy)]
 pub struct Mixed {
     pub throughput: bool,
     product: bool,
     factor: bool,
+    kept: bool,
+    held: bool,
     /// Also before anything was put aside, which is taken back only then.
     saved: bool,
 }
 
 impl Mixed {
     /// Where a path begins.
-    pub const NOTHING: Mixed = Mixed { throughput: false, product: false, factor: false, saved: true };
+    pub const NOTHING: Mixed =
+        Mixed { throughput: false, product: false, factor: false, kept: false, held: false, saved: true };
 
     /// Whether all that the path brings from now on is of the remainder.
     pub fn is_settled(self) -> bool {
@@ -103,7 +158,7 @@ impl Mixed {
     }
 
     /// Goes on by an instruction, and says whether what it adds to R, if anything, is of the remainder.
-    pub fn step(&mut self, scene: &Separable, word: u32, spectra: u32) -> bool {
+    pub fn step(&mut self, scene: &Separable, [word, spectra, _, parameter]: [u32; 4]) -> bool {
         let operation = word & 0x3f;
         match operation {
             OP_MEDIUM | OP_MARCH => {
@@ -126,17 +181,28 @@ impl Mixed {
                 return false;
             }
             OP_HOLD => {
-                self.factor = false;
+                (self.held, self.factor) = (self.factor, false);
                 return false;
             }
-            _ if word & MODE_KEEP != 0 => return false,
             _ => {}
         }
         let value = match operation {
             OP_ONE => false,
             OP_PLAIN | OP_SPECTRUM => scene.factor(spectra) == Factor::Mixed,
+            // Radiators that are in products say which they are.
+            OP_PLANCK => spectra == 0,
+            OP_HELD => self.held,
+            // Without a coat 1 - Q, which is a sum of products.
+            OP_ABSORBED => self.kept || parameter != 0,
             _ => true,
         };
+        if word & MODE_KEEP != 0 {
+            self.kept |= value;
+            return false;
+        }
+        if operation == OP_ABSORBED || operation == OP_INNER {
+            self.kept = false;
+        }
         let source = scene.sources_of(word).is_none();
         if operation == OP_PLAIN {
             self.throughput |= value;
@@ -175,7 +241,7 @@ pub fn basis(scene: &Scene) -> Result<Basis> {
 /// As [`basis`].
 pub fn of(scene: &Scene) -> Result<Separated> {
     let heat = heat::as_emission(scene);
-    Separated::new(&heat.scene, &heat)
+    Separated::new(&heat.scene, &heat, &scene.channels)
 }
 
 /// Whether something of `scene` does not separate.
@@ -185,35 +251,35 @@ pub fn has_remainder(scene: &Scene) -> bool {
 }
 
 impl Separated {
-    /// Of `scene`, whose heat is emission already.
+    /// Of `scene`, whose heat is emission already, for a cube of `channels`.
     ///
     /// # Errors
     /// As [`basis`].
-    pub fn new(scene: &Scene, heat: &Heat) -> Result<Separated> {
+    pub fn new(scene: &Scene, heat: &Heat, channels: &Channels) -> Result<Separated> {
         check(scene)?;
         let shares = scene.materials.iter().flat_map(|material| match material.bsdf {
             Bsdf::Diffuse { reflectance } => vec![reflectance],
             Bsdf::Translucent { reflectance, transmittance } => vec![reflectance, transmittance],
             _ => Vec::new(),
         });
-        let plain = shares.filter_map(|share| match share {
-            Reflectance::Spectrum(spectrum) => Some(spectrum),
-            Reflectance::Texture(_) => None,
-        });
-        let endmembers = scene.textures.iter().flat_map(|texture| match &texture.kind {
-            TextureKind::Mixture(endmembers) => &endmembers[..],
-            _ => &[],
-        });
-        let reflecting: BTreeSet<SpectrumId> = plain.chain(endmembers.copied()).collect();
+        let reflecting: BTreeSet<SpectrumId> =
+            shares.flat_map(|share| reflected(scene, share).unwrap_or_default().to_vec()).collect();
         let lamps = scene.objects.iter().zip(&heat.kinds).filter(|(_, kind)| matches!(kind, heat::Kind::Lamp));
         let surfaces = lamps.filter_map(|(object, _)| object.emission.as_ref().map(|e| e.radiance));
         let environment = scene.environment.as_ref().and_then(|environment| environment.uniform());
         let lights = scene.lights.iter().map(|light| light.spectrum());
-        let emitting: BTreeSet<SpectrumId> = surfaces.chain(environment).chain(lights).collect();
+        let by_place = heat.radiating.iter().flat_map(|surface| lamps_by_place(scene, surface));
+        let emitting: BTreeSet<SpectrumId> = surfaces.chain(environment).chain(lights).chain(by_place).collect();
 
-        let mut maker = Maker { scene, basis: Basis::default() };
-        let (factors, sources) = (BTreeMap::new(), BTreeMap::new());
-        let mut separated = Separated { basis: Basis::default(), remainder: obstacles(scene, heat), factors, sources };
+        let mut maker = Maker { scene, basis: Basis::default(), nodes: Vec::new() };
+        let mut separated = Separated {
+            basis: Basis::default(),
+            remainder: obstacles(scene, heat),
+            factors: BTreeMap::new(),
+            complements: BTreeMap::new(),
+            sources: BTreeMap::new(),
+            radiators: Vec::new(),
+        };
         for spectrum in reflecting {
             let factor = maker.expression(spectrum);
             separated.factors.insert(spectrum, push(&mut maker.basis.factors, factor));
@@ -229,6 +295,13 @@ impl Separated {
             let sources = lamp.into_iter().chain(parts).map(|source| push(&mut maker.basis.sources, source));
             separated.sources.insert(spectrum, sources.collect());
         }
+        for surface in &heat.radiating {
+            for part in &surface.parts {
+                let radiating = separated.by_place(&mut maker, part, channels);
+                separated.radiators.push(radiating);
+            }
+            separated.radiators.extend(surface.lamp.map(|_| Radiating::Other));
+        }
         separated.basis = maker.basis;
         if separated.basis.factors.len().max(separated.basis.sources.len()) > MOST_EXPRESSIONS {
             let message =
@@ -236,6 +309,28 @@ impl Separated {
             return Err(Error::input(&scene.file, message));
         }
         Ok(separated)
+    }
+
+    /// A hot part whose emission differs by place.
+    fn by_place(&mut self, maker: &mut Maker, part: &HotLeaf, channels: &Channels) -> Radiating {
+        if !separates_by_place(maker.scene, part) {
+            return Radiating::Other;
+        }
+        let mut keeps = None;
+        if let Bsdf::Diffuse { reflectance } = maker.scene.materials[part.material].bsdf {
+            for &spectrum in reflected(maker.scene, reflectance).unwrap_or_default().iter() {
+                let kept = Expression { scale: 1.0, terms: vec![maker.kept(spectrum)] };
+                let kept = push(&mut maker.basis.factors, kept);
+                self.complements.insert(self.factors[&spectrum], kept);
+                keeps = matches!(reflectance, Reflectance::Spectrum(_)).then_some(kept);
+            }
+        }
+        Radiating::Hot { nodes: maker.temperatures(part, channels), keeps }
+    }
+
+    /// The most factors of a product of paths of so many bounces: where something hot ends them, what it keeps of light is one.
+    pub fn most_factors(&self, bounces: u32) -> u32 {
+        bounces + u32::from(!self.complements.is_empty())
     }
 
     /// The names of spectra of `scene` that are in no product: those of what does not separate.
@@ -246,8 +341,14 @@ impl Separated {
         beside.into_iter().map(str::to_owned).collect()
     }
 
-    /// By the ids that `tables` gave to spectra. `needed`: those that materials of general scenes asked for.
-    pub fn by_id(&self, ids: &SpectrumIds, needed: &[Needed], tables: &SpectralTables) -> Separable {
+    /// By the ids that `tables` gave to spectra. `needed`: those that materials of general scenes asked for, as `radiators` name them.
+    pub fn by_id(
+        &self,
+        ids: &SpectrumIds,
+        needed: &[Needed],
+        radiators: Option<&Radiators>,
+        tables: &SpectralTables,
+    ) -> Separable {
         let (mut factors, mut sources) = (vec![Factor::Mixed; tables.ids.len()], vec![None; tables.ids.len()]);
         factors[0] = Factor::One;
         let of_materials = ids.factors.iter().map(|(&spectrum, &position)| (spectrum, position));
@@ -256,18 +357,39 @@ impl Separated {
             _ => None,
         });
         for (spectrum, position) in of_materials.chain(of_surfaces) {
+            let id = tables.ids[position] as usize;
             if let Some(&factor) = self.factors.get(&spectrum) {
-                factors[tables.ids[position] as usize] = Factor::Of(factor);
+                factors[id] = Factor::Of(factor);
+            } else if let Some([source]) = self.sources.get(&spectrum).map(|sources| &sources[..]) {
+                factors[id] = Factor::Source(*source);
             }
         }
         for (spectrum, &position) in &ids.sources {
             sources[tables.ids[position] as usize] = self.sources.get(spectrum).cloned();
         }
+        let mut heat = Vec::with_capacity(self.radiators.len());
+        for (n, radiating) in self.radiators.iter().enumerate() {
+            heat.push(match radiating {
+                Radiating::Other => None,
+                Radiating::Hot { nodes, keeps } => {
+                    let radiator =
+                        radiators.map(|radiators| radiators.all[n]).expect("what emits by place has radiators");
+                    if let Some(kept) = *keeps {
+                        factors[tables.ids[ids.needed[(radiator.inner & 0xffff) as usize]] as usize] = Factor::Of(kept);
+                    }
+                    Some(nodes.clone())
+                }
+            });
+        }
+        if !heat.is_empty() {
+            sources[0].get_or_insert_default();
+        }
         let bits = factors.iter().zip(&sources).map(|(factor, source)| {
             let as_factor = if *factor == Factor::Mixed { 0 } else { SEPARATES_AS_FACTOR };
             as_factor | if source.is_some() { SEPARATES_AS_SOURCE } else { 0 }
         });
-        Separable { bits: bits.collect(), factors, sources, has_remainder: !self.remainder.is_empty() }
+        let (bits, complements) = (bits.collect(), self.complements.clone());
+        Separable { bits, factors, complements, sources, heat, has_remainder: !self.remainder.is_empty() }
     }
 }
 
@@ -284,6 +406,8 @@ fn push(all: &mut Vec<Expression>, expression: Expression) -> u16 {
 struct Maker<'a> {
     scene: &'a Scene,
     basis: Basis,
+    /// Those of temperatures that are known already.
+    nodes: Vec<((MaterialId, Temperature), Nodes)>,
 }
 
 impl Maker<'_> {
@@ -300,16 +424,45 @@ impl Maker<'_> {
         let material = &self.scene.materials[part.material];
         let mut terms = Vec::new();
         if let Bsdf::Diffuse { reflectance: Reflectance::Spectrum(spectrum) } = material.bsdf {
-            let reflectance = self.expression(spectrum);
-            match (&reflectance.terms[0], reflectance.scale) {
-                // 1 - (1 - s) is s.
-                (Term::Complement(leaf), 1.0) => terms.push(Term::Spectrum(*leaf)),
-                (Term::Spectrum(leaf), 1.0) => terms.push(Term::Complement(*leaf)),
-                _ => unreachable!("reflectances are not scaled from outside"),
-            }
+            terms.push(self.kept(spectrum));
         }
-        terms.push(Term::Planck { material: material.name.clone(), kelvin });
+        terms.push(Term::Planck { material: material.name.clone(), kelvin, is_node: false });
         Expression { scale: part.weight, terms }
+    }
+
+    /// 1 - a reflectance.
+    fn kept(&mut self, reflectance: SpectrumId) -> Term {
+        let reflectance = self.expression(reflectance);
+        match (&reflectance.terms[0], reflectance.scale) {
+            // 1 - (1 - s) is s.
+            (Term::Complement(leaf), 1.0) => Term::Spectrum(*leaf),
+            (Term::Spectrum(leaf), 1.0) => Term::Complement(*leaf),
+            _ => unreachable!("reflectances are not scaled from outside"),
+        }
+    }
+
+    /// The temperatures that a hot part has, or those between which its own are, as sources.
+    fn temperatures(&mut self, part: &HotLeaf, channels: &Channels) -> Nodes {
+        let key = (part.material, part.temperature);
+        if let Some((_, known)) = self.nodes.iter().find(|(known, _)| *known == key) {
+            return known.clone();
+        }
+        let material = &self.scene.materials[part.material].name;
+        let (kelvin, is_node) = match part.temperature {
+            Temperature::Constant(kelvin) => (vec![kelvin], false),
+            Temperature::Texture(texture) => {
+                let texels = self.scene.textures[texture].texels.iter().map(|v| f64::from(*v));
+                let [least, most] = texels.fold([f64::INFINITY, 0.0], |[a, b], v| [v.min(a), v.max(b)]);
+                (nodes::between(least, most, channels), true)
+            }
+        };
+        let source = |&kelvin: &f64| {
+            let terms = vec![Term::Planck { material: material.clone(), kelvin, is_node }];
+            push(&mut self.basis.sources, Expression { scale: 1.0, terms })
+        };
+        let nodes = Nodes::new(kelvin.iter().map(source).collect::<Vec<_>>(), kelvin);
+        self.nodes.push((key, nodes.clone()));
+        nodes
     }
 
     /// The place of what a spectrum is made of. One definition is one leaf, whatever is made of it.
@@ -357,6 +510,45 @@ fn heat_separates(scene: &Scene, part: &HotLeaf) -> bool {
     is_even && matches!(bsdf, Bsdf::Black | Bsdf::Diffuse { reflectance: Reflectance::Spectrum(_) })
 }
 
+/// The spectra that a share of light is a sum of; `None` of colours.
+fn reflected(scene: &Scene, share: Reflectance) -> Option<SmallVec<[SpectrumId; 4]>> {
+    match share {
+        Reflectance::Spectrum(spectrum) => Some(smallvec![spectrum]),
+        Reflectance::Texture(texture) => match &scene.textures[texture].kind {
+            TextureKind::Mixture(endmembers) => Some(SmallVec::from_slice(endmembers)),
+            _ => None,
+        },
+    }
+}
+
+/// Whether what a hot part emits, another at each place, is a sum of products there.
+pub fn separates_by_place(scene: &Scene, part: &HotLeaf) -> bool {
+    match scene.materials[part.material].bsdf {
+        Bsdf::Black => true,
+        Bsdf::Diffuse { reflectance } => reflected(scene, reflectance).is_some(),
+        _ => false,
+    }
+}
+
+/// The spectra of the lamp of a surface that emits by place.
+fn lamps_by_place(scene: &Scene, surface: &heat::Radiating) -> Vec<SpectrumId> {
+    match surface.lamp {
+        None => Vec::new(),
+        Some((spectrum, _, None)) => vec![spectrum],
+        Some((_, _, Some(texture))) => match &scene.textures[texture].kind {
+            TextureKind::Mixture(lamps) => lamps.clone(),
+            _ => Vec::new(),
+        },
+    }
+}
+
+/// Whether all that a surface sends, another at each place, is a sum of products there.
+fn radiates_products(scene: &Scene, surface: &heat::Radiating) -> bool {
+    let is_colour = |texture: TextureId| matches!(scene.textures[texture].kind, TextureKind::Light(_));
+    let lamp = surface.lamp.is_none_or(|(_, _, texture)| !texture.is_some_and(is_colour));
+    lamp && surface.parts.iter().all(|part| separates_by_place(scene, part))
+}
+
 /// What of `scene`, whose heat is emission already, does not separate, in words: nothing where all does.
 pub fn obstacles(scene: &Scene, heat: &Heat) -> Vec<String> {
     let mut found: Vec<String> = Vec::new();
@@ -383,8 +575,8 @@ pub fn obstacles(scene: &Scene, heat: &Heat) -> Vec<String> {
     if !heat.by_angle.is_empty() {
         found.push("heat of surfaces whose front and back differ, or by angle".into());
     }
-    if !heat.radiating.is_empty() {
-        found.push("heat and emission that differ by place".into());
+    if !heat.radiating.iter().all(|surface| radiates_products(scene, surface)) {
+        found.push("heat and emission that differ by place, of what is not diffuse or black".into());
     }
     for made in &heat.made {
         if let Some(part) = made.parts.iter().find(|part| !heat_separates(scene, part)) {

@@ -183,6 +183,8 @@ constants! {
         RADIATOR_TWO_SIDED = 0x100;
         /// What is inside absorbs as spectrum `inner` says: below a coat, or what facets have scattered more than once.
         RADIATOR_ABSORBS = 0x200;
+        /// What it sends is in products of spectra (`device::separable`).
+        RADIATOR_SEPARATES = 0x1000;
     }
     /// Further bits: what is inside keeps, beside its textured reflectance, what spectrum a says; or what the texture in the
     /// upper half of the word says.

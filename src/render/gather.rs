@@ -12,11 +12,11 @@ use smallvec::{SmallVec, smallvec};
 
 use crate::cube::{Weights, random_of, systematic};
 use crate::device::instructions::{
-    FIRST_RAW_OP, MODE_ADD, MODE_ADVANCE, MODE_GATHER, MODE_KEEP, MODE_ON_F, MODE_START, OP_AMOUNTS, OP_HOLD, OP_MARCH,
-    OP_MEDIUM, OP_PLAIN, OP_RESTORE, OP_SAVE, OP_SPECTRUM,
+    FIRST_RAW_OP, MODE_ADD, MODE_ADVANCE, MODE_GATHER, MODE_KEEP, MODE_ON_F, MODE_START, OP_ABSORBED, OP_AMOUNTS,
+    OP_HELD, OP_HOLD, OP_INNER, OP_MARCH, OP_MEDIUM, OP_PLAIN, OP_PLANCK, OP_RESTORE, OP_SAVE, OP_SPECTRUM,
 };
 use crate::device::prepared::Prepared;
-use crate::device::separable::{Mixed, Separable};
+use crate::device::separable::{Factor, Mixed, Separable};
 use crate::device::words::{Counters, Wave};
 use crate::render::worker::UnitRect;
 use crate::spectral::product::Product;
@@ -29,6 +29,39 @@ const MOST_KNOWN: usize = 1 << 24;
 const MOST_TERMS: usize = 16;
 
 type Factors = SmallVec<[u16; 8]>;
+
+/// A part of what a register holds: a weight, times factors, times a source, if what is emitted by place has brought one.
+#[derive(Debug, Clone, PartialEq)]
+struct Part {
+    weight: f64,
+    factors: Factors,
+    source: Option<u16>,
+}
+
+impl Part {
+    const ONE: Part = Part { weight: 1.0, factors: SmallVec::new_const(), source: None };
+
+    fn of(weight: f64, factor: Option<u16>) -> Part {
+        Part { weight, factors: factor.into_iter().collect(), source: None }
+    }
+
+    fn times(&self, weight: f64, other: &Part) -> Part {
+        let mut both = self.clone();
+        both.weight *= weight * other.weight;
+        both.factors.extend_from_slice(&other.factors);
+        // Light has one source; nothing that is multiplied brings two.
+        both.source = self.source.or(other.source);
+        both
+    }
+}
+
+/// The value of an instruction.
+enum Value {
+    /// 1, or what is in no product.
+    One,
+    Factor(u16),
+    Sum(SmallVec<[Part; 4]>),
+}
 
 /// The products that a thread has met. A state is a set of factors, each as often as it multiplies; few are ever met.
 struct Met {
@@ -50,11 +83,13 @@ struct Walker {
     /// By product; those of `touched` are not zero, or were.
     weights: Vec<f64>,
     touched: Vec<u32>,
-    // Of general scenes: T, P and F (`device::instructions`) as sums of weights times factors.
+    // Of general scenes: T, P, F, H and Q (`device::instructions`) as sums. T has met what it is made of: weights and states.
     throughput: Vec<(f64, u32)>,
     saved: Vec<(f64, u32)>,
-    product: (f64, Factors),
-    factor: Vec<(f64, Factors)>,
+    product: SmallVec<[Part; 2]>,
+    factor: Vec<Part>,
+    held: Vec<Part>,
+    kept: SmallVec<[(f64, Option<u16>); 4]>,
     tally: Tally,
 }
 
@@ -99,9 +134,8 @@ pub struct Saved<'a> {
 
 impl Met {
     fn new(scene: &Separable) -> Met {
-        let past = |most: Option<u16>| most.map_or(0, |most| usize::from(most) + 1);
-        let factors = scene.factors.iter().filter_map(|factor| factor.of_product());
-        Met::of(past(factors.max()), past(scene.sources.iter().flatten().flatten().copied().max()))
+        let [sources, factors] = scene.ends();
+        Met::of(factors, sources)
     }
 
     fn empty(&self) -> Met {
@@ -206,29 +240,28 @@ impl Walker {
         self.throughput.clear();
         self.throughput.push((1.0, 0));
         self.factor.clear();
+        self.kept.clear();
         let mut mixed = Mixed::NOTHING;
         let mut places = (0..records.len() / 4).fuse();
         while let Some(place) = places.next() {
-            let record = &records[4 * place..][..4];
-            let (word, spectra) = (record[0], record[1]);
+            let record: [u32; 4] = std::array::from_fn(|i| records[4 * place + i]);
+            let [word, spectra, ..] = record;
             let operation = word & 0x3f;
             // Records of numbers.
             let numbers = if operation == OP_MARCH { 2 } else { usize::from(operation >= FIRST_RAW_OP) };
             (0..numbers).for_each(|_| _ = places.next());
-            let is_remainder = mixed.step(scene, word, spectra);
+            let is_remainder = mixed.step(scene, record);
             if mixed.is_settled() {
                 break;
             }
             match operation {
                 OP_SAVE => self.saved.clone_from(&self.throughput),
                 OP_RESTORE => self.throughput.clone_from(&self.saved),
+                OP_HOLD => self.held = std::mem::take(&mut self.factor),
+                OP_AMOUNTS if word & MODE_GATHER != 0 => self.factor.clear(),
                 _ => {}
             }
-            let is_none = matches!(operation, OP_MEDIUM | OP_MARCH | OP_AMOUNTS | OP_SAVE | OP_RESTORE | OP_HOLD);
-            if is_none || word & MODE_KEEP != 0 {
-                if operation == OP_HOLD || (operation == OP_AMOUNTS && word & MODE_GATHER != 0) {
-                    self.factor.clear();
-                }
+            if matches!(operation, OP_MEDIUM | OP_MARCH | OP_AMOUNTS | OP_SAVE | OP_RESTORE | OP_HOLD) {
                 continue;
             }
             let weight = f32::from_bits(record[2]);
@@ -236,30 +269,37 @@ impl Walker {
                 return false;
             }
             let weight = f64::from(weight);
-            // None: 1, or what is in no product.
-            let value = match operation {
-                OP_PLAIN | OP_SPECTRUM => scene.factor(spectra).of_product(),
-                _ => None,
+            let factor = match operation {
+                OP_PLAIN | OP_SPECTRUM => scene.factor(spectra),
+                _ => Factor::One,
             };
+            if word & MODE_KEEP != 0 {
+                self.kept.push((weight, factor.of_product()));
+                continue;
+            }
             let is_added = word & MODE_GATHER != 0 || (operation == OP_PLAIN && weight != 0.0);
             debug_assert!(scene.has_remainder || !(is_remainder && is_added), "nobody evaluates {word:x} {spectra:x}");
             let sources = scene.sources_of(word).filter(|_| !is_remainder).unwrap_or_default();
             if operation == OP_PLAIN {
-                self.plain_vertex(value, weight, sources, mixed);
+                self.plain_vertex(factor.of_product(), weight, sources, mixed);
                 continue;
             }
+            let value = self.value(scene, record, factor);
             self.instruction(word, value, weight);
             if word & MODE_GATHER != 0 {
                 match is_remainder {
                     true => self.factor.clear(),
-                    false => self.multiply_out(|walker, weight, state| walker.add(weight, state, sources)),
+                    false => self.multiply_out(|walker, weight, state, own| match own {
+                        Some(source) => walker.add(weight, state, &[source]),
+                        None => walker.add(weight, state, sources),
+                    }),
                 }
             }
             if word & MODE_ADVANCE != 0 {
                 let mut through = Vec::with_capacity(self.throughput.len());
                 match mixed.throughput {
                     true => self.factor.clear(),
-                    false => self.multiply_out(|_, weight, state| through.push((weight, state))),
+                    false => self.multiply_out(|_, weight, state, _| through.push((weight, state))),
                 }
                 self.throughput = choose(through, random ^ place as u64);
             }
@@ -285,34 +325,75 @@ impl Walker {
         }
     }
 
-    /// What an instruction makes of P and F, but for what it does with them then.
-    fn instruction(&mut self, word: u32, value: Option<u16>, weight: f64) {
-        if word & MODE_ON_F != 0 {
-            for (share, factors) in &mut self.factor {
-                *share *= weight;
-                factors.extend(value);
+    /// What an instruction multiplies by, which takes what it uses up.
+    fn value(&mut self, scene: &Separable, [word, spectra, _, parameter]: [u32; 4], factor: Factor) -> Value {
+        let source = |weight: f64, source: u16| Part { weight, source: Some(source), ..Part::ONE };
+        match word & 0x3f {
+            OP_PLANCK if spectra != 0 => {
+                let nodes = scene.nodes(spectra).at(f64::from(f32::from_bits(parameter)));
+                let sent = nodes.into_iter().filter(|(share, _)| *share > 0.0);
+                Value::Sum(sent.map(|(share, node)| source(share, node)).collect())
             }
-        } else {
-            if word & MODE_START != 0 {
-                self.product = (1.0, Factors::new());
+            // 1 - Σ w ρ = (1 - Σ w) + Σ w (1 - ρ).
+            OP_ABSORBED => {
+                let kept = std::mem::take(&mut self.kept);
+                let beside = (1.0 - kept.iter().map(|(share, _)| share).sum::<f64>()).max(0.0);
+                let absorbed = kept.iter().filter_map(|&(share, factor)| Some((share, scene.complement(factor?)?)));
+                let absorbed = absorbed.map(|(share, factor)| Part::of(share, Some(factor)));
+                Value::Sum(absorbed.chain([Part::of(beside, None)]).collect())
             }
-            self.product.0 *= weight;
-            self.product.1.extend(value);
-        }
-        if word & MODE_ADD != 0 {
-            self.factor.push(self.product.clone());
+            OP_INNER => {
+                self.kept.clear();
+                Value::One
+            }
+            OP_HELD => Value::Sum(self.held.drain(..).collect()),
+            _ => match factor {
+                Factor::Of(factor) => Value::Factor(factor),
+                Factor::Source(of_lamp) => Value::Sum(smallvec![source(1.0, of_lamp)]),
+                Factor::One | Factor::Mixed => Value::One,
+            },
         }
     }
 
-    /// Calls `each` with every term of T F, and leaves F = 0.
-    fn multiply_out(&mut self, mut each: impl FnMut(&mut Walker, f64, u32)) {
+    /// What an instruction makes of P and F, but for what it does with them then.
+    fn instruction(&mut self, word: u32, value: Value, weight: f64) {
+        let multiply = |part: &mut Part| {
+            part.weight *= weight;
+            if let Value::Factor(factor) = value {
+                part.factors.push(factor);
+            }
+        };
+        let by = |parts: &[Part], sum: &[Part]| -> Vec<Part> {
+            parts.iter().flat_map(|part| sum.iter().map(move |other| part.times(weight, other))).collect()
+        };
+        if word & MODE_ON_F != 0 {
+            match &value {
+                Value::Sum(sum) => self.factor = by(&self.factor, sum),
+                _ => self.factor.iter_mut().for_each(multiply),
+            }
+        } else {
+            if word & MODE_START != 0 {
+                self.product = smallvec![Part::ONE];
+            }
+            match &value {
+                Value::Sum(sum) => self.product = by(&self.product, sum).into(),
+                _ => self.product.iter_mut().for_each(multiply),
+            }
+        }
+        if word & MODE_ADD != 0 {
+            self.factor.extend(self.product.iter().cloned());
+        }
+    }
+
+    /// Calls `each` with every term of T F, and the source that F has brought; leaves F = 0.
+    fn multiply_out(&mut self, mut each: impl FnMut(&mut Walker, f64, u32, Option<u16>)) {
         let (factor, throughput) = (std::mem::take(&mut self.factor), std::mem::take(&mut self.throughput));
         for &(through, state) in &throughput {
-            for (share, factors) in &factor {
-                let weight = through * share;
+            for part in &factor {
+                let weight = through * part.weight;
                 if weight != 0.0 {
-                    let state = factors.iter().fold(state, |state, &factor| self.met.behind(state, factor));
-                    each(self, weight, state);
+                    let state = part.factors.iter().fold(state, |state, &factor| self.met.behind(state, factor));
+                    each(self, weight, state, part.source);
                 }
             }
         }
@@ -383,8 +464,10 @@ impl Gather {
             touched: Vec::new(),
             throughput: Vec::new(),
             saved: Vec::new(),
-            product: (0.0, smallvec![]),
+            product: smallvec![],
             factor: Vec::new(),
+            held: Vec::new(),
+            kept: smallvec![],
             tally: Tally::default(),
         };
         Some(Gather {

@@ -70,7 +70,8 @@ pub fn header(scene: &Scene, tile: [u32; 2], seed: u64, uncertainty: bool, layer
     }
     let separated = separable::of(scene)?;
     let beside = separated.spectra_of_remainder(scene);
-    Ok(header.with_weights(&separated.basis, scene.integrator.max_bounces, &separated.remainder, &beside))
+    let most_factors = separated.most_factors(scene.integrator.max_bounces);
+    Ok(header.with_weights(&separated.basis, most_factors, &separated.remainder, &beside))
 }
 
 /// The evaluator for `scene` on a software device or a GPU; or the one with which the cube was begun that `there` describes, since

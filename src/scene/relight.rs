@@ -74,7 +74,7 @@ pub fn relight(rendered: Rendered, sets: &[(String, String)], wanted: NewChannel
     let mut warnings = Vec::new();
     let Rendered { basis, channels, .. } = rendered;
     let channels = new_channels(channels, wanted, &mut warnings)?;
-    let (names, materials) = (names(basis), materials(basis));
+    let (names, materials) = (names(basis), materials(basis, false));
     let mut spectra: Vec<&str> = Vec::new();
     let mut hot: Vec<&str> = Vec::new();
     let mut normal = Vec::new();
@@ -168,12 +168,12 @@ fn give_below(cx: &Context, node: &mut Node, path: &str, files: &[(String, Strin
     }
 }
 
-/// The hot materials of a basis.
-fn materials(basis: &Basis) -> Vec<&str> {
+/// The hot materials of a basis whose temperatures are numbers; or those that a texture tells.
+fn materials(basis: &Basis, by_texture: bool) -> Vec<&str> {
     let terms = basis.factors.iter().chain(&basis.sources).flat_map(|expression| &expression.terms);
     let mut materials: Vec<&str> = terms
         .filter_map(|term| match term {
-            Term::Planck { material, .. } => Some(material.as_str()),
+            Term::Planck { material, is_node, .. } if *is_node == by_texture => Some(material.as_str()),
             _ => None,
         })
         .collect();
@@ -194,6 +194,11 @@ fn refusal(key: &str, path: &[&str], names: &[&str], materials: &[&str], rendere
             let known = || format!("the cube has {}", list(names.iter().copied()));
             format!("no spectrum of the cube is named \"{name}\"; {}", hint.unwrap_or_else(known))
         }
+        ["materials", name, "temperature"] | ["materials", name, _, "temperature"]
+            if self::materials(rendered.basis, true).contains(name) =>
+        {
+            format!("the temperature of \"{name}\" comes from a texture; what changes it needs a new render")
+        }
         ["materials", name, "temperature"] | ["materials", name, _, "temperature"] => {
             let known = if materials.is_empty() { "none".to_owned() } else { list(materials.iter().copied()) };
             format!("\"{name}\" is no hot material of the cube, which are: {known}")
@@ -213,7 +218,7 @@ fn document(basis: &Basis, spectra: &[&str], hot: &[&str]) -> String {
     for name in hot {
         let terms = basis.sources.iter().flat_map(|source| &source.terms);
         let kelvin = terms.filter_map(|term| match term {
-            Term::Planck { material, kelvin } if material == name => Some(*kelvin),
+            Term::Planck { material, kelvin, .. } if material == name => Some(*kelvin),
             _ => None,
         });
         let kelvin = kelvin.max_by(f64::total_cmp).unwrap_or_default();
@@ -271,7 +276,7 @@ fn decode<'a>(
         let entry = Item { cx, node: &entry.node, path, at: &entry.node.origin };
         let Some(value) = super::material::kelvin(&entry) else { continue };
         for term in basis.sources.iter_mut().flat_map(|source| &mut source.terms) {
-            if let Term::Planck { material, kelvin } = term
+            if let Term::Planck { material, kelvin, is_node: false } = term
                 && material == name
             {
                 *kelvin = value;
@@ -373,7 +378,7 @@ mod tests {
             factors: vec![of(vec![Term::Spectrum(1)])],
             sources: vec![
                 of(vec![Term::Spectrum(0)]),
-                of(vec![Term::Complement(1), Term::Planck { material: "wall".into(), kelvin: 290.0 }]),
+                of(vec![Term::Complement(1), Term::Planck { material: "wall".into(), kelvin: 290.0, is_node: false }]),
             ],
         }
     }
@@ -399,7 +404,7 @@ mod tests {
         let mut want = basis();
         want.spectra[0].curve = Curve::Blackbody { kelvin: 6500.0, scale: 0.5 };
         want.spectra[1].curve = Curve::Linear { nm: vec![400.0, 500.0], value: vec![0.2, 0.4], outside: Outside::Hold };
-        want.sources[1].terms[1] = Term::Planck { material: "wall".into(), kelvin: 350.0 };
+        want.sources[1].terms[1] = Term::Planck { material: "wall".into(), kelvin: 350.0, is_node: false };
         assert_eq!(relit.basis, want);
         assert_eq!(relit.changed, ["spectra.lamp", "spectra.paint", "materials.wall.temperature"]);
         // Half of what the cube has.

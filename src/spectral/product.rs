@@ -26,10 +26,13 @@ pub enum Term {
     Spectrum(usize),
     /// 1 - the spectrum.
     Complement(usize),
-    /// Planck's law at the temperature of a material, K.
+    /// Planck's law at the temperature of a material, K; or, where that is a texture, at one of the nodes between which temperatures
+    /// are.
     Planck {
         material: String,
         kelvin: f64,
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        is_node: bool,
     },
 }
 
@@ -315,7 +318,10 @@ mod tests {
             ],
             sources: vec![
                 of(vec![Term::Spectrum(1)], 2.0),
-                of(vec![Term::Complement(0), Term::Planck { material: "hot".into(), kelvin: 3000.0 }], 0.5),
+                of(
+                    vec![Term::Complement(0), Term::Planck { material: "hot".into(), kelvin: 3000.0, is_node: false }],
+                    0.5,
+                ),
             ],
         }
     }

@@ -4,10 +4,12 @@
 use glam::DVec3;
 use spectile::device::separable;
 use spectile::render::wave::Budget;
-use spectile::scene::{Cone, Filter, Profile, Scene, Sides, Weight};
+use spectile::scene::{
+    Bsdf, Cone, Filter, Profile, Roughness, Scene, Sides, Spectrum, TextureKind, Wavelengths, Weight,
+};
 use spectile::spectral::{Channels, Curve, Outside};
 
-use crate::device::{Settings, assert_rendered_as_reference, render, render_relit};
+use crate::device::{Settings, assert_rendered_as_reference, render, render_paths_of_weights, render_relit};
 use crate::scene_builder::heat::infrared;
 use crate::scene_builder::*;
 use crate::size;
@@ -208,6 +210,95 @@ fn heat_follows_its_paint_and_temperature() {
     let truth = image_estimates(&truth.mean, &truth.standard_error, channels, f64::from(truth.samples - 1));
     let means: Vec<f64> = truth.iter().map(|e| e.mean).collect();
     assert_agreement("heat", &relit.image_means(), &truth, &means, Bound { resolution: 0.02, allowance: 2e-6 });
+}
+
+/// Heat that differs by place: temperatures of textures, on paint, endmembers and black; shares of blends; beside a lamp, and a picture
+/// of lamps.
+fn hot_places(paints: [Curve; 4], lamps: [Curve; 2]) -> Scene {
+    let ([a, b, c, d], [lamp, screen]) = (paints, lamps);
+    let mut builder = corner().channels(infrared());
+    let warm = builder.texture([2, 2], &[300.0, 420.0, 0.0, 360.0], TextureKind::Number);
+    let shares = builder.texture([2, 1], &[0.9, 0.2], TextureKind::Number);
+    let mixture = builder.mixture([2, 1], &[0.6, 0.3, 0.1, 0.9], &[a.clone(), b.clone()]);
+    let picture = builder.mixture([2, 1], &[1.0, 0.2, 0.0, 3.0], &[lamp.clone(), screen]);
+    let [x, y] = [DVec3::X, DVec3::Y];
+    let away = || sphere(DVec3::new(0.0, 9.0, 0.0), 0.1);
+    let mut scene = builder
+        .diffuse(quad(DVec3::new(-2.0, -1.0, 2.0), 4.0 * x, 4.0 * DVec3::NEG_Z), c)
+        .attributes(quad_uv())
+        .heated_by(warm)
+        .textured(quad(DVec3::new(-2.0, -1.0, -1.0), 4.0 * x, 3.0 * y), mixture)
+        .attributes(quad_uv())
+        .at_kelvin(350.0)
+        .black(quad(DVec3::new(-1.5, -0.9, 0.2), x, y))
+        .attributes(quad_uv())
+        .heated_by(warm)
+        .diffuse(away(), d)
+        .at_kelvin(500.0)
+        .textured(away(), mixture)
+        .heated_by(warm)
+        .masked_last_two(quad(DVec3::new(0.5, -0.9, 0.2), x, y), shares)
+        .attributes(quad_uv())
+        .glowing(quad(DVec3::new(-0.5, 1.0, 0.2), x, -0.3 * y), a, lamp, Sides::Front)
+        .attributes(quad_uv())
+        .heated_by(warm)
+        .glowing(quad(DVec3::new(0.6, 0.3, 0.4), 0.5 * x, 0.4 * y), b, 1.0, Sides::Front)
+        .attributes(quad_uv())
+        .build();
+    let screen = scene.objects.last_mut().and_then(|object| object.emission.as_mut()).expect("a lamp");
+    screen.texture = Some(picture);
+    scene
+}
+
+fn dull_places() -> Scene {
+    let lamp = |scale: f64, kelvin: f64| Curve::Blackbody { kelvin, scale };
+    hot_places([0.2, 0.7, 0.4, 0.5].map(Curve::Constant), [lamp(0.3, 400.0), lamp(0.1, 500.0)])
+}
+
+#[test]
+fn heat_by_place_follows_paints_and_lamps() {
+    let rendered = dull_places();
+    assert_eq!(separable::of(&rendered).expect("a scene").remainder, [""; 0]);
+    let line = |from: f64, to: f64| table(&[3e3, 20e3], &[from, to]);
+    let lamp = |scale: f64, kelvin: f64| Curve::Blackbody { kelvin, scale };
+    let paints = [line(0.1, 0.8), line(0.9, 0.3), line(0.6, 0.2), line(0.05, 0.4)];
+    let wanted = hot_places(paints, [lamp(0.5, 600.0), lamp(0.2, 350.0)]);
+    let (settings, epochs) = (Settings { seed: 8, ..Settings::default() }, size::either(64, 256));
+    let relit = render_relit(&rendered, &basis(&wanted), &wanted.channels, epochs, 64, settings);
+    let bound = Bound { resolution: size::either(0.2, 0.1), allowance: 1e-4 };
+    assert_rendered_as_reference("heat by place", &relit, &wanted, 64 * epochs, bound);
+}
+
+/// The very same paths bring what they bring in channels so narrow that Planck's law is the same all over them, to what interpolation
+/// between temperatures leaves; beside metals that are hot by place, which do not separate, too.
+#[test]
+fn heat_by_place_is_that_of_channels() {
+    let channels = Channels::from_bounds([3e3, 5e3, 8e3, 12e3, 20e3].map(|nm| [nm, nm + 0.01]).to_vec(), None);
+    for beside_a_metal in [false, true] {
+        let mut scene = Scene { channels: channels.clone(), ..dull_places() };
+        scene.integrator.wavelengths = Wavelengths::Uniform;
+        if beside_a_metal {
+            let [eta, k] = [2.0, 5.0].map(|value| {
+                scene.spectra.push(Spectrum { name: "metal".into(), curve: Curve::Constant(value), definition: None });
+                scene.spectra.len() - 1
+            });
+            let roughness = Roughness::Constant([0.3; 2]);
+            scene.materials[2].bsdf = Bsdf::Conductor { eta, k, roughness, energy_compensation: true };
+        }
+        assert_eq!(separable::has_remainder(&scene), beside_a_metal);
+        let in_channels = render_paths_of_weights(&scene, 2, 64, Settings::default());
+        let weights = render(&scene.clone().factored(), 2, 64, Settings::default());
+        assert_eq!(in_channels.rays, weights.rays);
+        for k in 0..channels.len() {
+            let of = |means: &[Vec<f32>]| means.iter().map(|pixel| pixel[k]).collect::<Vec<f32>>();
+            let (a, b) = (of(&in_channels.means), of(&weights.means));
+            let peak = a.iter().copied().fold(0.0, f32::max);
+            assert!(peak > 0.0);
+            let worst = a.iter().zip(&b).map(|(a, b)| (a - b).abs() / peak).fold(0.0, f32::max);
+            println!("{k}: {worst:e} of the peak");
+            assert!(worst <= 1e-4, "{k}: {worst:e}");
+        }
+    }
 }
 
 /// Where spectra are the same all over each channel, the very same paths bring what they bring without weights.

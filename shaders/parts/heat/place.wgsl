@@ -83,7 +83,8 @@ fn append_heat(list: ptr<function, RecordList>, emitted: u32, v: Vertex, scale: 
             }
 #endif
         }
-        append(list, OP_PLANCK | mode | MODE_ADD, 0u, weight, kelvin);
+        // What is in products of spectra says which radiator it is.
+        append(list, OP_PLANCK | mode | MODE_ADD, select(0u, n + 1u, (r.kind & RADIATOR_SEPARATES) != 0u), weight, kelvin);
     }
 }
 

@@ -6,11 +6,13 @@
 // Of each spectrum these bits.
 @group(1) @binding(17) var<storage, read> separates: array<u32>;
 
-// Which registers hold something that does not separate: T, P, F and the T put aside.
+// Which registers hold something that does not separate: T, P, F, Q, H and the T put aside.
 struct Mixed {
     throughput: bool,
     product: bool,
     factor: bool,
+    kept: bool,
+    held: bool,
     saved: bool,
 }
 
@@ -38,16 +40,27 @@ fn is_of_remainder(record: vec4<u32>, mixed: ptr<function, Mixed>) -> bool {
         return false;
     }
     if (operation == OP_HOLD) {
+        (*mixed).held = (*mixed).factor;
         (*mixed).factor = false;
-        return false;
-    }
-    if ((record.x & MODE_KEEP) != 0u) {
         return false;
     }
     let is_source_mixed = (separates[record.x >> 16u] & SEPARATES_AS_SOURCE) == 0u;
     var is_value_mixed = operation != OP_ONE;
     if (operation == OP_PLAIN || operation == OP_SPECTRUM) {
         is_value_mixed = (separates[record.y & 0xffffu] & SEPARATES_AS_FACTOR) == 0u;
+    } else if (operation == OP_PLANCK) {
+        is_value_mixed = record.y == 0u;
+    } else if (operation == OP_HELD) {
+        is_value_mixed = (*mixed).held;
+    } else if (operation == OP_ABSORBED) {
+        is_value_mixed = (*mixed).kept || record.w != 0u;
+    }
+    if ((record.x & MODE_KEEP) != 0u) {
+        (*mixed).kept = (*mixed).kept || is_value_mixed;
+        return false;
+    }
+    if (operation == OP_ABSORBED || operation == OP_INNER) {
+        (*mixed).kept = false;
     }
     if (operation == OP_PLAIN) {
         (*mixed).throughput = (*mixed).throughput || is_value_mixed;

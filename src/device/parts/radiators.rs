@@ -3,9 +3,11 @@
 
 use crate::device::parts::heat::{HotLeaf, Radiating};
 use crate::device::parts::surfaces::{self, Surfaces, texture_records};
+use crate::device::separable;
 use crate::device::words::{
     HOT_FACET_COUNT, NONE, RADIATOR_ABSORBS, RADIATOR_COAT, RADIATOR_FACETS, RADIATOR_LAMP, RADIATOR_MIRROR,
-    RADIATOR_OPEN, RADIATOR_PASSES_SPECTRUM, RADIATOR_PASSES_TEXTURE, RADIATOR_TWO_SIDED, RADIATOR_VARNISH, Radiator,
+    RADIATOR_OPEN, RADIATOR_PASSES_SPECTRUM, RADIATOR_PASSES_TEXTURE, RADIATOR_SEPARATES, RADIATOR_TWO_SIDED,
+    RADIATOR_VARNISH, Radiator,
 };
 use crate::scene::{Bsdf, Reflectance, SMOOTH, Scene, SpectrumId, Temperature, TextureKind};
 use crate::spectral::Curve;
@@ -121,6 +123,9 @@ impl Radiators {
         let material = &scene.materials[part.material];
         let name = &material.name;
         let mut radiator = blank(if material.two_sided { RADIATOR_TWO_SIDED } else { 0 });
+        if separable::separates_by_place(scene, part) {
+            radiator.kind |= RADIATOR_SEPARATES;
+        }
         radiator.weight = part.weight as f32;
         match part.temperature {
             Temperature::Constant(kelvin) => radiator.kelvin = kelvin as f32,

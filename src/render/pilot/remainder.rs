@@ -23,8 +23,9 @@ impl Pilot<'_> {
         if !prepared.has_remainder() {
             return Ok(None);
         }
-        let basis = separable::basis(&scene)?;
-        let expander = Expander::new(&basis, &scene.channels, scene.integrator.max_bounces as usize);
+        let separated = separable::of(&scene)?;
+        let most_factors = separated.most_factors(scene.integrator.max_bounces);
+        let expander = Expander::new(&separated.basis, &scene.channels, most_factors as usize);
         self.on_a_device(|pilot, gpu| {
             let mut worker = worker(gpu, &prepared, pilot.memory, pilot.interrupt)?;
             let mut share = RemainderShare::none(scene.channels.len());

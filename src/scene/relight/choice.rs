@@ -81,14 +81,14 @@ pub fn changeable(rendered: Rendered) -> Changeable {
     let kelvin = |name: &str| {
         let terms = basis.factors.iter().chain(&basis.sources).flat_map(|expression| &expression.terms);
         let kelvin = terms.filter_map(|term| match term {
-            Term::Planck { material, kelvin } if material == name => Some(*kelvin),
+            Term::Planck { material, kelvin, .. } if material == name => Some(*kelvin),
             _ => None,
         });
         HotMaterial { material: name.to_owned(), kelvin: kelvin.fold(0.0, f64::max) }
     };
     Changeable {
         spectra: names(basis).into_iter().map(spectrum).collect(),
-        temperatures: materials(basis).into_iter().map(kelvin).collect(),
+        temperatures: materials(basis, false).into_iter().map(kelvin).collect(),
     }
 }
 
@@ -196,7 +196,7 @@ mod tests {
             sources: vec![
                 of(vec![Term::Spectrum(0)]),
                 of(vec![Term::Spectrum(2)]),
-                of(vec![Term::Complement(1), Term::Planck { material: "wall".into(), kelvin: 290.0 }]),
+                of(vec![Term::Complement(1), Term::Planck { material: "wall".into(), kelvin: 290.0, is_node: false }]),
             ],
         }
     }
