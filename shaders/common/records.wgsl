@@ -24,17 +24,32 @@
     // What there was before the last record, and whether what that added is no business of channels.
     var mixed = Mixed(false, false, false, false, false, true);
     var is_weighed = false;
+#if MAP_LEFT
+    var is_gathered = false;
+#endif
 #repeat VECTORS v
     var remainder_$v = vec4<f32>(0.0);
+#if MAP_LEFT
+    // The share of what F has from the map that weights do not bring.
+    var left_$v = vec4<f32>(0.0);
+#endif
 #end
 #endif
     for (var r = first_record; r < first_record + used; r += 1u) {
         let record = records[r];
 #if REMAINDER
 #repeat VECTORS v
+#if MAP_LEFT
+        radiance_$v = select(radiance_$v, remainder_$v + left_$v * (radiance_$v - remainder_$v), is_weighed);
+        left_$v = select(left_$v, vec4<f32>(0.0), is_gathered);
+#else
         radiance_$v = select(radiance_$v, remainder_$v, is_weighed);
+#endif
         remainder_$v = radiance_$v;
 #end
+#if MAP_LEFT
+        is_gathered = (record.x & MODE_GATHER) != 0u;
+#endif
         is_weighed = !is_of_remainder(record, &mixed);
 #endif
 #if THINS
@@ -143,6 +158,13 @@
         }
 #endif
 #endif
+#if MAP_LEFT
+        if ((record.x & 0x3fu) == OP_MAP) {
+#repeat VECTORS v
+            left_$v = map_left(record.y, record.w, spectrum_value(MAP_AXIS, quad_$v, s)) / max(value_$v, vec4<f32>(1.0e-37));
+#end
+        }
+#endif
 #if RADIATORS
         if ((record.x & 0x3fu) == OP_HELD) {
 #repeat VECTORS v
@@ -244,6 +266,10 @@
     }
 #if REMAINDER
 #repeat VECTORS v
+#if MAP_LEFT
+    radiance_$v = select(radiance_$v, remainder_$v + left_$v * (radiance_$v - remainder_$v), is_weighed);
+#else
     radiance_$v = select(radiance_$v, remainder_$v, is_weighed);
+#endif
 #end
 #endif

@@ -14,7 +14,7 @@ use crate::device::evaluator::EvaluateShape;
 use crate::device::facts;
 use crate::device::part::OnDevice;
 use crate::device::prepared::Prepared;
-use crate::device::separable::MOST_FACTORS;
+use crate::device::separable::{self, MOST_FACTORS};
 use crate::device::windows::Windows;
 use crate::files::{format_bytes, shown};
 use crate::gpu::adapter::{Gpu, Selection};
@@ -129,7 +129,10 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         None => plan::waves_without_device(&prepared, tile, budget)?,
     };
     let prepared = &*prepared;
-    let plan = Plan { args, scene: &scene, samples, prepared, choices, remainder, header, layer_disk, waves, measured };
+    let obstacles = separable::remainder(&scene);
+    let scene = &scene;
+    let plan =
+        Plan { args, scene, samples, prepared, choices, obstacles, remainder, header, layer_disk, waves, measured };
     output.event("done", plan.facts())?;
     output.text(&plan.describe())
 }
@@ -234,7 +237,8 @@ struct Plan<'a> {
     prepared: &'a Prepared,
     /// What the pilot decided, if it was asked.
     choices: Option<Choices>,
-    /// What it says of the picture that does not separate.
+    /// What of the scene does not separate, in words; and what the pilot says of that.
+    obstacles: Vec<String>,
     remainder: Option<RemainderShare>,
     header: Header,
     /// Of the cube's bytes on disk, those of its layers.
@@ -296,7 +300,7 @@ impl Plan<'_> {
             "choices": self.choices,
             "features": features.collect::<Vec<_>>(),
             "spectra": facts::table_bounds(self.prepared),
-            "factored_obstacles": self.prepared.obstacles,
+            "factored_obstacles": self.obstacles,
             "remainder_share": self.remainder.as_ref().map(RemainderShare::of_channels),
             "storage_buffers": self.storage_buffers(),
             "primitives": self.prepared.accel.primitives.len() - self.prepared.accel.instances,
@@ -337,7 +341,7 @@ impl Plan<'_> {
     /// What `render --factored` makes of the scene.
     fn describe_factored(&self) -> String {
         let bounces = self.scene.integrator.max_bounces;
-        let obstacles = self.prepared.obstacles.join(", ");
+        let obstacles = self.obstacles.join(", ");
         if bounces > MOST_FACTORS {
             return format!(
                 "not with paths of {bounces} bounces (integrator.max_bounces; render --factored takes {MOST_FACTORS})"

@@ -123,7 +123,7 @@ pub struct Prepared {
     pub first_hits: bool,
     /// What records say of products of spectra, where those are kept instead of channels.
     pub separable: Option<Separable>,
-    /// What of the scene does not separate into those, in words.
+    /// What of the scene does not separate into those, in words: of the remainder.
     pub obstacles: Vec<String>,
 }
 
@@ -137,7 +137,7 @@ impl Prepared {
     /// As [`Prepared::new`], for the evaluator chosen.
     pub fn for_evaluator(scene: &Scene, seed: u64, evaluator: Evaluator) -> Result<Prepared> {
         // Weights have no channels.
-        let has_channels = || evaluator != Evaluator::Factored || separable::has_remainder(scene);
+        let has_channels = || evaluator != Evaluator::Factored || !separable::remainder(scene).is_empty();
         match Integration::of(&scene.channels).filter(|_| has_channels()) {
             None => Prepared::flatten(scene, seed, evaluator, &scene.channels, None),
             Some(integration) => {
@@ -181,6 +181,10 @@ impl Prepared {
         let separated = (evaluator == Evaluator::Factored).then(|| Separated::new(scene, &heat, wanted)).transpose()?;
         let values = separated.as_ref().is_none_or(|separated| !separated.remainder.is_empty());
         let (tables, ids, warp) = spectral_tables(scene, &heat, needed, in_registers, values, weights, emitted)?;
+        if let (Some(separated), Some(sky)) = (&separated, &mut sky) {
+            sky.leave(separated);
+        }
+        let obstacles = separated.as_ref().map(|separated| separated.remainder.clone()).unwrap_or_default();
         let separable = separated.map(|separated| separated.by_id(&ids, needed, radiators.as_ref(), &tables));
         let factor = |s: usize| tables.ids[ids.factors[&s]];
         let source = |s: usize| tables.ids[ids.sources[&s]];
@@ -228,7 +232,7 @@ impl Prepared {
             path_weight: ids.path_weight.map(|position| tables.ids[position]),
             integration,
             separable,
-            obstacles: separable::obstacles(scene, &heat),
+            obstacles,
             thinning: None,
             lines: lines(scene, &accel),
             distortion: scene.camera.distortion.map(|Distortion { radial: [k1, k2, k3], tangential: [p1, p2] }| {

@@ -5,27 +5,30 @@
 //! channels as in any other render. Which of both a contribution is [`Mixed`] says by the records before it, one after the other, on the
 //! host as on the device (`shaders/parts/remainder/separates.wgsl`), so that nothing is left out and nothing counts twice.
 
+pub mod map;
 mod nodes;
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use smallvec::{SmallVec, smallvec};
 
+use self::map::Clusters;
 pub use self::nodes::Nodes;
 
 use crate::device::instructions::{
     MODE_ADD, MODE_ADVANCE, MODE_GATHER, MODE_KEEP, MODE_ON_F, MODE_START, OP_ABSORBED, OP_AMOUNTS, OP_HELD, OP_HOLD,
-    OP_INNER, OP_MARCH, OP_MEDIUM, OP_ONE, OP_PLAIN, OP_PLANCK, OP_RESTORE, OP_SAVE, OP_SPECTRUM,
+    OP_INNER, OP_MAP, OP_MARCH, OP_MEDIUM, OP_ONE, OP_PLAIN, OP_PLANCK, OP_RESTORE, OP_SAVE, OP_SPECTRUM,
 };
 use crate::device::parts::heat::{self, Heat, HotLeaf};
 use crate::device::parts::radiators::Radiators;
 use crate::device::parts::surfaces::Needed;
 use crate::device::spectra::SpectrumIds;
 use crate::device::words::{SEPARATES_AS_FACTOR, SEPARATES_AS_SOURCE};
-use crate::scene::{Bsdf, MaterialId, Reflectance, Scene, SpectrumId, Temperature, TextureId, TextureKind};
-use crate::spectral::Channels;
+use crate::scene::{Bsdf, MaterialId, Reflectance, Scene, SpectrumId, Temperature, Texels, TextureId, TextureKind};
 use crate::spectral::product::{Basis, Expression, Leaf, Term};
 use crate::spectral::table::SpectralTables;
+use crate::spectral::{Channels, Curve, Outside};
 use crate::{Error, Result};
 
 /// Scattering events of a path at most: a product is stored with room for as many factors.
@@ -45,6 +48,17 @@ pub struct Separated {
     sources: BTreeMap<SpectrumId, Sources>,
     /// What is emitted by place: of each radiator, in their order, what it is in products.
     radiators: Vec<Radiating>,
+    /// The environment, where it is a map of spectra.
+    map: Option<Map>,
+}
+
+/// A map of spectra in products.
+#[derive(Debug, Clone)]
+struct Map {
+    clusters: Arc<Clusters>,
+    /// Of each of its spectra.
+    sources: Vec<u16>,
+    scale: f64,
 }
 
 /// A radiator ([`Radiators`]) in products.
@@ -81,6 +95,8 @@ pub struct Separable {
     pub sources: Vec<Option<Sources>>,
     /// Of each radiator, where it is hot and in products.
     heat: Vec<Option<Nodes>>,
+    /// [`Separated::map`].
+    map: Option<Map>,
     /// The same for devices: [`SEPARATES_AS_FACTOR`] and [`SEPARATES_AS_SOURCE`] of each id.
     pub bits: Vec<u32>,
     /// Whether there is something that does not separate.
@@ -117,8 +133,21 @@ impl Separable {
             _ => None,
         });
         let nodes = self.heat.iter().flatten().flat_map(|nodes| nodes.sources());
-        let sources = self.sources.iter().flatten().flatten().copied().chain(emitted).chain(nodes);
+        let of_map = self.map.iter().flat_map(|map| map.sources.iter().copied());
+        let sources = self.sources.iter().flatten().flatten().copied().chain(emitted).chain(nodes).chain(of_map);
         [end(sources.max()), end(of_ids.chain(self.complements.values().copied()).max())]
+    }
+
+    /// Whether a map is a sum of sources, but for what these leave of it.
+    pub fn has_map(&self) -> bool {
+        self.map.is_some()
+    }
+
+    /// Of a map ([`Separable::has_map`]) how much of which sources there is at the place that a record names.
+    pub fn map_at(&self, cell: u32, fractions: u32) -> impl Iterator<Item = (u16, f64)> {
+        let found =
+            self.map.iter().flat_map(move |map| map.clusters.at(cell, fractions).into_iter().map(move |it| (map, it)));
+        found.map(|(map, (spectrum, share))| (map.sources[usize::from(spectrum)], share))
     }
 
     /// The temperatures of what the word of an instruction for Planck's law names.
@@ -192,6 +221,7 @@ impl Mixed {
             // Radiators that are in products say which they are.
             OP_PLANCK => spectra == 0,
             OP_HELD => self.held,
+            OP_MAP => !scene.has_map(),
             // Without a coat 1 - Q, which is a sum of products.
             OP_ABSORBED => self.kept || parameter != 0,
             _ => true,
@@ -244,10 +274,10 @@ pub fn of(scene: &Scene) -> Result<Separated> {
     Separated::new(&heat.scene, &heat, &scene.channels)
 }
 
-/// Whether something of `scene` does not separate.
-pub fn has_remainder(scene: &Scene) -> bool {
+/// What of `scene` does not separate, in words: nothing where all does.
+pub fn remainder(scene: &Scene) -> Vec<String> {
     let heat = heat::as_emission(scene);
-    !obstacles(&heat.scene, &heat).is_empty()
+    obstacles(&heat.scene, &heat)
 }
 
 impl Separated {
@@ -279,6 +309,7 @@ impl Separated {
             complements: BTreeMap::new(),
             sources: BTreeMap::new(),
             radiators: Vec::new(),
+            map: None,
         };
         for spectrum in reflecting {
             let factor = maker.expression(spectrum);
@@ -301,6 +332,13 @@ impl Separated {
                 separated.radiators.push(radiating);
             }
             separated.radiators.extend(surface.lamp.map(|_| Radiating::Other));
+        }
+        if let Some(map) = scene.environment.as_ref().and_then(|environment| environment.map())
+            && let (Some(clusters), Texels::Spectral { nm, .. }) = (map::clusters(map), &map.texels)
+        {
+            let source = |(i, spectrum): (usize, &Vec<f64>)| maker.of_map(i, nm, spectrum, map.scale);
+            let sources = clusters.spectra.iter().enumerate().map(source).collect();
+            separated.map = Some(Map { clusters, sources, scale: map.scale });
         }
         separated.basis = maker.basis;
         if separated.basis.factors.len().max(separated.basis.sources.len()) > MOST_EXPRESSIONS {
@@ -326,6 +364,11 @@ impl Separated {
             }
         }
         Radiating::Hot { nodes: maker.temperatures(part, channels), keeps }
+    }
+
+    /// What the environment is made of, where it is a map of spectra, and its scale.
+    pub fn map(&self) -> Option<(&Clusters, f64)> {
+        self.map.as_ref().map(|map| (&*map.clusters, map.scale))
     }
 
     /// The most factors of a product of paths of so many bounces: where something hot ends them, what it keeps of light is one.
@@ -381,15 +424,15 @@ impl Separated {
                 }
             });
         }
-        if !heat.is_empty() {
+        if !heat.is_empty() || self.map.is_some() {
             sources[0].get_or_insert_default();
         }
         let bits = factors.iter().zip(&sources).map(|(factor, source)| {
             let as_factor = if *factor == Factor::Mixed { 0 } else { SEPARATES_AS_FACTOR };
             as_factor | if source.is_some() { SEPARATES_AS_SOURCE } else { 0 }
         });
-        let (bits, complements) = (bits.collect(), self.complements.clone());
-        Separable { bits, factors, complements, sources, heat, has_remainder: !self.remainder.is_empty() }
+        let (bits, complements, map) = (bits.collect(), self.complements.clone(), self.map.clone());
+        Separable { bits, factors, complements, sources, heat, map, has_remainder: !self.remainder.is_empty() }
     }
 }
 
@@ -428,6 +471,18 @@ impl Maker<'_> {
         }
         terms.push(Term::Planck { material: material.name.clone(), kelvin, is_node: false });
         Expression { scale: part.weight, terms }
+    }
+
+    /// One of the spectra that a map is made of, as a source.
+    fn of_map(&mut self, number: usize, nm: &[f64], values: &[f64], scale: f64) -> u16 {
+        self.basis.spectra.push(Leaf {
+            name: format!("environment map, spectrum {number}"),
+            is_named: false,
+            quantity: String::new(),
+            curve: Curve::Linear { nm: nm.to_vec(), value: values.to_vec(), outside: Outside::Zero },
+        });
+        let terms = vec![Term::Spectrum(self.basis.spectra.len() - 1)];
+        push(&mut self.basis.sources, Expression { scale, terms })
     }
 
     /// 1 - a reflectance.
@@ -549,8 +604,8 @@ fn radiates_products(scene: &Scene, surface: &heat::Radiating) -> bool {
     lamp && surface.parts.iter().all(|part| separates_by_place(scene, part))
 }
 
-/// What of `scene`, whose heat is emission already, does not separate, in words: nothing where all does.
-pub fn obstacles(scene: &Scene, heat: &Heat) -> Vec<String> {
+/// [`remainder`] of a scene whose heat is emission already.
+fn obstacles(scene: &Scene, heat: &Heat) -> Vec<String> {
     let mut found: Vec<String> = Vec::new();
     for material in &scene.materials {
         let kind = match &material.bsdf {
@@ -569,8 +624,14 @@ pub fn obstacles(scene: &Scene, heat: &Heat) -> Vec<String> {
     if !scene.media.is_empty() {
         found.push("media".into());
     }
-    if matches!(&scene.environment, Some(environment) if environment.uniform().is_none()) {
-        found.push("the environment map".into());
+    if let Some(map) = scene.environment.as_ref().and_then(|environment| environment.map()) {
+        match map::clusters(map) {
+            None => found.push("the environment map, which is of colours".into()),
+            Some(clusters) if clusters.left.is_some() => {
+                found.push(format!("what {} spectra leave of the environment map", clusters.spectra.len()));
+            }
+            Some(_) => {}
+        }
     }
     if !heat.by_angle.is_empty() {
         found.push("heat of surfaces whose front and back differ, or by angle".into());

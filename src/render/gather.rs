@@ -13,7 +13,7 @@ use smallvec::{SmallVec, smallvec};
 use crate::cube::{Weights, random_of, systematic};
 use crate::device::instructions::{
     FIRST_RAW_OP, MODE_ADD, MODE_ADVANCE, MODE_GATHER, MODE_KEEP, MODE_ON_F, MODE_START, OP_ABSORBED, OP_AMOUNTS,
-    OP_HELD, OP_HOLD, OP_INNER, OP_MARCH, OP_MEDIUM, OP_PLAIN, OP_PLANCK, OP_RESTORE, OP_SAVE, OP_SPECTRUM,
+    OP_HELD, OP_HOLD, OP_INNER, OP_MAP, OP_MARCH, OP_MEDIUM, OP_PLAIN, OP_PLANCK, OP_RESTORE, OP_SAVE, OP_SPECTRUM,
 };
 use crate::device::prepared::Prepared;
 use crate::device::separable::{Factor, Mixed, Separable};
@@ -327,12 +327,16 @@ impl Walker {
 
     /// What an instruction multiplies by, which takes what it uses up.
     fn value(&mut self, scene: &Separable, [word, spectra, _, parameter]: [u32; 4], factor: Factor) -> Value {
+        // `spectra` and `parameter` are what the operation has in their places.
         let source = |weight: f64, source: u16| Part { weight, source: Some(source), ..Part::ONE };
         match word & 0x3f {
             OP_PLANCK if spectra != 0 => {
                 let nodes = scene.nodes(spectra).at(f64::from(f32::from_bits(parameter)));
                 let sent = nodes.into_iter().filter(|(share, _)| *share > 0.0);
                 Value::Sum(sent.map(|(share, node)| source(share, node)).collect())
+            }
+            OP_MAP if scene.has_map() => {
+                Value::Sum(scene.map_at(spectra, parameter).map(|(of_map, share)| source(share, of_map)).collect())
             }
             // 1 - Σ w ρ = (1 - Σ w) + Σ w (1 - ρ).
             OP_ABSORBED => {

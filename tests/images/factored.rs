@@ -5,7 +5,7 @@ use glam::DVec3;
 use spectile::device::separable;
 use spectile::render::wave::Budget;
 use spectile::scene::{
-    Bsdf, Cone, Filter, Profile, Roughness, Scene, Sides, Spectrum, TextureKind, Wavelengths, Weight,
+    Bsdf, Cone, Filter, Profile, Roughness, Scene, Sides, Spectrum, Texels, TextureKind, Wavelengths, Weight,
 };
 use spectile::spectral::{Channels, Curve, Outside};
 
@@ -269,36 +269,92 @@ fn heat_by_place_follows_paints_and_lamps() {
     assert_rendered_as_reference("heat by place", &relit, &wanted, 64 * epochs, bound);
 }
 
-/// The very same paths bring what they bring in channels so narrow that Planck's law is the same all over them, to what interpolation
-/// between temperatures leaves; beside metals that are hot by place, which do not separate, too.
+/// The very same paths bring what they bring in channels so narrow that nothing changes within them, to `bound` of the brightest pixel.
+fn is_that_of_channels(what: &str, scene: Scene, nm: [f64; 5], bound: f32) {
+    let mut scene = Scene { channels: Channels::from_bounds(nm.map(|nm| [nm, nm + 0.01]).to_vec(), None), ..scene };
+    scene.integrator.wavelengths = Wavelengths::Uniform;
+    let in_channels = render_paths_of_weights(&scene, 2, 64, Settings::default());
+    let weights = render(&scene.clone().factored(), 2, 64, Settings::default());
+    assert_eq!(in_channels.rays, weights.rays);
+    for k in 0..nm.len() {
+        let of = |means: &[Vec<f32>]| means.iter().map(|pixel| pixel[k]).collect::<Vec<f32>>();
+        let (a, b) = (of(&in_channels.means), of(&weights.means));
+        let peak = a.iter().copied().fold(0.0, f32::max);
+        assert!(peak > 0.0);
+        let worst = a.iter().zip(&b).map(|(a, b)| (a - b).abs() / peak).fold(0.0, f32::max);
+        println!("{what}, {k}: {worst:e} of the peak");
+        assert!(worst <= bound, "{what}, {k}: {worst:e}");
+    }
+}
+
+/// To what interpolation between temperatures leaves; beside metals that are hot by place, which do not separate, too.
 #[test]
 fn heat_by_place_is_that_of_channels() {
-    let channels = Channels::from_bounds([3e3, 5e3, 8e3, 12e3, 20e3].map(|nm| [nm, nm + 0.01]).to_vec(), None);
-    for beside_a_metal in [false, true] {
-        let mut scene = Scene { channels: channels.clone(), ..dull_places() };
-        scene.integrator.wavelengths = Wavelengths::Uniform;
-        if beside_a_metal {
-            let [eta, k] = [2.0, 5.0].map(|value| {
-                scene.spectra.push(Spectrum { name: "metal".into(), curve: Curve::Constant(value), definition: None });
-                scene.spectra.len() - 1
-            });
-            let roughness = Roughness::Constant([0.3; 2]);
-            scene.materials[2].bsdf = Bsdf::Conductor { eta, k, roughness, energy_compensation: true };
-        }
-        assert_eq!(separable::has_remainder(&scene), beside_a_metal);
-        let in_channels = render_paths_of_weights(&scene, 2, 64, Settings::default());
-        let weights = render(&scene.clone().factored(), 2, 64, Settings::default());
-        assert_eq!(in_channels.rays, weights.rays);
-        for k in 0..channels.len() {
-            let of = |means: &[Vec<f32>]| means.iter().map(|pixel| pixel[k]).collect::<Vec<f32>>();
-            let (a, b) = (of(&in_channels.means), of(&weights.means));
-            let peak = a.iter().copied().fold(0.0, f32::max);
-            assert!(peak > 0.0);
-            let worst = a.iter().zip(&b).map(|(a, b)| (a - b).abs() / peak).fold(0.0, f32::max);
-            println!("{k}: {worst:e} of the peak");
-            assert!(worst <= 1e-4, "{k}: {worst:e}");
-        }
+    let nm = [3e3, 5e3, 8e3, 12e3, 20e3];
+    is_that_of_channels("all", dull_places(), nm, 1e-4);
+    let mut scene = dull_places();
+    let [eta, k] = [2.0, 5.0].map(|value| {
+        scene.spectra.push(Spectrum { name: "metal".into(), curve: Curve::Constant(value), definition: None });
+        scene.spectra.len() - 1
+    });
+    scene.materials[2].bsdf =
+        Bsdf::Conductor { eta, k, roughness: Roughness::Constant([0.3; 2]), energy_compensation: true };
+    assert!(!separable::remainder(&scene).is_empty());
+    is_that_of_channels("beside metals", scene, nm, 1e-4);
+}
+
+/// A diffuse corner, a mirror if it is wanted, and a map of three spectra, of which texels have shares; with a per cent of something else
+/// in each band.
+fn under_a_map(noise: f32, with_a_mirror: bool) -> Scene {
+    const BANDS: usize = 13;
+    let nm: Vec<f64> = (0..BANDS).map(|i| 380.0 + 30.0 * i as f64).collect();
+    let spectrum = |k: usize, i: usize| match k {
+        0 => 0.2 + 0.05 * i as f32,
+        1 => (-(i as f32) / 3.0).exp(),
+        _ => 0.1 + (0.9 * i as f32).sin().powi(2),
+    };
+    let share = |t: usize, k: usize| if t < 3 { f32::from(u8::from(t == k)) } else { ((t * (k + 2)) % 7) as f32 / 3.0 };
+    let off = |t: usize, i: usize| 1.0 + noise * (((t * 31 + i * 17) % 11) as f32 / 5.0 - 1.0);
+    let value = |t: usize, i: usize| (0..3).map(|k| share(t, k) * spectrum(k, i)).sum::<f32>() * off(t, i);
+    let radiance: Vec<f32> = (0..32 * BANDS).map(|at| value(at / BANDS, at % BANDS)).collect();
+    let builder = corner()
+        .diffuse(
+            quad(DVec3::new(-2.0, -1.0, 2.0), 4.0 * DVec3::X, 4.0 * DVec3::NEG_Z),
+            table(&[400.0, 700.0], &[0.2, 0.8]),
+        )
+        .diffuse(sphere(DVec3::new(-0.5, -0.6, 0.2), 0.3), 0.6)
+        .map([8, 4], Texels::Spectral { nm, radiance: radiance.into() });
+    if with_a_mirror { builder.conductor(sphere(DVec3::new(0.6, -0.6, 0.2), 0.3), 0.3, 3.0, [0.0; 2]) } else { builder }
+        .build()
+}
+
+/// Maps of a few spectra are products; what these leave of others is of the remainder, and so is all of them that a mirror shows.
+#[test]
+fn maps_are_those_of_channels() {
+    let nm = [410.0, 475.0, 530.0, 610.0, 690.0];
+    for (what, scene, has_remainder) in [
+        ("three spectra", under_a_map(0.0, false), false),
+        ("a mirror", under_a_map(0.0, true), true),
+        ("noise", under_a_map(0.01, false), true),
+        ("noise and a mirror", under_a_map(0.01, true), true),
+    ] {
+        assert_eq!(!separable::remainder(&scene).is_empty(), has_remainder, "{what}");
+        // Shares of a texel are within 1e-5 of it.
+        is_that_of_channels(what, scene, nm, 2e-5);
     }
+}
+
+/// Rendered in narrow channels, relit in others: as the reference has it.
+#[test]
+fn maps_follow_channels() {
+    let scene = under_a_map(0.0, false);
+    let channels = Channels::from_bounds(vec![[400.0, 500.0], [540.0, 550.0], [550.0, 700.0]], None);
+    let narrow = Scene { channels: Channels::equal(600.0, 610.0, 2), ..scene.clone() };
+    let epochs = size::either(16, 256);
+    let relit =
+        render_relit(&narrow, &basis(&scene), &channels, epochs, 64, Settings { seed: 5, ..Settings::default() });
+    let bound = Bound { resolution: size::either(0.2, 0.1), allowance: 2e-5 };
+    assert_rendered_as_reference("a map", &relit, &Scene { channels, ..scene }, 64 * epochs, bound);
 }
 
 /// Where spectra are the same all over each channel, the very same paths bring what they bring without weights.

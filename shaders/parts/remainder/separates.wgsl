@@ -50,6 +50,10 @@ fn is_of_remainder(record: vec4<u32>, mixed: ptr<function, Mixed>) -> bool {
         is_value_mixed = (separates[record.y & 0xffffu] & SEPARATES_AS_FACTOR) == 0u;
     } else if (operation == OP_PLANCK) {
         is_value_mixed = record.y == 0u;
+#if MAP_SEPARATES
+    } else if (operation == OP_MAP) {
+        is_value_mixed = false;
+#endif
     } else if (operation == OP_HELD) {
         is_value_mixed = (*mixed).held;
     } else if (operation == OP_ABSORBED) {

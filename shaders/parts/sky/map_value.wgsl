@@ -33,11 +33,23 @@ fn map_texel(texel: u32, axis: vec4<f32>) -> vec4<f32> {
 #endif
 
 fn map_value(cell: u32, fractions: u32, axis: vec4<f32>) -> vec4<f32> {
+    return map_between(0u, cell, fractions, axis);
+}
+
+#if MAP_LEFT
+// What sources of products leave of it.
+fn map_left(cell: u32, fractions: u32, axis: vec4<f32>) -> vec4<f32> {
+    return map_between(MAP_WIDTH * MAP_HEIGHT, cell, fractions, axis);
+}
+#endif
+
+// Between the texels from `first` on.
+fn map_between(first: u32, cell: u32, fractions: u32, axis: vec4<f32>) -> vec4<f32> {
     let column = cell & 0xffffu;
     let row = cell >> 16u;
     let right = select(column + 1u, 0u, column + 1u == MAP_WIDTH);
-    let upper = (max(row, 1u) - 1u) * MAP_WIDTH;
-    let lower = min(row, MAP_HEIGHT - 1u) * MAP_WIDTH;
+    let upper = first + (max(row, 1u) - 1u) * MAP_WIDTH;
+    let lower = first + min(row, MAP_HEIGHT - 1u) * MAP_WIDTH;
     let f = vec2<f32>(vec2<u32>(fractions & 0xffffu, fractions >> 16u)) / 65535.0;
     let a = map_texel(upper + column, axis);
     let b = map_texel(upper + right, axis);

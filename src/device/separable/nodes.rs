@@ -3,14 +3,15 @@
 
 use crate::spectral::{Channels, planck};
 
-/// The most that what is interpolated is off, relative to what is sent at that temperature.
-const BOUND: f64 = 1e-4;
+/// The most that what is interpolated is off, relative to what is sent at that temperature: 1e-4, a little of which is left to wavelengths
+/// between those that are looked at.
+const BOUND: f64 = 0.9e-4;
 /// And what is that much less than the hottest place sends need not be so right.
 const DARK: f64 = 1e-3;
 /// Wavelengths, spread over the channels, at which that is asked for.
-const WAVELENGTHS: usize = 16;
+const WAVELENGTHS: usize = 48;
 /// Steps by which the next node is searched for.
-const HALVINGS: usize = 30;
+const HALVINGS: usize = 16;
 
 /// Temperatures, ascending, each with the number of its source.
 #[derive(Debug, Clone, PartialEq)]
@@ -88,7 +89,7 @@ mod tests {
     fn what_is_between_nodes_is_right_to_the_bound() {
         for (least, most, [from, to], count) in [
             (250.0, 350.0, [3e3, 14e3], 20..200),
-            (0.0, 350.0, [8e3, 12e3], 20..200),
+            (0.0, 350.0, [8e3, 12e3], 20..500),
             (500.0, 2500.0, [400.0, 5e3], 100..2000),
         ] {
             let channels = Channels::equal(from, to, 10);
