@@ -198,6 +198,7 @@ def relight(
     channels: Mapping[str, Any] | None = None,
     responses: Any = None,
     without_remainder: bool = False,
+    devices: str | int | list[int] | None = None,
     overwrite: bool = False,
     **named: Any,
 ) -> Cube:
@@ -209,6 +210,7 @@ def relight(
     temperatures: of materials by name, K. channels: as in a scene, such as {"equal": {"from": 400, "to": 700, "count": 30}}.
     responses: channels that are bands of a sensor, as `sensor` takes them.
     without_remainder: leave out what does not separate, which else is as it was rendered, and known only in unions of its channels.
+    devices: make radiance on these, as `render` takes them, and not on the processor; the last bits of values may differ.
     out: the cube to make; None for a temporary one.
 
     >>> from spectile import render
@@ -235,6 +237,7 @@ def relight(
     try:
         arguments = ["relight", f"--output={path}", *_work.option("overwrite", bool(overwrite))]
         arguments += _work.option("without-remainder", bool(without_remainder))
+        arguments += _work.option("devices", None if devices is None else _work.chosen(devices))
         twice = sorted(set(named) & set(spectra or {}))
         if twice:
             raise UsageError(f"relight: `{twice[0]}` is given twice, by itself and in `spectra`")

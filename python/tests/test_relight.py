@@ -24,6 +24,8 @@ def test_weights_are_the_bytes_of_the_program(weights, tmp_path):
     relit = sp.relight(weights, tmp_path / "b.zarr", spectra={"paint": 0.25})
     assert content(tmp_path / "a.zarr") == content(tmp_path / "b.zarr")
     assert relit.radiance.shape == (6, 16, 16)
+    by_device = sp.relight(weights, spectra={"paint": 0.25}, devices=1)
+    assert numpy.allclose(by_device.radiance, relit.radiance, rtol=2e-6, atol=0)
 
 
 def test_spectra_are_taken_as_scenes_take_them(weights):

@@ -7,8 +7,10 @@ use serde_json::json;
 use super::Output;
 use super::scene::parse_override;
 use super::sensor::refuse_itself;
-use crate::cube::{self, Cube, Existing, NewCube, Relighted};
+use crate::cube::{self, Cube, Existing, Expand, NewCube, Relighted};
 use crate::files::shown;
+use crate::gpu::adapter::Selection;
+use crate::render::expand::Devices;
 use crate::scene::{self, Files, NewChannels, Relit};
 use crate::{Error, Result};
 
@@ -53,6 +55,12 @@ pub struct Args {
     #[arg(long)]
     pub without_remainder: bool,
 
+    /// Make radiance on devices instead of the processor's cores: all, a number, or positions as `spectile devices` lists them
+    ///
+    /// As for `render`. Sums are made in the same order, but a device may round otherwise: values differ in their last bits.
+    #[arg(long, value_name = "all|N|LIST")]
+    pub devices: Option<Selection>,
+
     /// The cube to make, a folder
     #[arg(short, long, value_name = "OUT.zarr")]
     pub output: PathBuf,
@@ -88,12 +96,14 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         output.warn(warning)?;
     }
     let existing = if args.overwrite { Existing::Replace } else { Existing::Refuse };
+    let devices = args.devices.as_ref().map(Devices::open).transpose()?;
     let found = super::progress::watched(output, |progress| {
         let new = NewCube {
             basis: &relit.basis,
             channels: &relit.channels,
             changed: &relit.changed,
             without_remainder: args.without_remainder,
+            by: devices.as_ref().map(|devices| devices as &dyn Expand),
         };
         cube::relight(&cube, new, &args.output, existing, progress)
     })?;
@@ -119,6 +129,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
             "remainder_share": found.remainder.as_ref().map(|share| share.of_channels()),
             "entries_per_pixel": found.entries as f64 / found.pixels.max(1) as f64,
             "expand_s": found.expand_s,
+            "devices": devices.as_ref().map(Devices::names),
         }),
     )?;
     output.text(&text)

@@ -10,6 +10,7 @@ use super::create::{Aside, Existing};
 use super::metadata::{DERIVED, FACTORED, Header};
 use super::remainder::{RemainderShare, Unions, left_out};
 use super::store::Cube;
+use super::weights::Expand;
 use super::writer::Writer;
 use crate::Result;
 use crate::spectral::Channels;
@@ -19,7 +20,7 @@ use crate::spectral::product::{Basis, Expander};
 const TOGETHER: u32 = 64;
 
 /// The cube that is wanted of a factored one.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub struct NewCube<'a> {
     /// What its products are made of, and in which channels.
     pub basis: &'a Basis,
@@ -28,6 +29,8 @@ pub struct NewCube<'a> {
     pub changed: &'a [String],
     /// Without what does not separate.
     pub without_remainder: bool,
+    /// What makes radiance, if that is not the processor.
+    pub by: Option<&'a dyn Expand>,
 }
 
 /// What there is to say of a relit cube.
@@ -72,7 +75,7 @@ pub fn relight(
     existing: Existing,
     progress: &mut dyn FnMut(u64, u64) -> Result<()>,
 ) -> Result<Relighted> {
-    let NewCube { basis, channels, changed, without_remainder } = new;
+    let NewCube { basis, channels, changed, without_remainder, by } = new;
     let has_remainder = cube.header().has_remainder();
     let unions = (has_remainder && !without_remainder).then(|| Unions::of(cube, channels)).transpose()?;
     let expander = Expander::new(basis, channels, cube.header().most_factors());
@@ -101,7 +104,7 @@ pub fn relight(
             .clone()
             .into_par_iter()
             .map(|tile| {
-                let made = expand(cube, &expander, unions.as_ref(), tile)?;
+                let made = expand(cube, &expander, unions.as_ref(), by, tile)?;
                 if let Some(made) = &made {
                     if let Some(layers) = cube.tile_layers(tile)? {
                         writer.lay(tile, layers);
@@ -141,15 +144,27 @@ pub fn relight(
 }
 
 /// A tile under other spectra; `None` before its first unit.
-fn expand(cube: &Cube, expander: &Expander, unions: Option<&Unions>, tile: u32) -> Result<Option<Tile>> {
+fn expand(
+    cube: &Cube,
+    expander: &Expander,
+    unions: Option<&Unions>,
+    by: Option<&dyn Expand>,
+    tile: u32,
+) -> Result<Option<Tile>> {
     let samples = cube.samples(tile)?;
     let (Some(weights), 1..) = (cube.state().weights(tile)?, samples) else { return Ok(None) };
     let (size, rect, channels) = (cube.header().tile, cube.grid().rect(tile), expander.channels());
     let rows = expander.rows(&weights.products);
     let began = Instant::now();
-    let mut values = weights.expanded(&rows, channels, size, rect);
-    let expand_s = began.elapsed().as_secs_f64();
-    let mut errors = weights.standard_errors(&rows, channels, size, rect, &cube.groups(samples));
+    let mut values = match by {
+        None => weights.expanded(&rows, channels, size, rect),
+        Some(by) => weights.expanded_by(by, &rows, channels, size, rect)?,
+    };
+    let (expand_s, groups) = (began.elapsed().as_secs_f64(), cube.groups(samples));
+    let mut errors = match by {
+        None => weights.standard_errors(&rows, channels, size, rect, &groups),
+        Some(by) => weights.standard_errors_by(by, &rows, channels, size, rect, &groups)?,
+    };
     let mut sums = vec![[0.0f64; 2]; channels];
     let mut remainder = [vec![0.0; channels], vec![0.0; channels]];
     if let Some(unions) = unions {

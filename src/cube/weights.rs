@@ -5,10 +5,11 @@ mod expand;
 
 use std::path::Path;
 
+pub use self::expand::{Entries, Expand};
+
 use smallvec::SmallVec;
 
 use super::checksums;
-use super::grid::Rect;
 use super::metadata::Header;
 use crate::spectral::product::{Expander, Product};
 use crate::{Error, Result};
@@ -509,6 +510,7 @@ pub fn systematic(importances: &[f64], most: usize, random: u64) -> Vec<(usize, 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cube::grid::Rect;
 
     fn product(source: u16, factors: &[u16]) -> Product {
         Product { factors: SmallVec::from_slice(factors), source }

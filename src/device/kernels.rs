@@ -52,6 +52,11 @@ const BOUNCE: Module = module!("passes/generate_bounce.wgsl");
 const FIRST_HITS: Module = module!("passes/first_hits.wgsl");
 const STAGES: &[Text] = &[Of(module!("common/wave.wgsl")), Parts(Place::Stage), Of(module!("passes/generate.wgsl"))];
 
+/// What makes radiance of products, for cubes that are relit; of no scene.
+pub fn expanding() -> Source {
+    compose(&[module!("passes/expand.wgsl")], &Defines::default())
+}
+
 /// What takes spectra along records.
 const EVALUATING: &[Text] = &[TYPES, FRAME, SAVED_PATHS, Of(module!("common/spectra.wgsl")), Parts(Place::Evaluate)];
 

@@ -1,5 +1,6 @@
 //! The render: plan → units → waves on a device → host merge.
 
+pub mod expand;
 #[cfg(test)]
 mod fault_tests;
 mod gather;

@@ -244,6 +244,31 @@ fn relit_cubes_are_what_renders_make() {
     }
 }
 
+/// Devices make the radiance and the standard errors that the processor makes, but for rounding.
+#[test]
+fn devices_expand_as_the_processor_does() {
+    let place = Place::of(&scene());
+    place.render("cube.zarr", &["--factored", "--uncertainty", "--spp", "256"]);
+    let relit = |name: &str, more: &[&str]| {
+        let lamp = ["--set", "spectra.lamp.blackbody=4000", "--channels", "equal.count=70", "--json"];
+        let (said, _) = place.success(&[&["relight", "cube.zarr", "-o", name], &lamp[..], more].concat());
+        (place.cube(name), said)
+    };
+    let (processor, said) = relit("processor.zarr", &[]);
+    assert!(said.contains("\"devices\":null"), "{said}");
+    let (devices, said) = relit("devices.zarr", &["--devices", "1"]);
+    assert!(said.contains("\"devices\":[\""), "{said}");
+    let [width, height] = processor.header().size;
+    for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+        let near = |a: &[f32], b: &[f32], bound: f32| {
+            a.iter().zip(b).for_each(|(a, b)| assert!((a - b).abs() <= bound * a, "{x}, {y}: {a} {b}"));
+        };
+        near(&spectrum(&processor, x, y), &spectrum(&devices, x, y), 2e-6);
+        let errors = |cube: &Cube| cube.standard_error(x, y).expect("inside").expect("there");
+        near(&errors(&processor), &errors(&devices), 1e-4);
+    }
+}
+
 /// 95 % intervals by Student's t of 7 degrees of freedom, after relighting, hold the truth in 93 to 97 %.
 #[test]
 fn intervals_of_relit_cubes_hold_the_truth() {
