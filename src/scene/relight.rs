@@ -16,7 +16,7 @@ use super::{channels, overrides};
 use crate::error::Error;
 use crate::format::response::{self, Responses};
 use crate::spectral::product::{Basis, Leaf, Term};
-use crate::spectral::{Channels, Curve, Outside};
+use crate::spectral::{Channels, Curve, Outside, planck};
 use crate::{Result, files};
 
 /// A factored cube as it was rendered.
@@ -61,6 +61,9 @@ pub struct Relit {
     pub changed: Vec<String>,
     pub warnings: Vec<String>,
 }
+
+/// What heat may be off between nodes of temperatures (docs/METHOD.md, Factored cubes), before it is told.
+const ROUGH: f64 = 1.1e-4;
 
 /// Where mistakes of an option are said to stand.
 const OPTION: &str = "--set";
@@ -123,6 +126,7 @@ pub fn relight(rendered: Rendered, sets: &[(String, String)], wanted: NewChannel
     }
     warnings.extend(more);
     warnings.extend(dark(&relit, &channels));
+    warnings.extend(rough_temperatures(&relit, &channels));
     let changed = spectra.iter().map(|name| format!("spectra.{name}"));
     let changed = changed.chain(hot.iter().map(|name| format!("materials.{name}.temperature"))).collect();
     Ok(Relit { basis: relit, channels, changed, warnings })
@@ -302,6 +306,31 @@ fn dark<'b>(basis: &'b Basis, channels: &'b Channels) -> impl Iterator<Item = St
     })
 }
 
+/// Temperatures of textures whose nodes, which were chosen for the channels of the render, are too far apart for others.
+fn rough_temperatures<'b>(basis: &'b Basis, channels: &Channels) -> impl Iterator<Item = String> + use<'b> {
+    let range = channels.hull();
+    materials(basis, true).into_iter().filter_map(move |name| {
+        let terms = basis.sources.iter().flat_map(|source| &source.terms);
+        let mut kelvin: Vec<f64> = terms
+            .filter_map(|term| match term {
+                Term::Planck { material, kelvin, is_node: true } if material == name => Some(*kelvin),
+                _ => None,
+            })
+            .collect();
+        kelvin.sort_by(f64::total_cmp);
+        let hottest = *kelvin.last()?;
+        let error = |pair: &[f64]| planck::chord_error(range.unwrap_or_default(), [pair[0], pair[1]], hottest);
+        let worst = kelvin.windows(2).map(error).fold(0.0, f64::max);
+        (worst > ROUGH).then(|| {
+            format!(
+                "heat of \"{name}\", whose temperature is a texture, is interpolated for the channels that were rendered: in these \
+                 it may be off by {:.2} %",
+                100.0 * worst
+            )
+        })
+    })
+}
+
 fn quantity(leaf: &Leaf) -> Option<Quantity> {
     Quantity::ALL.into_iter().find(|quantity| quantity.noun() == leaf.quantity)
 }
@@ -429,6 +458,28 @@ mod tests {
         let wanted = NewChannels::Set(&sets);
         let relit = relight(rendered(&cube, &channels), &[], wanted, Files::Disk).expect("channels");
         assert!(relit.warnings.iter().any(|warning| warning.contains("in none of the channels, 0.4 and 0.7 nm")));
+    }
+
+    /// Temperatures of a texture stay, and are told of where their nodes are too far apart for new channels.
+    #[test]
+    fn temperatures_of_textures_stay() {
+        let mut cube = basis();
+        for kelvin in [300.0, 301.0, 302.0] {
+            let terms = vec![Term::Planck { material: "ground".into(), kelvin, is_node: true }];
+            cube.sources.push(Expression { scale: 1.0, terms });
+        }
+        let infrared = Channels::equal(8e3, 12e3, 4);
+        let relit = |sets: &[(&str, &str)], wanted: &[(String, String)]| {
+            let sets: Vec<_> = sets.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+            relight(rendered(&cube, &infrared), &sets, NewChannels::Set(wanted), Files::Disk)
+        };
+        let warm = relit(&[("materials.wall.temperature", "320")], &[]).expect("a wall");
+        assert!(warm.warnings.iter().all(|warning| !warning.contains("ground")), "{:?}", warm.warnings);
+        let said = relit(&[("materials.ground.temperature", "320")], &[]).expect_err("a texture").to_string();
+        assert!(said.contains("\"ground\" comes from a texture"), "{said}");
+        let short = relit(&[], &[("equal.from".to_owned(), "2000".to_owned())]).expect("channels").warnings.join("\n");
+        // (x² - 2 x) / 8 (ΔT/T)², x = 24 at 2 µm.
+        assert!(short.contains("heat of \"ground\"") && short.contains("off by 0.07 %"), "{short}");
     }
 
     #[test]

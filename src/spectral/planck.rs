@@ -23,6 +23,30 @@ pub fn radiance(nm: f64, kelvin: f64) -> f64 {
     per_metre * 1e-9
 }
 
+/// What is that much less than what the hottest place sends need not be so right.
+const DARK: f64 = 1e-3;
+/// Wavelengths, spread over a range, at which [`chord_error`] looks.
+const WAVELENGTHS: usize = 48;
+
+/// How far off, in `from` to `to` nanometres, radiance is that is interpolated between what bodies of `low` and `high` kelvin send, over
+/// what is sent really, or over a thousandth of what one of `hottest` kelvin sends.
+pub fn chord_error([from, to]: [f64; 2], [low, high]: [f64; 2], hottest: f64) -> f64 {
+    let ratio = (to / from).ln() / (WAVELENGTHS - 1) as f64;
+    let at = |i: usize| {
+        let nm = from * (ratio * i as f64).exp();
+        let least = DARK * radiance(nm, hottest);
+        let [below, above] = [low, high].map(|kelvin| radiance(nm, kelvin));
+        let off = |share: f64| {
+            let real = radiance(nm, low + share * (high - low));
+            let error = (below + share * (above - below) - real).abs();
+            // Where f32 would have nothing either.
+            if error > 0.0 { error / real.max(least).max(f64::MIN_POSITIVE) } else { 0.0 }
+        };
+        [0.25, 0.5, 0.75].into_iter().map(off).fold(0.0, f64::max)
+    };
+    (0..WAVELENGTHS).map(at).fold(0.0, f64::max)
+}
+
 #[cfg(test)]
 mod tests {
     use super::radiance;

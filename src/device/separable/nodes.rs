@@ -6,10 +6,6 @@ use crate::spectral::{Channels, planck};
 /// The most that what is interpolated is off, relative to what is sent at that temperature: 1e-4, a little of which is left to wavelengths
 /// between those that are looked at.
 const BOUND: f64 = 0.9e-4;
-/// And what is that much less than the hottest place sends need not be so right.
-const DARK: f64 = 1e-3;
-/// Wavelengths, spread over the channels, at which that is asked for.
-const WAVELENGTHS: usize = 48;
 /// Steps by which the next node is searched for.
 const HALVINGS: usize = 16;
 
@@ -46,19 +42,8 @@ impl Nodes {
 /// Nodes for temperatures from `least` to `most` kelvin, so few that chords between them are right to [`BOUND`] in the range of `channels`.
 /// Where `least` is 0 there is none for that.
 pub fn between(least: f64, most: f64, channels: &Channels) -> Vec<f64> {
-    let Some([first, last]) = channels.hull().filter(|_| most > 0.0) else { return vec![most] };
-    let ratio = (last / first).ln() / (WAVELENGTHS - 1) as f64;
-    let nm: Vec<f64> = (0..WAVELENGTHS).map(|i| first * (ratio * i as f64).exp()).collect();
-    let hottest: Vec<f64> = nm.iter().map(|&nm| planck::radiance(nm, most)).collect();
-    let is_right = |from: f64, to: f64| {
-        nm.iter().zip(&hottest).all(|(&nm, hottest)| {
-            let [low, high] = [from, to].map(|kelvin| planck::radiance(nm, kelvin));
-            [0.25, 0.5, 0.75].into_iter().all(|share| {
-                let real = planck::radiance(nm, from + share * (to - from));
-                (low + share * (high - low) - real).abs() <= BOUND * real.max(DARK * hottest)
-            })
-        })
-    };
+    let Some(range) = channels.hull().filter(|_| most > 0.0) else { return vec![most] };
+    let is_right = |from: f64, to: f64| planck::chord_error(range, [from, to], most) <= BOUND;
     let mut nodes = vec![most];
     loop {
         let upper = nodes[nodes.len() - 1];
