@@ -5,7 +5,8 @@ use glam::DVec3;
 use spectile::device::separable;
 use spectile::render::wave::Budget;
 use spectile::scene::{
-    Bsdf, Cone, Filter, Profile, Roughness, Scene, Sides, Spectrum, Texels, TextureKind, Wavelengths, Weight,
+    Bsdf, Cone, Filter, Profile, Reflectance, Roughness, Scene, Sides, Spectrum, Texels, TextureKind, Wavelengths,
+    Weight,
 };
 use spectile::spectral::{Channels, Curve, Outside};
 
@@ -301,6 +302,12 @@ fn heat_by_place_is_that_of_channels() {
         Bsdf::Conductor { eta, k, roughness: Roughness::Constant([0.3; 2]), energy_compensation: true };
     assert!(!separable::remainder(&scene).is_empty());
     is_that_of_channels("beside metals", scene, nm, 1e-4);
+    // A lamp and a paint of the same numbers are one spectrum of a scene.
+    let mut scene = dull_places();
+    let Bsdf::Diffuse { reflectance: Reflectance::Spectrum(paint) } = scene.materials[0].bsdf else { unreachable!() };
+    let lamps = scene.objects.iter_mut().filter_map(|object| object.emission.as_mut());
+    lamps.filter(|lamp| lamp.texture.is_none()).for_each(|lamp| lamp.radiance = paint);
+    is_that_of_channels("a lamp of paint", scene, nm, 1e-4);
 }
 
 /// A diffuse corner, a mirror if it is wanted, and a map of three spectra, of which texels have shares; with a per cent of something else
