@@ -32,8 +32,11 @@ pub struct Clusters {
     pub left: Option<Vec<f32>>,
 }
 
+/// A map's radiance, and what it is made of.
+type Known = (Weak<[f32]>, Arc<Clusters>);
+
 /// Those of maps that somebody has still.
-static KNOWN: Mutex<Vec<(Weak<[f32]>, Arc<Clusters>)>> = Mutex::new(Vec::new());
+static KNOWN: Mutex<Vec<Known>> = Mutex::new(Vec::new());
 
 /// Of a map of spectra; `None` of one of colours, which are no sums of some.
 pub fn clusters(map: &EnvironmentMap) -> Option<Arc<Clusters>> {
