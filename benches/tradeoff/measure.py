@@ -4,10 +4,12 @@ makes of it.
     measure.py --spectile PROGRAM [-o FOLDER] [--scenes NAMES] [--channels K,K] [--choices NAMES]
                [--rounds N] [--minutes N] [--gas FOLDER]
 
-What was measured is kept in FOLDER/measured.jsonl, a line a render, and not measured again: so it can be done in parts. Each choice renders the same picture for some epochs. Time is the median of the epochs'
-after the first, so compilation and the pilot are apart; processor time on software devices. The choices of a scene and number of channels take turns. Error is the cube's own estimate from the spread of its epochs, one for each channel:
-efficiency is 1 / (mean over channels of error² x time a path), of which ratios to all paths at one wavelength are told. Needs nothing
-but Python 3.9 and the program.
+What was measured is kept in FOLDER/measured.jsonl, a line a render, and not measured again: so it can be done in parts. Each choice
+renders the same picture for some epochs; in rounds after the first for fewer, of which only the time counts. Time is the median of the
+epochs' after the first, so compilation and the pilot are apart, and then of the rounds; processor time on software devices. The choices
+of a scene and number of channels take turns. Error is the cube's own estimate from the spread of its epochs, one for each channel: the
+choices have the same seed, and so the same paths. Efficiency is 1 / (mean over channels of error² x time a path), of which ratios to all
+paths at one wavelength are told. Needs nothing but Python 3.9 and the program.
 """
 
 import argparse
@@ -30,6 +32,8 @@ SCENES += ["conference/conference-bands", "aircraft/aircraft-bands"]
 # and 0.01 cm-1, 25,000 nodes at each of five temperatures; CO as of a poor combustion.
 LINES = ["lbl_co_2000-2300cm_1atm.csv", "lbl_h2o_2000-2100cm_1atm.csv"]
 EPOCH, EPOCHS = 16, 16
+# Epochs of a render that is only timed.
+TIMED = 6
 SIZE = "32x20"
 
 
@@ -117,13 +121,13 @@ class Program:
         file.write_text("\n".join(["band,wavelength_nm,response", *rows, ""]))
         return file
 
-    def render(self, scene, channels, choice, seed):
-        """Seconds a path, error of every channel, what was chosen."""
+    def render(self, scene, channels, choice, turn):
+        """Seconds a path, error of every channel (of the first turn), what was chosen."""
         file, set_in_scene = self.of_scene(scene, channels)
         cube = self.folder / "cube.zarr"
         shutil.rmtree(cube, ignore_errors=True)
         settings = {**choice.settings, "epoch": EPOCH}
-        arguments = ["render", str(file), "-o", str(cube), "--size", SIZE, "--seed", str(seed), "--json"]
+        arguments = ["render", str(file), "-o", str(cube), "--size", SIZE, "--json"]
         for setting in set_in_scene:
             arguments += ["--set", setting]
         for name, value in settings.items():
@@ -137,13 +141,13 @@ class Program:
             written["scale"] *= choice.scale
             chosen.write_text(json.dumps(written))
             arguments.append("--resume")
-        ends = [seconds for event, seconds in self.timed(*arguments, "--spp", str(EPOCH * EPOCHS)) if event["event"] == "epoch"]
+        ends = [seconds for event, seconds in self.timed(*arguments, "--spp", str(EPOCH * (TIMED if turn else EPOCHS))) if event["event"] == "epoch"]
         ends = [seconds for seconds in ends if not math.isnan(seconds)]
         # Setting up is before the end of the first.
         width, height = map(int, SIZE.split("x"))
         seconds = statistics.median(after - before for before, after in zip(ends, ends[1:])) / (EPOCH * width * height)
         info = self.run("info", str(cube), "--json")[-1]
-        errors = [channel["error_estimate"] for channel in info["channels"]]
+        errors = None if turn else [channel["error_estimate"] for channel in info["channels"]]
         return seconds, errors, info["choices"]
 
 
@@ -227,8 +231,7 @@ def row(scene, channels, choice, turns, base):
         return {**result, "note": turns, "text": f"{result['scene']} {channels} {choice.name}: {turns}"}
     seconds = statistics.median(turn[0] for turn in turns)
     of_all = statistics.median(turn[0] for turn in base)
-    # Of each channel: mean of error² over the turns, whose seeds differ.
-    squares = [[statistics.fmean(turn[1][k] ** 2 for turn in several) for k in range(channels)] for several in (turns, base)]
+    squares = [[error**2 for error in next(turn[1] for turn in several if turn[1])] for several in (turns, base)]
     lit = [k for k in range(channels) if squares[1][k] > 0]
     growth = [squares[0][k] / squares[1][k] for k in lit]
     chosen = turns[0][2] or {}
@@ -265,7 +268,7 @@ def fewer(rows):
 FIELDS = ["scene", "channels", "choice", "microseconds", "error", "time", "variance", "worst_variance", "gain", "predicted", "wavelengths", "evaluated", "scale", "note"]
 
 
-def page(rows, device):
+def page(rows, device, rounds):
     """One file with tables, and a drawing of gain against s for every scene."""
 
     def cell(value):
@@ -279,7 +282,7 @@ def page(rows, device):
     parts = [f"<!doctype html><meta charset=utf-8><title>Paths against evaluations</title><style>{style}</style>"]
     parts.append("<h1>Paths against evaluations</h1>")
     parts.append(
-        f"<p>{html.escape(device)}; {SIZE} pixels, {EPOCH * EPOCHS} samples each. <i>Gain</i>: error² x time of all paths at one wavelength a "
+        f"<p>{html.escape(device)}; {SIZE} pixels, {EPOCH * EPOCHS} samples each, {rounds} rounds of times. <i>Gain</i>: error² x time of all paths at one wavelength a "
         "channel, over that of the choice; <i>predicted</i>: by the pilot, before the render. Made by benches/tradeoff/run.</p>"
     )
     parts.append("<h2>Fewer wavelengths than channels: n of K a path</h2><p>Efficiency over that of all K, from the measured times.</p>")
@@ -336,7 +339,7 @@ def main():
     parser.add_argument("-o", "--output", type=pathlib.Path, default=pathlib.Path("out/tradeoff"))
     parser.add_argument("--scenes", default=",".join(SCENES))
     parser.add_argument("--channels", default="8,32,128,512")
-    parser.add_argument("--rounds", type=int, default=1, help="turns of every choice, with other seeds: medians of times")
+    parser.add_argument("--rounds", type=int, default=1, help="turns of every choice: medians of times")
     parser.add_argument("--choices", help="only these, such as all,auto")
     parser.add_argument("--minutes", type=float, default=math.inf, help="begins no render after these; the next call goes on")
     parser.add_argument("--gas", type=pathlib.Path, default=pathlib.Path("../shared/data/gas"), help=f"where {' and '.join(LINES)} are")
@@ -356,7 +359,7 @@ def main():
         writer = csv.DictWriter(file, FIELDS, extrasaction="ignore")
         writer.writeheader()
         writer.writerows(rows)
-    (arguments.output / "tradeoff.html").write_text(page(rows, program.device))
+    (arguments.output / "tradeoff.html").write_text(page(rows, program.device, arguments.rounds))
 
 
 if __name__ == "__main__":

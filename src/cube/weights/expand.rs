@@ -47,6 +47,9 @@ struct OfGroups {
     divisor: f64,
 }
 
+/// Values of a block of channels, of all products, that a processor's second cache surely holds.
+const MOST_PACKED: usize = 1 << 18;
+
 /// The sums over the entries of `pixels`, in every channel, once with each of `sets` of weights. A block of channels of all rows stays in
 /// the cache while the pixels go by, and a pixel's sums stay in registers; they are added in the order of the entries, so that the bits are
 /// those of any machine.
@@ -66,6 +69,10 @@ impl<F: FnMut(usize, usize, &[f32])> WithSimd for Sums<'_, F> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) {
+        let widest = 8 * S::F32_LANES;
+        if widest * self.weights.products.len() > MOST_PACKED {
+            return self.whole_rows();
+        }
         let mut from = 0;
         while from < self.channels {
             from += match (self.channels - from).div_ceil(S::F32_LANES) {
@@ -79,6 +86,32 @@ impl<F: FnMut(usize, usize, &[f32])> WithSimd for Sums<'_, F> {
 }
 
 impl<F: FnMut(usize, usize, &[f32])> Sums<'_, F> {
+    /// A pixel after the other, in all channels: of so many products that each is in a few pixels only, and no block of them stays in the cache.
+    #[inline(always)]
+    fn whole_rows(&mut self) {
+        let channels = self.channels;
+        let row = |i: usize| &self.rows[self.weights.product[i] as usize * channels..][..channels];
+        let mut sums = vec![0.0f32; channels * self.sets.len()];
+        for (n, &pixel) in self.pixels.iter().enumerate() {
+            let entries = self.weights.entries(pixel);
+            let in_fours = entries.end - entries.len() % 4;
+            for (set, sums) in self.sets.iter().zip(sums.chunks_exact_mut(channels)) {
+                sums.fill(0.0);
+                // So that what is summed is loaded and stored once for four.
+                for i in (entries.start..in_fours).step_by(4) {
+                    let rows = row(i).iter().zip(row(i + 1)).zip(row(i + 2)).zip(row(i + 3));
+                    for (sum, (((a, b), c), d)) in sums.iter_mut().zip(rows) {
+                        *sum = *sum + set[i] * a + set[i + 1] * b + set[i + 2] * c + set[i + 3] * d;
+                    }
+                }
+                for i in in_fours..entries.end {
+                    sums.iter_mut().zip(row(i)).for_each(|(sum, value)| *sum += set[i] * value);
+                }
+            }
+            (self.put)(n, 0, &sums);
+        }
+    }
+
     /// So many vectors of channels; gives the channels that are done.
     #[inline(always)]
     fn block<S: Simd, const VECTORS: usize>(&mut self, simd: S, from: usize) -> usize {
@@ -257,7 +290,7 @@ mod tests {
     use super::*;
     use crate::spectral::product::Product;
 
-    /// Blocks of channels of every width, in the order of a chunk: the bits of a pixel alone.
+    /// Blocks of channels of every width and whole rows, in the order of a chunk: the bits of a pixel alone.
     #[test]
     fn blocks_have_the_bits_of_single_pixels() {
         let number = |i: usize| ((i * 7919) % 1013) as f32 / 97.0;
@@ -265,8 +298,16 @@ mod tests {
         let (tile, rect) = ([3, 4], Rect { x0: 3, y0: 4, x1: 5, y1: 7 });
         let entries =
             |pixel: usize| (0..5 * pixel).map(move |i| (product((i + pixel) % 71), f64::from(number(i * pixel))));
-        let weights = Weights::of_pixels((0..12).map(entries));
-        for channels in [1, 4, 7, 16, 31, 64, 100, 129, 300] {
+        let few = Weights::of_pixels((0..12).map(entries));
+        // One pixel, beyond the picture, has more products than a cache.
+        let several = |pixel: usize| match pixel {
+            11 => (0..MOST_PACKED / 8).map(|i| (product(i), 1.0)).collect::<Vec<_>>(),
+            pixel => entries(pixel).collect(),
+        };
+        let many = Weights::of_pixels((0..12).map(|pixel| several(pixel).into_iter()));
+        for (weights, channels) in
+            [1, 4, 7, 16, 31, 64, 100, 129, 300].into_iter().flat_map(|k| [(&few, k), (&many, k)])
+        {
             let rows: Vec<f32> = (0..weights.products.len() * channels).map(number).collect();
             let all = weights.expanded(&rows, channels, tile, rect);
             let mut want = vec![0.0; channels];
