@@ -94,6 +94,19 @@ impl Mesh {
         self.normals = Some(normals.into_iter().map(DVec3::normalize_or_zero).collect());
     }
 
+    /// With coordinates of its own for each triangle, of its three corners, where it has none.
+    pub fn lay_out(&mut self, corners: [DVec2; 3]) {
+        if self.uv.is_some() {
+            return;
+        }
+        let vertices = || self.triangles.iter().flatten().map(|i| *i as usize);
+        let positions = vertices().map(|i| self.positions[i]).collect();
+        let normals = self.normals.as_ref().map(|normals| vertices().map(|i| normals[i]).collect());
+        let uv = self.triangles.iter().flat_map(|_| corners).collect();
+        let triangles = (0..self.triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+        *self = Mesh { positions, normals, uv: Some(uv), triangles };
+    }
+
     /// The other side in front.
     pub fn reverse(&mut self) {
         self.triangles.iter_mut().for_each(|t| t.swap(1, 2));

@@ -16,7 +16,8 @@ use crate::spectral::Curve;
 pub struct Matter {
     pub absorption: Curve,
     pub scattering: Curve,
-    pub phase: Phase,
+    /// Each with its share of what is scattered, all of which are 1 together.
+    pub phases: Vec<(f64, Phase)>,
 }
 
 pub enum Phase {
@@ -41,17 +42,34 @@ pub fn is_within(curve: &Curve, range: RangeInclusive<f64>) -> bool {
 /// Adds a medium of the name nearest to `wanted`; gives that.
 pub fn put(scene: &mut Scene, wanted: &str, matter: &Matter) -> Result<String> {
     let name = scene.material_name(wanted);
-    let mut section = Section::new(format!("[media.{}]", text::key(&name)));
-    let is_none = |curve: &Curve| matches!(curve, Curve::Constant(0.0));
-    if !is_none(&matter.absorption) || is_none(&matter.scattering) {
+    let is_none = |curve: &Curve| match curve {
+        Curve::Constant(value) => *value == 0.0,
+        Curve::Linear { value, .. } => value.iter().all(|value| *value == 0.0),
+        Curve::Blackbody { .. } => false,
+    };
+    let phases = if is_none(&matter.scattering) { &[] } else { &matter.phases[..] };
+    // Matter that scatters in several ways is as many kinds of it; what it absorbs is the first one's.
+    let header = match phases {
+        [] | [_] => format!("[media.{}]", text::key(&name)),
+        _ => format!("[[media.{}.components]]", text::key(&name)),
+    };
+    let mut section = Section::new(&header);
+    if !is_none(&matter.absorption) || phases.is_empty() {
         section.set("absorption", scene.spectrum(&matter.absorption, &format!("{name}-absorption"))?);
     }
-    if !is_none(&matter.scattering) {
-        section.set("scattering", scene.spectrum(&matter.scattering, &format!("{name}-scattering"))?);
-        match matter.phase {
+    for (i, (share, phase)) in phases.iter().enumerate() {
+        let scattering = match share {
+            1.0 => matter.scattering.clone(),
+            share => both(&matter.scattering, &Curve::Constant(*share), |all, share| share * all),
+        };
+        section.set("scattering", scene.spectrum(&scattering, &format!("{name}-scattering"))?);
+        match phase {
             Phase::HenyeyGreenstein(0.0) => {}
-            Phase::HenyeyGreenstein(g) => section.set("phase", format!("{{ hg = {} }}", text::rounded(g))),
+            Phase::HenyeyGreenstein(g) => section.set("phase", format!("{{ hg = {} }}", text::rounded(*g))),
             Phase::Rayleigh => section.set("phase", "{ rayleigh = 0.0 }"),
+        }
+        if i + 1 < phases.len() {
+            scene.media.push(std::mem::replace(&mut section, Section::new(&header)));
         }
     }
     scene.media.push(section);

@@ -9,7 +9,7 @@ use super::geometry::similarity;
 use super::report::Report;
 use super::text;
 use crate::format::csv_table;
-use crate::spectral::Curve;
+use crate::spectral::{Curve, Outside};
 use crate::{Error, Result};
 
 /// A table of the file.
@@ -73,6 +73,14 @@ impl Assembly {
             object.entries.iter().any(|(key, _)| ["sphere", "disk", "cylinder"].contains(&key.as_str()))
         };
         similarity(to_world.matrix3).is_some() || !self.objects.iter().any(is_round)
+    }
+}
+
+/// What a table is beyond its ends, as scenes say it.
+fn beyond(outside: Outside) -> &'static str {
+    match outside {
+        Outside::Hold => "outside = \"hold\"",
+        Outside::Zero => "outside = \"zero\"",
     }
 }
 
@@ -201,12 +209,12 @@ impl Scene {
                 Ok(format!("{{ blackbody = {}, scale = {} }}", text::number(*kelvin), text::rounded(*scale)))
             }
             Curve::Linear { nm, value, .. } if nm.len() == 1 => Ok(text::number(value[0])),
-            Curve::Linear { nm, value, .. } if nm.len() <= 6 => {
+            Curve::Linear { nm, value, outside } if nm.len() <= 6 => {
                 let samples =
                     nm.iter().zip(value).map(|(nm, v)| format!("[{}, {}]", text::rounded(*nm), text::rounded(*v)));
-                Ok(format!("{{ samples = [{}], outside = \"hold\" }}", samples.collect::<Vec<_>>().join(", ")))
+                Ok(format!("{{ samples = [{}], {} }}", samples.collect::<Vec<_>>().join(", "), beyond(*outside)))
             }
-            Curve::Linear { nm, value, .. } => {
+            Curve::Linear { nm, value, outside } => {
                 let mut table = csv_table::Table::new(["nm", "value"]);
                 nm.iter().zip(value).for_each(|(nm, value)| table.row([text::rounded(*nm), text::rounded(*value)]));
                 let content = table.finish();
@@ -218,7 +226,7 @@ impl Scene {
                         path
                     }
                 };
-                Ok(format!("{{ file = {}, outside = \"hold\" }}", text::quoted(&path)))
+                Ok(format!("{{ file = {}, {} }}", text::quoted(&path), beyond(*outside)))
             }
         }
     }

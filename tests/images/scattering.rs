@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use glam::DVec3;
-use spectile::scene::{Camera, Evaluator, Field, Filter, Phase, PhaseTable, Scene, Sides};
+use spectile::scene::{Camera, Evaluator, Field, Filter, Mesh, Phase, PhaseTable, Scene, Shape, Sides};
 
 use crate::device::{Settings, assert_as_reference, measure, render};
 use crate::scene_builder::heat::*;
@@ -132,6 +132,20 @@ fn forward_layers_reflect_and_transmit_what_is_published() {
     ];
     let phase = |b: &mut Builder| b.henyey_greenstein(0.85);
     assert_layers("forward", &forward[..size::either(2, 7)], size::either(2, 20), size::either(0.06, 0.02), phase);
+}
+
+/// In matter light has no side to come from: a triangle with shading normals where nobody sees it, under the black floor, changes nothing.
+#[test]
+fn shading_normals_are_none_of_matters() {
+    let positions = [DVec3::ZERO, DVec3::X, DVec3::Y].map(|at| at - 3.0 * DVec3::Z).to_vec();
+    let hidden = Shape::Mesh(Mesh { positions, triangles: vec![[0, 1, 2]] });
+    let normals = round_normals(DVec3::new(0.3, 0.3, -6.0), &hidden);
+    let bare = Builder::new().camera(at_cosine(0.5, true)).sky(1.0).bounces(20);
+    let scene =
+        black_below(with_layer(bare, &[0.5], &[10.0], isotropic)).diffuse(hidden, 0.5).attributes(normals).build();
+    let found = measure(scene, 2, 7);
+    // As `layers_reflect_and_transmit_what_is_published` has it.
+    assert_estimates("beside normals", &found, &[0.16014], Bound { resolution: 0.01, allowance: 5e-6 / 0.16 + 2e-4 });
 }
 
 /// What is scattered once, of a beam straight down that is seen straight from above: BRF = ω P / (4 (μ + μ₀)) (1 - e^(-τ (1/μ + 1/μ₀))), times μ₀ E / π.

@@ -86,3 +86,47 @@ fn media_of_groups_are_placed() {
         assert!(own[0].material.is_none() && own[0].interior.is_some(), "{}", found.toml);
     }
 }
+
+/// Of all that is scattered, half goes as Rayleigh says, and a quarter each as two of Henyey and Greenstein's; the first kind absorbs.
+#[test]
+fn phase_functions_are_blended() {
+    let hg = |g: &str| format!("<phase type=\"hg\"><float name=\"g\" value=\"{g}\"/></phase>");
+    let blended = |weight: &str, inner: &str| format!("<phase type=\"blendphase\">{weight}{inner}</phase>");
+    let half = "<float name=\"weight\" value=\"0.5\"/>";
+    let volume = "<volume type=\"constvolume\" name=\"weight\"><float name=\"value\" value=\"0.5\"/></volume>";
+    let scene = |phase: &str| {
+        format!(
+            "<scene version=\"3.0.0\"><sensor type=\"perspective\"/><shape type=\"cube\"><bsdf type=\"null\"/><medium name=\"interior\" \
+             type=\"homogeneous\" id=\"mist\"><float name=\"albedo\" value=\"0.75\"/><float name=\"sigma_t\" value=\"8\"/>{phase}</medium></shape></scene>"
+        )
+    };
+    let both = blended(volume, &(hg("0.7") + &hg("-0.2")));
+    let (_folder, path) = written("scene.xml", &scene(&blended(half, &format!("<phase type=\"rayleigh\"/>{both}"))));
+    let found = import(&path);
+    let header = "[[media.mist.components]]\n";
+    let expected = format!(
+        "{header}absorption = 2.0\nscattering = 3.0\nphase = {{ rayleigh = 0.0 }}\n\n\
+         {header}scattering = 1.5\nphase = {{ hg = 0.7 }}\n\n{header}scattering = 1.5\nphase = {{ hg = -0.2 }}\n"
+    );
+    assert!(found.toml.contains(&expected), "{}", found.toml);
+    assert_eq!(found.scene.media[0].components.len(), 3);
+    // What has no share is not there.
+    let none = half.replace("0.5", "1");
+    let (_folder, path) = written("scene.xml", &scene(&blended(&none, &(hg("0.7") + &hg("0.1")))));
+    let toml = import(&path).toml;
+    assert!(toml.contains("[media.mist]\nabsorption = 2.0\nscattering = 6.0\nphase = { hg = 0.1 }\n"), "{toml}");
+    for (phase, message) in [
+        (blended("", &(hg("0.7") + &hg("0.1"))), "`blendphase` needs a `weight`"),
+        (blended(&half.replace("0.5", "2"), &(hg("0.7") + &hg("0.1"))), "must lie between 0 and 1"),
+        (blended(half, &hg("0.7")), "needs two phase functions"),
+        ((0..20).fold(hg("0"), |inner, _| blended(half, &(hg("0.5") + &inner))), "within more than 16 others"),
+    ] {
+        let (folder, path) = written("scene.xml", &scene(&phase));
+        let error = spectile::import::import(&path, &folder.path().join("out")).expect_err("a mistake").to_string();
+        assert!(error.contains(message), "{error}");
+    }
+    let varied = blended("<volume type=\"gridvolume\" name=\"weight\"/>", &(hg("0.7") + &hg("0.1")));
+    let (_folder, path) = written("scene.xml", &scene(&varied));
+    let page = import(&path).page;
+    assert!(page.contains("a medium whose phase function differs from place to place"), "{page}");
+}

@@ -1,6 +1,6 @@
 //! Scenes of Mitsuba 3.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use serde_json::Value;
 use spectile::scene::{Bsdf, Filter, Light, Projection, Reflectance, Roughness, Shape, Sides, Weight};
 
@@ -190,6 +190,63 @@ fn groups_are_placed() {
         [(DVec3::Y, 1.0), (DVec3::ZERO, 2.0), (DVec3::new(5.0, 1.0, 0.0), 1.0), (DVec3::X * 10.0, 2.0)]
     );
     assert!(found.toml.contains("[[assemblies.pair.objects]]"), "{}", found.toml);
+}
+
+/// Mitsuba 3.9.1 has, on a triangle without texture coordinates, u and v of 1 at its second and third corner, and the first edge as its tangent.
+#[test]
+fn meshes_without_coordinates_have_those_of_their_triangles() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).expect("written");
+    write("flat.obj", "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nf 1 2 3\nf 1 3 4\n");
+    write(
+        "smooth.ply",
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty float nx\nproperty float ny\n\
+        property float nz\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 0 0 1\n1 0 0 0 0 1\n0 1 0 0 0 1\n3 0 1 2\n",
+    );
+    write("picture.pfm", "Pf\n1 2\n-1.0\n\0\0\0\0\0\0\0\0");
+    let picture =
+        "<texture name=\"reflectance\" type=\"bitmap\"><string name=\"filename\" value=\"picture.pfm\"/></texture>";
+    write(
+        "scene.xml",
+        &scene(&format!(
+            "<bsdf type=\"diffuse\" id=\"picture\">{picture}</bsdf><bsdf type=\"roughconductor\" id=\"brushed\"><float name=\"alpha_u\" value=\"0.2\"/></bsdf>\
+         <bsdf type=\"diffuse\" id=\"plain\"/>\
+         <shape type=\"obj\"><string name=\"filename\" value=\"flat.obj\"/><ref id=\"picture\"/></shape>\
+         <shape type=\"ply\"><string name=\"filename\" value=\"smooth.ply\"/><ref id=\"picture\"/></shape>\
+         <shape type=\"ply\"><string name=\"filename\" value=\"smooth.ply\"/><ref id=\"brushed\"/></shape>\
+         <shape type=\"ply\"><string name=\"filename\" value=\"smooth.ply\"/><ref id=\"plain\"/></shape>"
+        )),
+    );
+    let found = import(&folder.path().join("scene.xml"));
+    let uv: Vec<_> = found.scene.objects.iter().map(|object| object.attributes.uv.clone()).collect();
+    // v of the surface runs down but where that of a file would be turned up, as it is of OBJ: either way the second corner has the same texel.
+    let corners = |v: [f64; 3]| [DVec2::new(0.0, v[0]), DVec2::new(1.0, v[1]), DVec2::new(0.0, v[2])];
+    assert_eq!(uv[0], Some(vec![corners([1.0, 1.0, 0.0]); 2]));
+    assert_eq!(uv[1..3], [Some(vec![corners([0.0, 0.0, 1.0])]), Some(vec![corners([0.0, 0.0, 1.0])])]);
+    assert_eq!(uv[3], None);
+    let way = |object: usize| match found.scene.materials[found.scene.objects[object].material.expect("one")].bsdf {
+        Bsdf::Diffuse { reflectance: Reflectance::Texture(id) } => found.scene.textures[id].placement.scale.y,
+        ref other => panic!("{other:?}"),
+    };
+    assert_eq!((way(0), way(1)), (1.0, -1.0));
+}
+
+/// Beyond its ends a light is nothing, a reflectance what it is there.
+#[test]
+fn tables_end_as_they_do_there() {
+    let long = (0..10).map(|i| format!("{}:1", 500 + 10 * i)).collect::<Vec<_>>().join(", ");
+    for table in ["500:1, 590:1", long.as_str()] {
+        let found = imported(&format!(
+            "<emitter type=\"constant\"><spectrum name=\"radiance\" value=\"{table}\"/></emitter>\
+             <shape type=\"sphere\"><bsdf type=\"diffuse\"><spectrum name=\"reflectance\" value=\"{table}\"/></bsdf></shape>"
+        ));
+        let sky = found.scene.environment.as_ref().and_then(|sky| sky.uniform()).expect("an even sky");
+        let Bsdf::Diffuse { reflectance: Reflectance::Spectrum(paint) } = found.scene.materials[0].bsdf else {
+            panic!("{:?}", found.scene.materials[0])
+        };
+        let of = |id: usize| [450.0, 550.0, 650.0].map(|nm| found.scene.spectra[id].curve.eval(nm));
+        assert_eq!((of(sky), of(paint)), ([0.0, 1.0, 0.0], [1.0; 3]), "{}", found.toml);
+    }
 }
 
 #[test]

@@ -1,9 +1,11 @@
 //! `spectile import`: what scenes of other programs become.
 
+mod as_mitsuba;
 mod deviations;
 mod gltf;
 mod media;
 mod mitsuba;
+mod mitsuba_xml;
 mod numbers;
 mod pbrt;
 mod round_trip;

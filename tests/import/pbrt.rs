@@ -1,6 +1,6 @@
 //! Scenes of pbrt-v4.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use spectile::scene::{Bsdf, Light, Projection, Reflectance, Roughness, Shape, Sides, Weight};
 
 use super::{Imported, import, others, written};
@@ -41,6 +41,22 @@ fn cameras_are_left_handed() {
     near(found.scene.camera.right, DVec3::NEG_X);
     let Projection::Orthographic { half_size } = found.scene.camera.projection else { panic!("parallel") };
     assert!((half_size.x - 3.0).abs() < 1e-9 && found.scene.film.crop == [10, 0, 20, 20]);
+}
+
+/// pbrt-v4 has (0, 0), (1, 0) and (1, 1) at the corners of a triangle without `uv`, which are those of what it is a half of.
+#[test]
+fn triangles_without_coordinates_have_those_of_pbrt() {
+    let found = imported(
+        r#"Texture "t" "spectrum" "checkerboard"
+Material "diffuse" "texture reflectance" "t"
+Shape "trianglemesh" "point3 P" [0 0 0  1 0 0  0 1 0] "normal3 N" [0 0 -1  0 0 -1  0 0 -1]
+Material "diffuse"
+Shape "trianglemesh" "point3 P" [0 0 0  1 0 0  0 1 0]"#,
+    );
+    let [textured, plain] = &found.scene.objects[..] else { panic!("{}", found.toml) };
+    // Turned to where its normals are, by which two corners change places.
+    assert_eq!(textured.attributes.uv, Some(vec![[DVec2::ZERO, DVec2::ONE, DVec2::X]]));
+    assert_eq!(plain.attributes.uv, None);
 }
 
 #[test]

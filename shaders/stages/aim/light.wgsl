@@ -5,9 +5,9 @@ fn aim_at_light(path: u32, site: Site, v: Vertex, choice: f32, u: vec2<f32>) -> 
     let seen_from = select(offset_origin(site.surface.position, site.face), site.surface.position, transmits);
     var aim = find_light(path, seen_from, choice, u);
     let side = dot(site.face, aim.towards);
-    var keeps_side = true;
+    var is_kept = true;
 #lines LIGHT_SIDE
-    if (!(aim.density > 0.0 && side != 0.0 && (side > 0.0 || transmits) && keeps_side)) {
+    if (!(aim.density > 0.0 && side != 0.0 && (side > 0.0 || transmits) && is_kept)) {
         aim.density = 0.0;
         return aim;
     }

@@ -27,8 +27,9 @@ pub const SMOOTH: Part = Part {
     used: |scene| scene.surfaces.as_ref().is_some_and(|surfaces| surfaces.smooth),
     modules: &[(Place::Stage, module!("parts/attributes/smooth.wgsl"))],
     lines: &[
-        ("CHOSEN", "choice.goes_on = choice.goes_on && keeps_side(v, site.face, choice.direction);"),
-        ("LIGHT_SIDE", "keeps_side = side * dot(v.normal, aim.towards) > 0.0;"),
+        ("CHOSEN", "let along_face = dot(to_world(v, choice.direction), site.face);"),
+        ("CHOSEN", "choice.goes_on = choice.goes_on && keeps_side(site, along_face, choice.direction.z);"),
+        ("LIGHT_SIDE", "is_kept = keeps_side(site, side, dot(v.normal, aim.towards));"),
         ("MET_COSINE", "cosine = v.o.z;"),
         (
             "AIMED_COSINE",

@@ -39,11 +39,21 @@ struct Placing<'a, 'n> {
     to_world: DAffine3,
     /// Whether its texture coordinates matter.
     textured: bool,
+    /// Whether v of a file runs up.
+    is_upward: bool,
     /// Whether its other side is the front.
     flipped: bool,
 }
 
 impl Placing<'_, '_> {
+    /// Where a mesh has no texture coordinates Mitsuba takes those within each triangle: u is 1 at its second corner, v at its third.
+    fn lay_out(&self, mesh: &mut Mesh) {
+        if self.textured {
+            let v = |v: f64| if self.is_upward { 1.0 - v } else { v };
+            mesh.lay_out([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)].map(|(u, down)| DVec2::new(u, v(down))));
+        }
+    }
+
     /// The object of a mesh file.
     fn of_mesh(self, path: &str) -> Section {
         let object = self.object.with("mesh", text::quoted(path));
@@ -102,7 +112,8 @@ impl<'n> Importer<'n, '_> {
             }
         };
         let flipped = plugin.boolean("flip_normals", false)?;
-        let Some(mut object) = self.form(&plugin, &to_world, textured, flipped)? else { return Ok(()) };
+        let coordinates = (textured, is_upward);
+        let Some(mut object) = self.form(&plugin, &to_world, coordinates, flipped)? else { return Ok(()) };
         if let Some(id) = node.attribute("id") {
             object.comments.insert(0, values::shown(id));
         }
@@ -231,7 +242,12 @@ impl<'n> Importer<'n, '_> {
         }
         let name = self.name_of(shape.node);
         let text = match self.colour(&plugin, "radiance", Of::Emission, flip)? {
-            Some(Colour::Texture(texture)) => texture.toml(self.scene, "")?,
+            Some(Colour::Texture(texture)) => {
+                let what = "a picture of light is of colours as they are written, in daylight, as in Mitsuba's RGB variants; its spectral \
+                            variants (3.9.1) take 1 in the place of what is more, and no daylight";
+                self.scene.report.chosen(plugin.place(), what);
+                texture.toml(self.scene, "")?
+            }
             Some(colour) => colour.toml(self.scene, &format!("{name}-light"))?,
             None => "{ rgb = [1.0, 1.0, 1.0] }".to_owned(),
         };
@@ -245,11 +261,12 @@ impl<'n> Importer<'n, '_> {
         &mut self,
         plugin: &Plugin<'n>,
         to_world: &DAffine3,
-        textured: bool,
+        (textured, is_upward): (bool, bool),
         flipped: bool,
     ) -> Result<Option<Section>> {
         let (name, object) = (self.name_of(plugin.node), Section::new("[[objects]]"));
-        let placing = |object: Section| Placing { plugin, object, name, to_world: *to_world, textured, flipped };
+        let placing =
+            |object: Section| Placing { plugin, object, name, to_world: *to_world, textured, is_upward, flipped };
         let point = |x: f64, y: f64| to_world.transform_point3(DVec3::new(x, y, 0.0));
         let mirrored = to_world.matrix3.determinant() < 0.0;
         match plugin.kind() {
@@ -406,12 +423,14 @@ impl<'n> Importer<'n, '_> {
             let mut mesh =
                 serialized::parse(&bytes, index).map_err(|message| node.problem(format!("{named} {message}")))?;
             shade(&mut mesh, face_normals);
+            placing.lay_out(&mut mesh);
             return self.put_mesh(placing, mesh);
         }
         let format = if plugin.kind() == "obj" { Format::Obj } else { Format::Ply };
         let read = meshes::parse(format, &bytes, &path).map_err(|problem| at(node, &problem))?;
         let has_normals = read.parts.iter().all(|part| part.normals.is_some());
-        if has_normals && !face_normals && !placing.flipped {
+        let is_laid_out = !placing.textured || read.parts.iter().all(|part| part.uv.is_some());
+        if has_normals && !face_normals && !placing.flipped && is_laid_out {
             let path = self.scene.copy("meshes", &path)?;
             return Ok(placing.of_mesh(&path));
         }
@@ -421,6 +440,7 @@ impl<'n> Importer<'n, '_> {
             _ => Mesh::of_file(&read),
         };
         shade(&mut mesh, face_normals);
+        placing.lay_out(&mut mesh);
         let stem = Path::new(named).file_stem().map(|stem| stem.to_string_lossy().into_owned());
         let name = stem.unwrap_or_else(|| placing.name.clone());
         self.put_mesh(Placing { name, ..placing }, mesh)

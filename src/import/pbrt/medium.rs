@@ -45,7 +45,7 @@ impl Importer<'_> {
         let matter = Matter {
             absorption: coefficient("sigma_a", ABSORPTION)?,
             scattering: coefficient("sigma_s", SCATTERING)?,
-            phase: Phase::HenyeyGreenstein(g),
+            phases: vec![(1.0, Phase::HenyeyGreenstein(g))],
         };
         let medium = media::put(self.scene, name, &matter)?;
         parameters.finish(&format!("the medium \"{}\"", shown(name)), &mut self.scene.report);

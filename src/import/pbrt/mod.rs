@@ -478,7 +478,9 @@ impl Importer<'_> {
         let to_world = self.state.ctm;
         let round = similarity(to_world.matrix3).is_some();
         let reversed = self.state.reversed;
-        let Some(form) = self.form(kind, parameters, at, round, reversed)? else { return Ok(()) };
+        let textured = matches!(self.state.look, Some(Look::Material { textured: true, .. }))
+            || parameters.get("alpha").is_some_and(|alpha| alpha.kind == "texture");
+        let Some(form) = self.form(kind, parameters, at, (round, textured), reversed)? else { return Ok(()) };
         let emission = match self.state.area.clone() {
             Some(area) => Some(self.emission(&area, &form, &to_world, at)?),
             None => None,

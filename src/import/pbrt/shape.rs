@@ -102,7 +102,7 @@ impl Importer<'_> {
         kind: &str,
         parameters: &Parameters,
         at: &At,
-        round: bool,
+        (round, textured): (bool, bool),
         reversed: bool,
     ) -> Result<Option<Form>> {
         let radius = || -> Result<f64> {
@@ -194,7 +194,7 @@ impl Importer<'_> {
                     [part] => Mesh::of_vertices(part),
                     _ => Mesh::of_file(&read),
                 };
-                if !reversed && agrees(&mesh) {
+                if !reversed && agrees(&mesh) && (mesh.uv.is_some() || !textured) {
                     let area = area(&mesh);
                     return Ok(Some(Form::Mesh { path: self.scene.copy("meshes", &path)?, area }));
                 }
@@ -207,6 +207,10 @@ impl Importer<'_> {
             }
         };
         let mut mesh = mesh;
+        if textured {
+            // As pbrt has triangles without `uv`.
+            mesh.lay_out([DVec2::ZERO, DVec2::X, DVec2::ONE]);
+        }
         if reversed {
             mesh.reverse();
         }
