@@ -193,6 +193,22 @@ def measure(program, measured, scenes, channel_counts, wanted, rounds, until):
                     print(*what, result if isinstance(result, str) else f"{1e6 * result[0]:.1f} us a path", flush=True)
 
 
+def taken(chosen):
+    """What `auto` took, by the name of that fixed choice where it is one."""
+    kind = "roulette" if chosen["scale"] else "all"
+    several = chosen["wavelengths_per_channel"] or 1
+    return kind if several == 1 else f"m={several}" + (", roulette" if chosen["scale"] else "")
+
+
+def times(measured, scene, channels, choice):
+    """Seconds a path of all turns. Where `auto` takes a fixed choice both are the same render, so that their times are of both."""
+    auto = measured.turns(scene, channels, "auto")
+    same = taken(auto[0][2]) if auto and not isinstance(auto, str) and auto[0][2] else None
+    names = {"auto", same} if choice in ("auto", same) else {choice}
+    found = [measured.turns(scene, channels, name) for name in names]
+    return [turn[0] for turns in found if turns and not isinstance(turns, str) for turn in turns]
+
+
 def table_of(measured):
     """A row for each choice of each scene and number of channels of which all paths were measured too."""
     rows = []
@@ -202,14 +218,14 @@ def table_of(measured):
         for choice in choices(scene, channels, True):
             turns = measured.turns(scene, channels, choice.name)
             if turns is not None and base is not None and (isinstance(turns, str) or not isinstance(base, str)):
-                rows.append(row(scene, channels, choice, turns, base))
+                of_both = [[] if isinstance(turns, str) else times(measured, scene, channels, name) for name in (choice.name, "all")]
+                rows.append(row(scene, channels, choice, turns, base, *of_both))
                 print(rows[-1]["text"], flush=True)
     return rows
 
 
 def against_fixed(rows):
-    """Of each scene and number of channels: auto's gain, and the best fixed choice's. Where auto takes what that is, both are the same
-    render, measured twice."""
+    """Of each scene and number of channels: auto's gain, and the best fixed choice's."""
     found = []
     for scene, channels in dict.fromkeys((r["scene"], r["channels"]) for r in rows):
         here = {r["choice"]: r for r in rows if (r["scene"], r["channels"]) == (scene, channels) and "gain" in r}
@@ -217,20 +233,17 @@ def against_fixed(rows):
         if "auto" not in here or not fixed:
             continue
         auto, best = here["auto"], max(fixed, key=fixed.get)
-        taken = "roulette" if auto["scale"] else "all"
-        taken = f"m={auto['wavelengths']}" + (", roulette" if auto["scale"] else "") if (auto["wavelengths"] or 1) > 1 else taken
-        found.append({"scene": scene, "channels": channels, "auto": taken, "expected": auto["predicted"], "gain": auto["gain"],
-                      "best": best, "best_gain": fixed[best], "of_best": auto["gain"] / fixed[best],
-                      "of_same": fixed.get(taken, auto["gain"]) / fixed[best]})
+        kind = taken({"scale": auto["scale"], "wavelengths_per_channel": auto["wavelengths"]})
+        found.append({"scene": scene, "channels": channels, "auto": kind, "expected": auto["predicted"], "gain": auto["gain"],
+                      "best": best, "best_gain": fixed[best], "of_best": auto["gain"] / fixed[best]})
     return found
 
 
-def row(scene, channels, choice, turns, base):
+def row(scene, channels, choice, turns, base, own_times, times_of_all):
     result = {"scene": scene.split("/")[1], "channels": channels, "choice": choice.name}
     if isinstance(turns, str):
         return {**result, "note": turns, "text": f"{result['scene']} {channels} {choice.name}: {turns}"}
-    seconds = statistics.median(turn[0] for turn in turns)
-    of_all = statistics.median(turn[0] for turn in base)
+    seconds, of_all = statistics.median(own_times), statistics.median(times_of_all)
     squares = [[error**2 for error in next(turn[1] for turn in several if turn[1])] for several in (turns, base)]
     lit = [k for k in range(channels) if squares[1][k] > 0]
     growth = [squares[0][k] / squares[1][k] for k in lit]
@@ -289,11 +302,10 @@ def page(rows, device, rounds):
     parts.append(table(["scene", "n", "K", "efficiency"], [[f["scene"], f["n"], f["channels"], f["efficiency"]] for f in fewer(rows)]))
     parts.append(
         "<h2>Auto against the best fixed choice</h2><p>Gains over all paths at one wavelength; <i>over best</i>: auto's over that of the best "
-        "fixed choice, <i>of its kind</i>: that of the fixed choice that auto took, over the best, without the clock's noise between two "
-        "renders of the same.</p>"
+        "fixed choice. What auto takes and the fixed choice of that kind are the same render, and have their times together.</p>"
     )
-    names = ["scene", "channels", "auto", "expected", "gain", "best", "best_gain", "of_best", "of_same"]
-    heads = ["scene", "channels", "auto took", "expected", "gain", "best fixed", "its gain", "over best", "of its kind"]
+    names = ["scene", "channels", "auto", "expected", "gain", "best", "best_gain", "of_best"]
+    heads = ["scene", "channels", "auto took", "expected", "gain", "best fixed", "its gain", "over best"]
     parts.append(table(heads, [[f[name] for name in names] for f in against_fixed(rows)]))
     parts.append("<h2>Several wavelengths a channel, roulette on evaluation, auto</h2>")
     parts.append(table(FIELDS, [[r.get(field) for field in FIELDS] for r in rows]))
