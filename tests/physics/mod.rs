@@ -3,6 +3,7 @@
 //! Bounds as in `statistics`: Student t at ALPHA = 1e-4 per test, Sidak over channels, fixed seeds, plus a stated f32
 //! allowance. Resolutions of 0.2 to 0.4 % mean that a wrong factor of 1 to 2 % in any of these would fail.
 
+mod anchors;
 mod cavities;
 mod irradiance;
 mod sides;
