@@ -77,7 +77,7 @@ impl Grid {
         y / self.tile[1] * self.tiles()[0] + x / self.tile[0]
     }
 
-    /// The number of a pixel of the picture among those of its tile, row by row of full ones.
+    /// The number of a pixel of the cube among those of its tile, row by row of full ones.
     pub fn pixel_in_tile(&self, x: u32, y: u32) -> usize {
         (y % self.tile[1]) as usize * self.tile[0] as usize + (x % self.tile[0]) as usize
     }

@@ -120,7 +120,8 @@ impl Layers {
         let lit = self.sun.map(|sun| self.lit(accel, sun, &seen, meet)).transpose()?.unwrap_or_default();
         for (i, (&[x, y], seen)) in pixels.iter().zip(&seen).enumerate() {
             let Some(seen) = seen else { continue };
-            let pixel = grid.pixel_in_tile(x, y);
+            // Of the film, of which the cube may be a part.
+            let pixel = ((y - rect.y0) * grid.tile[0] + (x - rect.x0)) as usize;
             let [object, material] = self.numbers_of(accel, seen.primitive);
             layers.set(Layer::Depth, pixel, &[seen.distance / space.scale]);
             layers.set(Layer::Normal, pixel, &seen.normal.to_array());

@@ -531,6 +531,9 @@ const CUT: f64 = 1e-4;
 /// Without `--full` devices stay away from pictures of longer paths, which take them many seconds.
 const LONG: u32 = 100;
 
+/// What measures the numbers of a setup.
+type Way = fn(&Setup) -> Measured;
+
 /// Every number, by both.
 #[track_caller]
 fn check(setups: impl IntoIterator<Item = Setup>) {
@@ -539,7 +542,7 @@ fn check(setups: impl IntoIterator<Item = Setup>) {
     let only = std::env::var("SPECTILE_ANCHORS").unwrap_or_default();
     let mut wrong = Vec::new();
     for setup in setups.into_iter().filter(|setup| setup.anchors[0].what.contains(&only)) {
-        let measured: [(&str, f64, fn(&Setup) -> Measured); 2] =
+        let measured: [(&str, f64, Way); 2] =
             [("device", ROUNDED + CUT, Setup::by_device), ("reference", CUT, Setup::by_reference)];
         let skipped = usize::from(!size::is_full() && setup.scene.integrator.max_bounces > LONG);
         for (by, allowance, measure) in measured.into_iter().skip(skipped) {
