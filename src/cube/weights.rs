@@ -7,9 +7,11 @@ use std::path::Path;
 
 pub use self::expand::{Entries, Expand};
 
+use pulp::Arch;
 use smallvec::SmallVec;
 
 use super::checksums;
+use super::grid::Rect;
 use super::metadata::Header;
 use crate::spectral::product::{Expander, Product};
 use crate::{Error, Result};
@@ -264,13 +266,31 @@ impl Weights {
         self
     }
 
-    /// The radiance of a pixel, Σ weight x row of its product; `rows` as [`Expander::rows`] makes them. [`Weights::expanded`] is faster.
+    /// The radiance of a pixel, Σ weight x row of its product; `rows` as [`Expander::rows`] makes them.
+    #[inline(always)]
     pub fn expand(&self, pixel: usize, rows: &[f32], out: &mut [f32]) {
+        self.sum(pixel, rows, |i| self.weight[i], out);
+    }
+
+    /// Σ over the entries of a pixel, each with the weight that `weight` gives it.
+    #[inline(always)]
+    fn sum(&self, pixel: usize, rows: &[f32], weight: impl Fn(usize) -> f32, out: &mut [f32]) {
         out.fill(0.0);
         let channels = out.len();
-        for i in self.entries(pixel) {
-            let row = &rows[self.product[i] as usize * channels..][..channels];
-            out.iter_mut().zip(row).for_each(|(out, value)| *out += self.weight[i] * value);
+        let row = |i: usize| &rows[self.product[i] as usize * channels..][..channels];
+        let entries = self.entries(pixel);
+        let in_fours = entries.end - entries.len() % 4;
+        // Four at a time, so that what is summed is loaded and stored once; in the order of the entries, whatever the machine.
+        for i in (entries.start..in_fours).step_by(4) {
+            let weights = [weight(i), weight(i + 1), weight(i + 2), weight(i + 3)];
+            let rows = row(i).iter().zip(row(i + 1)).zip(row(i + 2)).zip(row(i + 3));
+            for (out, (((a, b), c), d)) in out.iter_mut().zip(rows) {
+                *out = *out + weights[0] * a + weights[1] * b + weights[2] * c + weights[3] * d;
+            }
+        }
+        for i in in_fours..entries.end {
+            let weight = weight(i);
+            out.iter_mut().zip(row(i)).for_each(|(out, value)| *out += weight * value);
         }
     }
 
@@ -289,6 +309,67 @@ impl Weights {
         let mut out = vec![0.0; expander.channels()];
         of_pixel.expand(0, &rows, &mut out);
         out
+    }
+
+    /// The radiance of all pixels, in the order of a chunk's files: column by column. Beyond `rect` NaN.
+    pub fn expanded(&self, rows: &[f32], channels: usize, tile: [u32; 2], rect: Rect) -> Vec<f32> {
+        // Compiled for every width of vectors, of which the machine's is taken; what is computed is the same.
+        Arch::new().dispatch(|| self.each(channels, tile, rect, |pixel, out| self.expand(pixel, rows, out)))
+    }
+
+    /// Standard errors of the means of all pixels, by the spread of the groups; NaN below two epochs.
+    pub fn standard_errors(
+        &self,
+        rows: &[f32],
+        channels: usize,
+        tile: [u32; 2],
+        rect: Rect,
+        groups: &Groups,
+    ) -> Vec<f32> {
+        let mut scratch = vec![0.0; channels];
+        Arch::new().dispatch(|| {
+            self.each(channels, tile, rect, |pixel, out| self.standard_error(pixel, rows, groups, &mut scratch, out))
+        })
+    }
+
+    /// Of one pixel. Var = Σ b_g (m_g - m)² / ((G - 1) B): b_g of B epochs are of group g, whose mean is m_g.
+    #[inline(always)]
+    pub fn standard_error(&self, pixel: usize, rows: &[f32], groups: &Groups, mean: &mut [f32], out: &mut [f32]) {
+        let all: u32 = groups.epochs.iter().sum();
+        let spread_over = groups.epochs.iter().filter(|&&n| n > 0).count();
+        if all < 2 {
+            return out.fill(f32::NAN);
+        }
+        self.expand(pixel, rows, mean);
+        let mut variance = vec![0.0f64; out.len()];
+        let total: f64 = groups.samples.iter().sum();
+        let others = self.groups - 1;
+        for (group, &epochs) in groups.epochs.iter().enumerate().filter(|(_, n)| **n > 0) {
+            let of_group = |i: usize| {
+                let shares = &self.shares[i * others..(i + 1) * others];
+                let share = if group == 0 { 1.0 - shares.iter().sum::<f32>() } else { shares[group - 1] };
+                (f64::from(self.weight[i] * share) * total / groups.samples[group]) as f32
+            };
+            self.sum(pixel, rows, of_group, out);
+            for ((variance, &of_group), &mean) in variance.iter_mut().zip(&*out).zip(&*mean) {
+                let distance = f64::from(of_group) - f64::from(mean);
+                *variance += f64::from(epochs) * distance * distance;
+            }
+        }
+        let divisor = (spread_over as f64 - 1.0) * f64::from(all);
+        out.iter_mut().zip(variance).for_each(|(out, variance)| *out = (variance / divisor).sqrt() as f32);
+    }
+
+    #[inline(always)]
+    fn each(&self, channels: usize, tile: [u32; 2], rect: Rect, mut fill: impl FnMut(usize, &mut [f32])) -> Vec<f32> {
+        let mut values = vec![f32::NAN; self.pixels() * channels];
+        for x in 0..rect.width() {
+            for y in 0..rect.height() {
+                let out = &mut values[(x * tile[1] + y) as usize * channels..][..channels];
+                fill((y * tile[0] + x) as usize, out);
+            }
+        }
+        values
     }
 
     /// How much each product matters.
@@ -510,7 +591,6 @@ pub fn systematic(importances: &[f64], most: usize, random: u64) -> Vec<(usize, 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cube::grid::Rect;
 
     fn product(source: u16, factors: &[u16]) -> Product {
         Product { factors: SmallVec::from_slice(factors), source }
