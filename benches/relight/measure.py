@@ -103,7 +103,7 @@ def measure(program, rounds, samples):
             entries_a_pixel=entries,
         )
         tell(
-            what="relight", scene=name, samples=samples, ns_an_entry_and_channel=1e9 * expand / (entries * values), ns_a_value=1e9 * expand / values,
+            what="relight", scene=name, samples=samples, ns_a_value_and_its_error=1e9 * expand / values, ns_a_value_written=1e9 * seconds / values,
             relight_s=seconds, render_again_s=again, ratio=again / seconds,
         )
     # A lamp of lines in eight channels: what of the noise is that of wavelengths.

@@ -14,7 +14,7 @@ use crate::device::evaluator::EvaluateShape;
 use crate::device::facts;
 use crate::device::part::OnDevice;
 use crate::device::prepared::Prepared;
-use crate::device::separable::{self, MOST_FACTORS};
+use crate::device::separable::MOST_FACTORS;
 use crate::device::windows::Windows;
 use crate::files::{format_bytes, shown};
 use crate::gpu::adapter::{Gpu, Selection};
@@ -129,8 +129,8 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
         None => plan::waves_without_device(&prepared, tile, budget)?,
     };
     let prepared = &*prepared;
-    let obstacles = separable::remainder(&scene);
     let scene = &scene;
+    let obstacles = prepared.obstacles(scene);
     let plan =
         Plan { args, scene, samples, prepared, choices, obstacles, remainder, header, layer_disk, waves, measured };
     output.event("done", plan.facts())?;

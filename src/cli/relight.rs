@@ -7,7 +7,7 @@ use serde_json::json;
 use super::Output;
 use super::scene::parse_override;
 use super::sensor::refuse_itself;
-use crate::cube::{self, Cube, Existing, Expand, NewCube, Relighted};
+use crate::cube::{self, Cube, Existing, Expand, NewCube, Processor, Relighted};
 use crate::files::shown;
 use crate::gpu::adapter::Selection;
 use crate::render::expand::Devices;
@@ -103,7 +103,7 @@ pub fn run(args: &Args, output: &Output) -> Result<()> {
             channels: &relit.channels,
             changed: &relit.changed,
             without_remainder: args.without_remainder,
-            by: devices.as_ref().map(|devices| devices as &dyn Expand),
+            by: devices.as_ref().map_or(&Processor as &dyn Expand, |devices| devices),
         };
         cube::relight(&cube, new, &args.output, existing, progress)
     })?;

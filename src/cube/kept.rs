@@ -280,22 +280,26 @@ impl Relit<'_> {
     pub fn channels(&self, channels: &[usize], rect: Rect, factor: u32) -> Result<Window> {
         let (grid, mut sums) = (self.state.cube().grid(), Sums::new(rect, factor, channels.len()));
         let pixels = sums.pixels(grid);
-        let all = self.light.expander.channels();
         self.each_tile(
             pixels,
             |tile| {
                 let Some((_, of_tile)) = self.kept.tile(self.state, tile)? else { return Ok(None) };
-                let rows = self.light.expander.rows(&of_tile.weights.products);
+                let products = &of_tile.weights.products;
+                let mut rows = vec![0.0; channels.len() * products.len()];
+                for (&k, row) in channels.iter().zip(rows.chunks_mut(products.len().max(1))) {
+                    self.light.expander.write_rows(products, k..k + 1, 1, row);
+                }
                 Ok(Some((of_tile, rows, self.state.remainder(tile)?)))
             },
             |(of_tile, rows, remainder), shared| {
                 let mut values = vec![0.0f32; channels.len()];
+                let products = of_tile.weights.products.len().max(1);
                 for (x, y) in places(shared) {
                     let pixel = grid.pixel_in_tile(x, y);
                     values.fill(0.0);
                     for (product, weight) in of_tile.weights.of_pixel(pixel) {
-                        let row = &rows[product * all..][..all];
-                        values.iter_mut().zip(channels).for_each(|(value, &k)| *value += weight * row[k]);
+                        let of_channel = values.iter_mut().zip(rows.chunks(products));
+                        of_channel.for_each(|(value, row)| *value += weight * row[product]);
                     }
                     if let Some(remainder) = &remainder {
                         let more = remainder.spectrum(x, y);

@@ -203,12 +203,12 @@ impl Header {
         [count("factors"), count("sources")]
     }
 
-    pub(super) fn most_factors(&self) -> usize {
+    pub fn most_factors(&self) -> usize {
         self.attributes.get(FACTORED).and_then(|of| of["most_factors"].as_u64()).unwrap_or(0) as usize
     }
 
     /// Parts of the epochs whose weights are told apart.
-    pub(super) fn groups(&self) -> usize {
+    pub fn groups(&self) -> usize {
         if self.has_uncertainty() { GROUPS_WITH_UNCERTAINTY } else { GROUPS }
     }
 

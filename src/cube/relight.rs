@@ -1,6 +1,7 @@
 //! An ordinary cube from a factored one, under other spectra and in other channels: no path is traced.
 
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use rayon::prelude::*;
@@ -10,7 +11,7 @@ use super::create::{Aside, Existing};
 use super::metadata::{DERIVED, FACTORED, Header};
 use super::remainder::{RemainderShare, Unions, left_out};
 use super::store::Cube;
-use super::weights::Expand;
+use super::weights::{Expand, Rows};
 use super::writer::Writer;
 use crate::Result;
 use crate::spectral::Channels;
@@ -29,8 +30,8 @@ pub struct NewCube<'a> {
     pub changed: &'a [String],
     /// Without what does not separate.
     pub without_remainder: bool,
-    /// What makes radiance, if that is not the processor.
-    pub by: Option<&'a dyn Expand>,
+    /// What makes radiance.
+    pub by: &'a dyn Expand,
 }
 
 /// What there is to say of a relit cube.
@@ -44,16 +45,22 @@ pub struct Relighted {
     pub pixels: u64,
     /// How much of the picture does not separate and is as it was rendered, of a cube that has such a thing and where it is not left out.
     pub remainder: Option<RemainderShare>,
-    /// Seconds that threads spent multiplying weights by spectra, in all: without reading, standard errors and writing.
+    /// Seconds that threads spent on radiance and its standard errors, in all: without reading, what does not separate, and writing.
     pub expand_s: f64,
 }
 
-/// A tile under the new spectra: rows of pixels, and standard errors, column by column.
+/// Radiance of a tile and its standard errors, pixels column by column. Threads hand them on from tile to tile: memory that is used for
+/// the first time takes longer than what is written there.
+#[derive(Default)]
+struct Buffers {
+    values: Vec<f32>,
+    errors: Vec<f32>,
+}
+
+/// What there is to say of a tile under the new spectra.
 struct Tile {
     tile: u32,
     samples: u32,
-    values: Vec<f32>,
-    errors: Vec<f32>,
     /// Per channel Σ variance and Σ mean².
     sums: Vec<[f64; 2]>,
     /// Per channel Σ of the remainder, and of all radiance.
@@ -97,24 +104,27 @@ pub fn relight(
     let mut share = RemainderShare::none(channels.len());
     let (mut entries, mut pixels, mut expand_s) = (0, 0, 0.0);
     let at_once = 2 * rayon::current_num_threads() as u32;
-    let mut since_commit = 0;
+    let (mut since_commit, buffers) = (0, Mutex::new(Vec::new()));
+    let kept = || buffers.lock().unwrap_or_else(PoisonError::into_inner);
     for first in (0..count).step_by(at_once as usize) {
         let tiles = first..(first + at_once).min(count);
         let done: Vec<Option<Tile>> = tiles
             .clone()
             .into_par_iter()
             .map(|tile| {
-                let made = expand(cube, &expander, unions.as_ref(), by, tile)?;
+                let mut buffers: Buffers = kept().pop().unwrap_or_default();
+                let made = expand(cube, &expander, unions.as_ref(), by, tile, &mut buffers)?;
                 if let Some(made) = &made {
                     if let Some(layers) = cube.tile_layers(tile)? {
                         writer.lay(tile, layers);
                     }
-                    let errors = header.has_uncertainty().then_some(&made.errors[..]);
+                    let errors = header.has_uncertainty().then_some(&buffers.errors[..]);
                     writer
-                        .store_columns(tile, made.samples, &made.values, errors)
+                        .store_columns(tile, made.samples, &buffers.values, errors)
                         .map_err(|error| aside.error(error))?;
                 }
-                Ok(made.map(|made| Tile { values: Vec::new(), errors: Vec::new(), ..made }))
+                kept().push(buffers);
+                Ok(made)
             })
             .collect::<Result<_>>()?;
         for made in done.into_iter().flatten() {
@@ -148,27 +158,21 @@ fn expand(
     cube: &Cube,
     expander: &Expander,
     unions: Option<&Unions>,
-    by: Option<&dyn Expand>,
+    by: &dyn Expand,
     tile: u32,
+    Buffers { values, errors }: &mut Buffers,
 ) -> Result<Option<Tile>> {
     let samples = cube.samples(tile)?;
     let (Some(weights), 1..) = (cube.state().weights(tile)?, samples) else { return Ok(None) };
     let (size, rect, channels) = (cube.header().tile, cube.grid().rect(tile), expander.channels());
-    let rows = expander.rows(&weights.products);
+    let (rows, groups) = (Rows::Of(expander, &weights.products), cube.groups(samples));
     let began = Instant::now();
-    let mut values = match by {
-        None => weights.expanded(&rows, channels, size, rect),
-        Some(by) => weights.expanded_by(by, &rows, channels, size, rect)?,
-    };
-    let (expand_s, groups) = (began.elapsed().as_secs_f64(), cube.groups(samples));
-    let mut errors = match by {
-        None => weights.standard_errors(&rows, channels, size, rect, &groups),
-        Some(by) => weights.standard_errors_by(by, &rows, channels, size, rect, &groups)?,
-    };
+    weights.expand_by(by, rows, size, rect, Some(&groups), [values, errors])?;
+    let expand_s = began.elapsed().as_secs_f64();
     let mut sums = vec![[0.0f64; 2]; channels];
     let mut remainder = [vec![0.0; channels], vec![0.0; channels]];
     if let Some(unions) = unions {
-        add_remainder(cube, tile, unions, &mut values, &mut errors, &mut remainder[0])?;
+        add_remainder(cube, tile, unions, values, errors, &mut remainder[0])?;
     }
     for (values, errors) in
         values.chunks(channels).zip(errors.chunks(channels)).filter(|(values, _)| !values[0].is_nan())
@@ -187,7 +191,7 @@ fn expand(
         };
         unions.each(&mut sums, &deviations, |sums, deviation| sums[0] = (sums[0].sqrt() + deviation).powi(2));
     }
-    Ok(Some(Tile { tile, samples, values, errors, sums, remainder, entries: weights.len() as u64, expand_s }))
+    Ok(Some(Tile { tile, samples, sums, remainder, entries: weights.len() as u64, expand_s }))
 }
 
 /// Adds what does not separate to the pixels of a tile, and its standard errors, if there are some, to theirs: at most they add up. Sums

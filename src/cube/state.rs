@@ -12,7 +12,7 @@ use super::grid::Rect;
 use super::map::Chunk;
 use super::metadata::Layout;
 use super::store::{Cube, TileArray};
-use super::weights::Weights;
+use super::weights::{Rows, Weights};
 use super::writer::Writer;
 use super::{BLOCK, Grid};
 use crate::spectral::tone::Picture;
@@ -121,7 +121,7 @@ impl<'a> CubeState<'a> {
     }
 
     /// The weights of a tile of a factored cube.
-    pub(super) fn weights(&self, tile: u32) -> Result<Option<Weights>> {
+    pub fn weights(&self, tile: u32) -> Result<Option<Weights>> {
         let [main, products] = [TileArray::Weights, TileArray::Products];
         let paths = [main, products].map(|part| self.cube.part_path(part, tile));
         for _ in 0..READS {
@@ -152,8 +152,7 @@ impl<'a> CubeState<'a> {
         }
         let Some(weights) = self.weights(tile)? else { return Ok(None) };
         let (size, channels, rect) = (self.cube.header().tile, self.cube.channels().len(), self.cube.grid().rect(tile));
-        let rows = self.cube.expander()?.rows(&weights.products);
-        let mut values = weights.expanded(&rows, channels, size, rect);
+        let mut values = weights.expanded(Rows::Of(self.cube.expander()?, &weights.products), size, rect);
         if let Some(remainder) = self.remainder(tile)? {
             add(&mut values, remainder.values());
         }
@@ -437,8 +436,8 @@ impl<'a> CubeState<'a> {
         }
         let Some(weights) = cube.state().weights(tile)? else { return Ok(None) };
         let (size, channels, rect) = (cube.header().tile, cube.channels().len(), cube.grid().rect(tile));
-        let rows = cube.expander()?.rows(&weights.products);
-        let mut errors = weights.standard_errors(&rows, channels, size, rect, &cube.groups(cube.samples(tile)?));
+        let rows = Rows::Of(cube.expander()?, &weights.products);
+        let mut errors = weights.standard_errors(rows, size, rect, &cube.groups(cube.samples(tile)?));
         // Both parts come from the same paths, so that their errors belong together: at most they add up.
         if let Some(more) = cube.state().remainder_errors(tile)? {
             add(&mut errors, more.values());

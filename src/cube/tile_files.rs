@@ -17,7 +17,7 @@ use super::merge::{UnitPass, write_standard_errors};
 use super::metadata::{Header, Layout};
 use super::state::add;
 use super::store::{Cube, TileArray};
-use super::weights::{Merging, Weights};
+use super::weights::{Merging, Rows, Weights};
 use crate::{Error, Result, files};
 
 /// A tile merged and not committed yet: its files lie aside.
@@ -229,7 +229,7 @@ impl<'a> Aside<'a> {
         let Merging { old, unit, merged, rows } = cube.merging(tile, old, samples - n_unit, unit, n_unit)?;
         let remainder = remainder.map(|unit| self.write_remainder(base, samples, n_unit, unit)).transpose()?;
         let radiance = |weights: &Weights, remainder: Option<&[f32]>| {
-            let mut values = weights.expanded(&rows, channels, size, rect);
+            let mut values = weights.expanded(Rows::Made(&rows, channels), size, rect);
             add(&mut values, remainder.unwrap_or_default());
             values
         };

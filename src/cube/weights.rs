@@ -5,13 +5,11 @@ mod expand;
 
 use std::path::Path;
 
-pub use self::expand::{Entries, Expand};
-
-use pulp::Arch;
 use smallvec::SmallVec;
 
+pub use self::expand::{Entries, Expand, Processor, Rows};
+
 use super::checksums;
-use super::grid::Rect;
 use super::metadata::Header;
 use crate::spectral::product::{Expander, Product};
 use crate::{Error, Result};
@@ -63,6 +61,21 @@ impl Groups {
         let mut of_samples: Vec<f64> = epochs.iter().map(|&n| f64::from(n) * f64::from(epoch)).collect();
         of_samples[whole as usize % groups] += f64::from(samples % epoch);
         Groups { samples: of_samples, epochs }
+    }
+
+    fn total(&self) -> f64 {
+        self.samples.iter().sum()
+    }
+
+    /// Those that have epochs, and how many.
+    fn with_epochs(&self) -> impl Iterator<Item = (usize, u32)> {
+        self.epochs.iter().copied().enumerate().filter(|(_, epochs)| *epochs > 0)
+    }
+
+    /// What the groups' squared distances from the mean, each times its epochs, are divided by; `None` below two epochs.
+    fn divisor(&self) -> Option<f64> {
+        let all: u32 = self.epochs.iter().sum();
+        (all >= 2).then(|| (self.with_epochs().count() as f64 - 1.0) * f64::from(all))
     }
 }
 
@@ -192,7 +205,6 @@ impl Weights {
     }
 
     /// Each entry of a pixel: the place of its product, and its weight.
-    #[inline(always)]
     pub(super) fn of_pixel(&self, pixel: usize) -> impl Iterator<Item = (usize, f32)> + '_ {
         self.entries(pixel).map(|i| (self.product[i] as usize, self.weight[i]))
     }
@@ -267,30 +279,12 @@ impl Weights {
     }
 
     /// The radiance of a pixel, Σ weight x row of its product; `rows` as [`Expander::rows`] makes them.
-    #[inline(always)]
     pub fn expand(&self, pixel: usize, rows: &[f32], out: &mut [f32]) {
-        self.sum(pixel, rows, |i| self.weight[i], out);
-    }
-
-    /// Σ over the entries of a pixel, each with the weight that `weight` gives it.
-    #[inline(always)]
-    fn sum(&self, pixel: usize, rows: &[f32], weight: impl Fn(usize) -> f32, out: &mut [f32]) {
         out.fill(0.0);
         let channels = out.len();
-        let row = |i: usize| &rows[self.product[i] as usize * channels..][..channels];
-        let entries = self.entries(pixel);
-        let in_fours = entries.end - entries.len() % 4;
-        // Four at a time, so that what is summed is loaded and stored once; in the order of the entries, whatever the machine.
-        for i in (entries.start..in_fours).step_by(4) {
-            let weights = [weight(i), weight(i + 1), weight(i + 2), weight(i + 3)];
-            let rows = row(i).iter().zip(row(i + 1)).zip(row(i + 2)).zip(row(i + 3));
-            for (out, (((a, b), c), d)) in out.iter_mut().zip(rows) {
-                *out = *out + weights[0] * a + weights[1] * b + weights[2] * c + weights[3] * d;
-            }
-        }
-        for i in in_fours..entries.end {
-            let weight = weight(i);
-            out.iter_mut().zip(row(i)).for_each(|(out, value)| *out += weight * value);
+        for (product, weight) in self.of_pixel(pixel) {
+            let row = &rows[product * channels..][..channels];
+            out.iter_mut().zip(row).for_each(|(out, value)| *out += weight * value);
         }
     }
 
@@ -311,65 +305,12 @@ impl Weights {
         out
     }
 
-    /// The radiance of all pixels, in the order of a chunk's files: column by column. Beyond `rect` NaN.
-    pub fn expanded(&self, rows: &[f32], channels: usize, tile: [u32; 2], rect: Rect) -> Vec<f32> {
-        // Compiled for every width of vectors, of which the machine's is taken; what is computed is the same.
-        Arch::new().dispatch(|| self.each(channels, tile, rect, |pixel, out| self.expand(pixel, rows, out)))
-    }
-
-    /// Standard errors of the means of all pixels, by the spread of the groups; NaN below two epochs.
-    pub fn standard_errors(
-        &self,
-        rows: &[f32],
-        channels: usize,
-        tile: [u32; 2],
-        rect: Rect,
-        groups: &Groups,
-    ) -> Vec<f32> {
-        let mut scratch = vec![0.0; channels];
-        Arch::new().dispatch(|| {
-            self.each(channels, tile, rect, |pixel, out| self.standard_error(pixel, rows, groups, &mut scratch, out))
-        })
-    }
-
-    /// Of one pixel. Var = Σ b_g (m_g - m)² / ((G - 1) B): b_g of B epochs are of group g, whose mean is m_g.
-    #[inline(always)]
-    pub fn standard_error(&self, pixel: usize, rows: &[f32], groups: &Groups, mean: &mut [f32], out: &mut [f32]) {
-        let all: u32 = groups.epochs.iter().sum();
-        let spread_over = groups.epochs.iter().filter(|&&n| n > 0).count();
-        if all < 2 {
-            return out.fill(f32::NAN);
-        }
-        self.expand(pixel, rows, mean);
-        let mut variance = vec![0.0f64; out.len()];
-        let total: f64 = groups.samples.iter().sum();
+    /// The weight that an entry has by the samples of a group alone; all groups have `total` samples.
+    fn weight_in(&self, entry: usize, group: usize, groups: &Groups, total: f64) -> f32 {
         let others = self.groups - 1;
-        for (group, &epochs) in groups.epochs.iter().enumerate().filter(|(_, n)| **n > 0) {
-            let of_group = |i: usize| {
-                let shares = &self.shares[i * others..(i + 1) * others];
-                let share = if group == 0 { 1.0 - shares.iter().sum::<f32>() } else { shares[group - 1] };
-                (f64::from(self.weight[i] * share) * total / groups.samples[group]) as f32
-            };
-            self.sum(pixel, rows, of_group, out);
-            for ((variance, &of_group), &mean) in variance.iter_mut().zip(&*out).zip(&*mean) {
-                let distance = f64::from(of_group) - f64::from(mean);
-                *variance += f64::from(epochs) * distance * distance;
-            }
-        }
-        let divisor = (spread_over as f64 - 1.0) * f64::from(all);
-        out.iter_mut().zip(variance).for_each(|(out, variance)| *out = (variance / divisor).sqrt() as f32);
-    }
-
-    #[inline(always)]
-    fn each(&self, channels: usize, tile: [u32; 2], rect: Rect, mut fill: impl FnMut(usize, &mut [f32])) -> Vec<f32> {
-        let mut values = vec![f32::NAN; self.pixels() * channels];
-        for x in 0..rect.width() {
-            for y in 0..rect.height() {
-                let out = &mut values[(x * tile[1] + y) as usize * channels..][..channels];
-                fill((y * tile[0] + x) as usize, out);
-            }
-        }
-        values
+        let shares = &self.shares[entry * others..(entry + 1) * others];
+        let share = if group == 0 { 1.0 - shares.iter().sum::<f32>() } else { shares[group - 1] };
+        (f64::from(self.weight[entry] * share) * total / groups.samples[group]) as f32
     }
 
     /// How much each product matters.
@@ -590,6 +531,7 @@ pub fn systematic(importances: &[f64], most: usize, random: u64) -> Vec<(usize, 
 
 #[cfg(test)]
 mod tests {
+    use super::super::grid::Rect;
     use super::*;
 
     fn product(source: u16, factors: &[u16]) -> Product {
@@ -646,7 +588,7 @@ mod tests {
         assert_eq!(out, [0.0]);
         // Group 0: two epochs, means 1.5 and 1.5 of b's 10; group 1: one, 3 and 8 of c's 100.
         let (picture, groups) = (Rect { x0: 0, y0: 0, x1: 2, y1: 1 }, Groups::new(192, 64, 2));
-        let errors = all.standard_errors(&rows, 1, [2, 1], picture, &groups);
+        let errors = all.standard_errors(Rows::Made(&rows, 1), [2, 1], picture, &groups);
         let (m0, m1) = (1.5 + 15.0, 3.0 + 800.0);
         let m = (2.0 * m0 + m1) / 3.0;
         let want = ((2.0 * (m0 - m) * (m0 - m) + (m1 - m) * (m1 - m)) / 3.0f64).sqrt();

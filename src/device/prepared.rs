@@ -123,8 +123,8 @@ pub struct Prepared {
     pub first_hits: bool,
     /// What records say of products of spectra, where those are kept instead of channels.
     pub separable: Option<Separable>,
-    /// What of the scene does not separate into those, in words: of the remainder.
-    pub obstacles: Vec<String>,
+    /// What of its heat does not separate into those, in words: of the remainder.
+    of_heat: Vec<String>,
 }
 
 impl Prepared {
@@ -181,11 +181,10 @@ impl Prepared {
         let separated = (evaluator == Evaluator::Factored).then(|| Separated::new(scene, &heat, wanted)).transpose()?;
         let values = separated.as_ref().is_none_or(|separated| !separated.remainder.is_empty());
         let (tables, ids, warp) = spectral_tables(scene, &heat, needed, in_registers, values, weights, emitted)?;
-        if let (Some(separated), Some(sky)) = (&separated, &mut sky) {
-            sky.leave(separated);
-        }
-        let obstacles = separated.as_ref().map(|separated| separated.remainder.clone()).unwrap_or_default();
         let separable = separated.map(|separated| separated.by_id(&ids, needed, radiators.as_ref(), &tables));
+        if let (Some(separable), Some(sky)) = (&separable, &mut sky) {
+            sky.append_left(separable);
+        }
         let factor = |s: usize| tables.ids[ids.factors[&s]];
         let source = |s: usize| tables.ids[ids.sources[&s]];
         let id = |position: usize| tables.ids[ids.needed[position]];
@@ -232,7 +231,7 @@ impl Prepared {
             path_weight: ids.path_weight.map(|position| tables.ids[position]),
             integration,
             separable,
-            obstacles,
+            of_heat: separable::of_heat(&heat),
             thinning: None,
             lines: lines(scene, &accel),
             distortion: scene.camera.distortion.map(|Distortion { radial: [k1, k2, k3], tangential: [p1, p2] }| {
@@ -284,6 +283,11 @@ impl Prepared {
     /// Whether what does not separate is evaluated in channels, beside weights.
     pub fn has_remainder(&self) -> bool {
         self.separable.as_ref().is_some_and(|separable| separable.has_remainder)
+    }
+
+    /// What of `scene`, which this is made of, does not separate into products of spectra, in words.
+    pub fn obstacles(&self, scene: &Scene) -> Vec<String> {
+        separable::obstacles(scene, self.of_heat.clone())
     }
 
     /// On a device that binds each array as a whole.

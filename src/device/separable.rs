@@ -91,7 +91,7 @@ pub fn of(scene: &Scene) -> Result<Separated> {
 /// What of `scene` does not separate, in words: nothing where all does.
 pub fn remainder(scene: &Scene) -> Vec<String> {
     let heat = heat::as_emission(scene);
-    obstacles(&heat.scene, &heat)
+    obstacles(scene, of_heat(&heat))
 }
 
 impl Separated {
@@ -118,7 +118,7 @@ impl Separated {
         let mut maker = Maker { scene, basis: Basis::default(), nodes: Vec::new() };
         let mut separated = Separated {
             basis: Basis::default(),
-            remainder: obstacles(scene, heat),
+            remainder: obstacles(scene, of_heat(heat)),
             factors: BTreeMap::new(),
             complements: BTreeMap::new(),
             sources: BTreeMap::new(),
@@ -185,11 +185,6 @@ impl Separated {
         Radiating::Hot { nodes: maker.temperatures(part, channels), keeps }
     }
 
-    /// What the environment is made of, where it is a map of spectra, and its scale.
-    pub fn map(&self) -> Option<(&Clusters, f64)> {
-        self.map.as_ref().map(|map| (&*map.clusters, map.scale))
-    }
-
     /// The most factors of a product of paths of so many bounces: where something hot ends them, what it keeps of light is one.
     pub fn most_factors(&self, bounces: u32) -> u32 {
         bounces + u32::from(!self.complements.is_empty())
@@ -251,7 +246,9 @@ impl Separated {
             as_factor | if source.is_some() { SEPARATES_AS_SOURCE } else { 0 }
         });
         let (bits, complements, map) = (bits.collect(), self.complements.clone(), self.map.clone());
-        Separable { bits, factors, complements, sources, heat, map, has_remainder: !self.remainder.is_empty() }
+        let counts = [self.basis.sources.len(), self.basis.factors.len()];
+        let has_remainder = !self.remainder.is_empty();
+        Separable { bits, factors, complements, sources, heat, map, counts, has_remainder }
     }
 }
 
@@ -423,8 +420,8 @@ fn radiates_products(scene: &Scene, surface: &heat::Radiating) -> bool {
     lamp && surface.parts.iter().all(|part| separates_by_place(scene, part))
 }
 
-/// [`remainder`] of a scene whose heat is emission already.
-fn obstacles(scene: &Scene, heat: &Heat) -> Vec<String> {
+/// [`remainder`], of which that `of_heat` is known. It looks into maps, which takes its time.
+pub fn obstacles(scene: &Scene, of_heat: Vec<String>) -> Vec<String> {
     let mut found: Vec<String> = Vec::new();
     for material in &scene.materials {
         let kind = match &material.bsdf {
@@ -452,6 +449,15 @@ fn obstacles(scene: &Scene, heat: &Heat) -> Vec<String> {
             Some(_) => {}
         }
     }
+    found.extend(of_heat);
+    found.dedup();
+    found
+}
+
+/// What of heat does not separate, in words.
+pub fn of_heat(heat: &Heat) -> Vec<String> {
+    let scene = &*heat.scene;
+    let mut found: Vec<String> = Vec::new();
     if !heat.by_angle.is_empty() {
         found.push("heat of surfaces whose front and back differ, or by angle".into());
     }
@@ -463,6 +469,5 @@ fn obstacles(scene: &Scene, heat: &Heat) -> Vec<String> {
             found.push(format!("heat of the material \"{}\"", scene.materials[part.material].name));
         }
     }
-    found.dedup();
     found
 }

@@ -130,6 +130,12 @@ impl Pass {
     }
 }
 
+/// Workgroup counts in x and y for at least `groups` groups: a dimension takes at most 65,535.
+pub fn grid(groups: u32) -> [u32; 2] {
+    let y = groups.div_ceil(65_535).max(1);
+    [groups.div_ceil(y), y]
+}
+
 /// Storage buffers that a kernel binds.
 pub fn storage_buffers(source: &Source) -> Result<u32> {
     Ok(bindings(&source.parse()?).iter().filter(|b| !b.uniform).count() as u32)

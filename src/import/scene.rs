@@ -9,7 +9,7 @@ use super::geometry::similarity;
 use super::report::Report;
 use super::text;
 use crate::format::csv_table;
-use crate::spectral::{Curve, Outside};
+use crate::spectral::Curve;
 use crate::{Error, Result};
 
 /// A table of the file.
@@ -73,14 +73,6 @@ impl Assembly {
             object.entries.iter().any(|(key, _)| ["sphere", "disk", "cylinder"].contains(&key.as_str()))
         };
         similarity(to_world.matrix3).is_some() || !self.objects.iter().any(is_round)
-    }
-}
-
-/// What a table is beyond its ends, as scenes say it.
-fn beyond(outside: Outside) -> &'static str {
-    match outside {
-        Outside::Hold => "outside = \"hold\"",
-        Outside::Zero => "outside = \"zero\"",
     }
 }
 
@@ -212,7 +204,11 @@ impl Scene {
             Curve::Linear { nm, value, outside } if nm.len() <= 6 => {
                 let samples =
                     nm.iter().zip(value).map(|(nm, v)| format!("[{}, {}]", text::rounded(*nm), text::rounded(*v)));
-                Ok(format!("{{ samples = [{}], {} }}", samples.collect::<Vec<_>>().join(", "), beyond(*outside)))
+                Ok(format!(
+                    "{{ samples = [{}], outside = \"{}\" }}",
+                    samples.collect::<Vec<_>>().join(", "),
+                    outside.name()
+                ))
             }
             Curve::Linear { nm, value, outside } => {
                 let mut table = csv_table::Table::new(["nm", "value"]);
@@ -226,7 +222,7 @@ impl Scene {
                         path
                     }
                 };
-                Ok(format!("{{ file = {}, {} }}", text::quoted(&path), beyond(*outside)))
+                Ok(format!("{{ file = {}, outside = \"{}\" }}", text::quoted(&path), outside.name()))
             }
         }
     }

@@ -10,11 +10,10 @@ use crate::cube::{Entries, Expand};
 use crate::device::kernels::expanding;
 use crate::gpu::adapter::{Gpu, Selection};
 use crate::gpu::buffer;
-use crate::gpu::pass::Pass;
+use crate::gpu::pass::{Pass, grid};
 
-/// Threads of a workgroup, and workgroups of a row of a dispatch.
+/// Threads of a workgroup.
 const THREADS: u32 = 64;
-const ACROSS: u32 = 1 << 15;
 /// Bytes of a buffer at most: of more channels some are made at a time.
 const MOST_BYTES: u64 = 128 << 20;
 
@@ -34,8 +33,7 @@ struct Task {
     entries: u32,
     sets: u32,
     divisor: f32,
-    across: u32,
-    unused: [u32; 2],
+    unused: [u32; 3],
 }
 
 impl Devices {
@@ -48,11 +46,6 @@ impl Devices {
         Ok(Devices { devices, next: AtomicUsize::new(0), most_bytes: MOST_BYTES })
     }
 
-    /// With less room, so that channels come in turns.
-    pub fn with_most_bytes(self, most_bytes: u64) -> Devices {
-        Devices { most_bytes, ..self }
-    }
-
     /// Their names, in order.
     pub fn names(&self) -> Vec<String> {
         let name =
@@ -62,54 +55,92 @@ impl Devices {
 }
 
 impl Expand for Devices {
-    fn sums(&self, of: Entries) -> Result<Vec<f32>> {
+    fn sums(&self, of: &Entries, values: &mut [f32], errors: &mut [f32]) -> Result<()> {
         let number = self.next.fetch_add(1, Ordering::Relaxed) % self.devices.len();
         let device = self.devices[number].lock().unwrap_or_else(|broken| broken.into_inner());
         let (gpu, pass) = &*device;
-        let (pixels, all, products) = (of.pixels(), of.channels, of.rows.len() / of.channels.max(1));
+        let (pixels, all, products) = (of.pixels.len(), of.rows.channels(), of.rows.products());
         let largest = gpu.limits.max_storage_buffer_binding_size.min(self.most_bytes) / 4;
         let at_once = (largest / products.max(pixels).max(1) as u64).clamp(1, all as u64) as usize;
-        let starts = buffer::storage(gpu, "starts", of.starts)?;
+        let ranges = buffer::storage(gpu, "pixels", &of.pixels)?;
         let entries = buffer::storage(gpu, "products", of.products)?;
         let weights = buffer::storage(gpu, "weights", &of.sets.concat())?;
         let epochs: Vec<f32> = [0.0].into_iter().chain(of.epochs.iter().map(|epochs| *epochs as f32)).collect();
         let epochs = buffer::storage(gpu, "epochs", &epochs)?;
-        let mut values = vec![0.0f32; pixels * all];
         for from in (0..all).step_by(at_once) {
             let channels = at_once.min(all - from);
-            let rows: Vec<f32> =
-                of.rows.chunks_exact(all).flat_map(|row| &row[from..from + channels]).copied().collect();
+            let mut rows = vec![0.0f32; products * channels];
+            of.rows.write(from..from + channels, channels, &mut rows);
             let rows = buffer::storage(gpu, "rows", &rows)?;
             let bytes = 4 * (pixels * channels) as u64;
-            let sums = buffer::output(gpu, "sums", bytes);
+            let means = buffer::output(gpu, "means", bytes);
+            let deviations = buffer::output(gpu, "deviations", if errors.is_empty() { 4 } else { bytes });
             let task = Task {
                 pixels: pixels as u32,
                 channels: channels as u32,
                 entries: of.products.len() as u32,
                 sets: of.sets.len() as u32,
                 divisor: of.divisor as f32,
-                across: ACROSS,
-                unused: [0; 2],
+                unused: [0; 3],
             };
             let task = buffer::uniform(gpu, "task", bytemuck::bytes_of(&task));
             let groups = pixels as u32 * (channels as u32).div_ceil(THREADS);
-            pass.run(gpu, [groups.min(ACROSS), groups.div_ceil(ACROSS)], |name| {
+            pass.run(gpu, grid(groups), |name| {
                 let buffer = match name {
                     "task" => &task,
-                    "starts" => &starts,
+                    "pixels" => &ranges,
                     "products" => &entries,
                     "weights" => &weights,
                     "epochs" => &epochs,
                     "rows" => &rows,
-                    _ => &sums,
+                    "means" => &means,
+                    _ => &deviations,
                 };
                 Some(buffer.as_entire_buffer_binding())
             })?;
-            let made: Vec<f32> = buffer::read(gpu, &sums, bytes, buffer::WARM_UP)?;
-            for (to, made) in values.chunks_exact_mut(all).zip(made.chunks_exact(channels)) {
-                to[from..from + channels].copy_from_slice(made);
+            for (made, to) in [(&means, &mut *values), (&deviations, &mut *errors)] {
+                if to.is_empty() {
+                    continue;
+                }
+                let made: Vec<f32> = buffer::read(gpu, made, bytes, buffer::WARM_UP)?;
+                for (to, made) in to.chunks_exact_mut(all).zip(made.chunks_exact(channels)) {
+                    to[from..from + channels].copy_from_slice(made);
+                }
             }
         }
-        Ok(values)
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use smallvec::smallvec;
+
+    use super::*;
+    use crate::cube::{Rect, Rows, Weights};
+    use crate::spectral::product::Product;
+
+    /// Channels that come in turns, the last of them fewer, are those of the processor.
+    #[test]
+    fn turns_of_channels_are_all_of_them() {
+        let number = |i: usize| ((i * 7919) % 1013) as f32 / 97.0;
+        let product = |i: usize| Product { factors: smallvec![i as u16], source: 0 };
+        let entries =
+            |pixel: usize| (0..5 * pixel).map(move |i| (product((i + pixel) % 71), f64::from(number(i * pixel))));
+        let weights = Weights::of_pixels((0..12).map(entries));
+        let (tile, rect, channels) = ([3, 4], Rect { x0: 3, y0: 4, x1: 5, y1: 7 }, 100);
+        let rows: Vec<f32> = (0..weights.products.len() * channels).map(number).collect();
+        let rows = Rows::Made(&rows, channels);
+        let want = weights.expanded(rows, tile, rect);
+        let most_bytes = 4 * 30 * weights.products.len() as u64;
+        let devices = Devices { most_bytes, ..Devices::open(&Selection::Count(1)).expect("a device") };
+        let (mut got, mut errors) = (Vec::new(), Vec::new());
+        let done = weights.expand_by(&devices, rows, tile, rect, None, [&mut got, &mut errors]);
+        done.expect("a device that works");
+        assert!(errors.is_empty());
+        assert!(want.iter().any(|v| *v > 0.0) && want.iter().any(|v| v.is_nan()));
+        for (got, want) in got.iter().zip(&want) {
+            assert!(got.is_nan() && want.is_nan() || (got - want).abs() <= 2e-6 * want, "{got} {want}");
+        }
     }
 }

@@ -134,7 +134,7 @@ pub struct Saved<'a> {
 
 impl Met {
     fn new(scene: &Separable) -> Met {
-        let [sources, factors] = scene.ends();
+        let [sources, factors] = scene.counts;
         Met::of(factors, sources)
     }
 

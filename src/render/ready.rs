@@ -88,8 +88,8 @@ pub(super) fn get_ready(
         }
         Err(error) => return Err(error),
     }
-    if evaluator == Evaluator::Factored && !prepared.obstacles.is_empty() {
-        let what = prepared.obstacles.join(", ");
+    if evaluator == Evaluator::Factored && prepared.has_remainder() {
+        let what = prepared.obstacles(&job.scene).join(", ");
         observe(Event::Note(format!(
             "light by what does not separate stays in channels, where relight cannot change it: {what} (plan --pilot says how much it is)"
         )))?;

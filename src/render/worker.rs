@@ -15,7 +15,7 @@ use crate::gpu::adapter::Gpu;
 use crate::gpu::buffer;
 #[cfg(test)]
 use crate::gpu::fault::{self, Phase};
-use crate::gpu::pass::Pass;
+use crate::gpu::pass::{Pass, grid};
 use crate::gpu::source::Source;
 use crate::gpu::timestamps::Timestamps;
 use crate::gpu::upload::NamedBuffers;
@@ -595,12 +595,6 @@ pub fn device_limits(gpu: &Gpu) -> DeviceLimits {
 /// What marks wave `number` on the device: 16 bits, never 0.
 fn sequence(number: u64) -> u32 {
     (number % 65_535) as u32 + 1
-}
-
-/// Workgroup counts in x and y for at least `groups` groups: a dimension takes at most 65,535.
-fn grid(groups: u32) -> [u32; 2] {
-    let y = groups.div_ceil(65_535).max(1);
-    [groups.div_ceil(y), y]
 }
 
 impl Stage {

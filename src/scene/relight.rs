@@ -16,7 +16,7 @@ use super::{channels, overrides};
 use crate::error::Error;
 use crate::format::response::{self, Responses};
 use crate::spectral::product::{Basis, Leaf, Term};
-use crate::spectral::{Channels, Curve, Outside, planck};
+use crate::spectral::{Channels, Curve, planck};
 use crate::{Result, files};
 
 /// A factored cube as it was rendered.
@@ -238,8 +238,7 @@ fn written(curve: &Curve) -> String {
         Curve::Blackbody { kelvin, scale } => format!("blackbody = {kelvin:?}\nscale = {scale:?}\n"),
         Curve::Linear { nm, value, outside } => {
             let nodes: Vec<String> = nm.iter().zip(value).map(|(nm, value)| format!("[{nm:?}, {value:?}]")).collect();
-            let outside = if *outside == Outside::Hold { "hold" } else { "zero" };
-            format!("samples = [{}]\noutside = \"{outside}\"\n", nodes.join(", "))
+            format!("samples = [{}]\noutside = \"{}\"\n", nodes.join(", "), outside.name())
         }
     }
 }
@@ -388,6 +387,7 @@ fn channels_document(channels: &Channels) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::spectral::Outside;
     use crate::spectral::product::Expression;
 
     fn basis() -> Basis {

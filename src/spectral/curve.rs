@@ -17,6 +17,16 @@ pub enum Outside {
     Hold,
 }
 
+impl Outside {
+    /// As scene files call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Outside::Zero => "zero",
+            Outside::Hold => "hold",
+        }
+    }
+}
+
 /// On the line from node `i - 1` to node `i`.
 fn between(x: &[f64], y: &[f64], i: usize, at: f64) -> f64 {
     let t = (at - x[i - 1]) / (x[i] - x[i - 1]);

@@ -2,6 +2,8 @@
 //! *product*, one source spectrum times powers of factor spectra. Whoever has the weights of a picture can make it anew for any
 //! spectra and channels, exactly in wavelength.
 
+use std::ops::Range;
+
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 
@@ -191,9 +193,9 @@ impl Expander {
         let mut expander =
             Expander { channels: channels.len(), ends, weights, factors, sources, brightest: Vec::new() };
         let mut brightest = vec![0.0f64; channels.len()];
+        let runs = expander.runs(0..channels.len());
         for source in &expander.sources {
-            let means = expander.means(&expander.weights, source);
-            brightest.iter_mut().zip(means).for_each(|(most, mean)| *most = most.max(mean));
+            means(&runs, &expander.weights, source, |k, mean| brightest[k] = brightest[k].max(mean));
         }
         expander.brightest = brightest;
         expander
@@ -203,43 +205,58 @@ impl Expander {
         self.channels
     }
 
-    /// Σ over the nodes of each channel.
-    #[inline(always)]
-    fn means<'a>(&'a self, weighted: &'a [f64], values: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
-        let mut begin = 0;
-        self.ends.iter().map(move |&end| {
-            let sum = weighted[begin..end].iter().zip(&values[begin..end]).map(|(w, v)| w * v).sum();
-            begin = end;
-            sum
-        })
+    /// The nodes of some channels.
+    fn nodes(&self, channels: &Range<usize>) -> Range<usize> {
+        let end = |channels: usize| if channels > 0 { self.ends[channels - 1] } else { 0 };
+        end(channels.start)..end(channels.end)
     }
 
-    /// The mean of each product over each channel, [product][channel]. Fast where `products` ascend: what two have in common is
-    /// multiplied once.
-    pub fn rows(&self, products: &[Product]) -> Vec<f32> {
-        // Compiled for every width of vectors, of which the machine's is taken; what is computed is the same.
-        pulp::Arch::new().dispatch(|| self.rows_of(products))
-    }
-
-    #[inline(always)]
-    fn rows_of(&self, products: &[Product]) -> Vec<f32> {
-        let mut rows = Vec::with_capacity(products.len() * self.channels);
-        // Weights times the first so many factors of the last product.
-        let mut partial: Vec<Vec<f64>> = vec![self.weights.clone()];
-        let mut before: &[u16] = &[];
-        for product in products {
-            let common = before.iter().zip(&product.factors).take_while(|(a, b)| a == b).count();
-            partial.truncate(common + 1);
-            for &factor in &product.factors[common..] {
-                let last = &partial[partial.len() - 1];
-                let next = last.iter().zip(&self.factors[usize::from(factor)]).map(|(w, v)| w * v).collect();
-                partial.push(next);
+    /// How many nodes each of some channels has, and how many channels in turn have as many.
+    fn runs(&self, channels: Range<usize>) -> Vec<(usize, usize)> {
+        let mut runs: Vec<(usize, usize)> = Vec::new();
+        for k in channels {
+            let nodes = self.nodes(&(k..k + 1)).len();
+            match runs.last_mut() {
+                Some((of_last, count)) if *of_last == nodes => *count += 1,
+                _ => runs.push((nodes, 1)),
             }
-            let weighted = &partial[partial.len() - 1];
-            rows.extend(self.means(weighted, &self.sources[usize::from(product.source)]).map(|mean| mean as f32));
+        }
+        runs
+    }
+
+    /// The mean of each product over each channel, [product][channel].
+    pub fn rows(&self, products: &[Product]) -> Vec<f32> {
+        let mut rows = vec![0.0; products.len() * self.channels];
+        self.write_rows(products, 0..self.channels, self.channels, &mut rows);
+        rows
+    }
+
+    /// The mean of each product over each of some channels: a product's in `out` from `width` times its number on. Fast where `products`
+    /// ascend: what two have in common is multiplied once.
+    pub fn write_rows(&self, products: &[Product], channels: Range<usize>, width: usize, out: &mut [f32]) {
+        // Compiled for every width of vectors, of which the machine's is taken; what is computed is the same.
+        pulp::Arch::new().dispatch(|| self.write_rows_of(products, channels.clone(), width, out));
+    }
+
+    #[inline(always)]
+    fn write_rows_of(&self, products: &[Product], channels: Range<usize>, width: usize, out: &mut [f32]) {
+        let (nodes, runs) = (self.nodes(&channels), self.runs(channels));
+        // Weights times the first so many factors of the last product, one behind the other.
+        let mut partial = self.weights[nodes.clone()].to_vec();
+        let mut before: &[u16] = &[];
+        for (product, out) in products.iter().zip(out.chunks_mut(width)) {
+            let common = before.iter().zip(&product.factors).take_while(|(a, b)| a == b).count();
+            let of = |number: usize| number * nodes.len()..(number + 1) * nodes.len();
+            partial.resize(of(product.factors.len()).end, 0.0);
+            for (number, &factor) in product.factors.iter().enumerate().skip(common) {
+                let (last, next) = partial[of(number).start..of(number + 1).end].split_at_mut(nodes.len());
+                let factor = &self.factors[usize::from(factor)][nodes.clone()];
+                next.iter_mut().zip(last).zip(factor).for_each(|((next, w), v)| *next = *w * v);
+            }
+            let source = &self.sources[usize::from(product.source)][nodes.clone()];
+            means(&runs, &partial[of(product.factors.len())], source, |k, mean| out[k] = mean as f32);
             before = &product.factors;
         }
-        rows
     }
 
     /// How much a unit of weight of a product matters: half by the channel in which it is the largest share of the brightest source,
@@ -248,6 +265,40 @@ impl Expander {
         let shares = row.iter().zip(&self.brightest).filter(|(_, most)| **most > 0.0);
         let largest = shares.map(|(mean, most)| f64::from(*mean) / most).fold(0.0, f64::max);
         0.5 * largest + 0.5 * 0.5f64.powi(product.factors.len() as i32)
+    }
+}
+
+/// Σ weight x value over the nodes of each channel, for channels by [`Expander::runs`].
+#[inline(always)]
+fn means(runs: &[(usize, usize)], weighted: &[f64], values: &[f64], mut each: impl FnMut(usize, f64)) {
+    let (mut channel, mut node) = (0, 0);
+    for &(nodes, count) in runs {
+        let own = node..node + nodes * count;
+        let (weighted, values) = (&weighted[own.clone()], &values[own.clone()]);
+        let mut each = |k: usize, mean: f64| each(channel + k, mean);
+        match nodes {
+            1 => means_of::<1>(weighted, values, each),
+            2 => means_of::<2>(weighted, values, each),
+            3 => means_of::<3>(weighted, values, each),
+            4 => means_of::<4>(weighted, values, each),
+            _ => weighted
+                .chunks(nodes)
+                .zip(values.chunks(nodes))
+                .map(|(weighted, values)| weighted.iter().zip(values).map(|(w, v)| w * v).sum())
+                .enumerate()
+                .for_each(|(k, mean)| each(k, mean)),
+        }
+        (channel, node) = (channel + count, own.end);
+    }
+}
+
+/// The same where every channel has `N` nodes, known when this is compiled.
+#[inline(always)]
+fn means_of<const N: usize>(weighted: &[f64], values: &[f64], mut each: impl FnMut(usize, f64)) {
+    for (k, (weighted, values)) in weighted.as_chunks::<N>().0.iter().zip(values.as_chunks::<N>().0).enumerate() {
+        let mut sum = 0.0;
+        weighted.iter().zip(values).for_each(|(w, v)| sum += w * v);
+        each(k, sum);
     }
 }
 

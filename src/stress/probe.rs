@@ -10,7 +10,7 @@ use crate::device::text::{Module, module};
 use crate::device::windows::Windows;
 use crate::gpu::adapter::Gpu;
 use crate::gpu::buffer::{self, Buffer};
-use crate::gpu::pass::Pass;
+use crate::gpu::pass::{Pass, grid};
 use crate::gpu::upload::NamedBuffers;
 use crate::render::worker::{device_limits, upload};
 
@@ -53,9 +53,7 @@ impl<'a> Kernel<'a> {
         let input = buffer::storage(gpu, "asked", asked)?;
         let size = (size_of::<T>() * answers) as u64;
         let output = buffer::output(gpu, "given", size);
-        let workgroups = (answers as u32).div_ceil(64);
-        let grid = [workgroups.min(1 << 15), workgroups.div_ceil(1 << 15)];
-        self.pass.run(gpu, grid, |name| match name {
+        self.pass.run(gpu, grid((answers as u32).div_ceil(64)), |name| match name {
             "asked" => Some(input.as_entire_buffer_binding()),
             "given" => Some(output.as_entire_buffer_binding()),
             _ => self.scene.find(name).or(Some(self.unused.as_entire_buffer_binding())),

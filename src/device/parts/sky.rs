@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use crate::device::part::{Part, Place, Records, SceneBuffer};
 use crate::device::parts::lights::STEPS;
-use crate::device::separable::Separated;
+use crate::device::separable::Separable;
 use crate::device::text::module;
 use crate::scene::{EnvironmentMap, Scene, Texels};
 use crate::spectral::skylight;
@@ -45,7 +45,9 @@ pub const MAP: Part = Part {
         if let Some(bands) = map.bands {
             defines.set("MAP_SPECTRAL", true).constant("MAP_BANDS", bands);
         }
-        defines.set("MAP_SEPARATES", map.separates).set("MAP_LEFT", map.has_left);
+        let separable = scene.separable.as_ref();
+        defines.set("MAP_SEPARATES", separable.is_some_and(Separable::has_map));
+        defines.set("MAP_LEFT", separable.is_some_and(|separable| separable.left_of_map().is_some()));
     },
     buffers: |scene| {
         let buffers = scene.prepared.sky.as_ref().map(|map| {
@@ -72,9 +74,6 @@ pub struct SkyMap {
     pub texels: Vec<f32>,
     /// Bands of a spectral map.
     pub bands: Option<u32>,
-    /// In factored renders: whether it is a sum of sources of products; which leave something.
-    pub separates: bool,
-    pub has_left: bool,
     /// Place of a wavelength: t of a smooth spectrum; or among the bands, the first at 1, and 0 outside.
     pub axis: Curve,
     /// Ids of its spectrum, and of the one that multiplies all texels.
@@ -124,18 +123,13 @@ impl SkyMap {
                 (texels, Some(count as u32), axis, flux, importance)
             }
         };
-        let (separates, has_left, table) = (false, false, table(map, &importance));
-        SkyMap { size: map.size, texels, bands, separates, has_left, axis, axis_id: 0, source_id: 0, table, flux }
+        SkyMap { size: map.size, texels, bands, axis, axis_id: 0, source_id: 0, table: table(map, &importance), flux }
     }
 
-    /// Takes what products leave of the map for the remainder.
-    pub fn leave(&mut self, separated: &Separated) {
-        let Some((clusters, scale)) = separated.map() else { return };
-        self.separates = true;
-        if let Some(left) = &clusters.left {
-            self.has_left = true;
-            self.texels.extend(left.iter().map(|v| (f64::from(*v) * scale) as f32));
-        }
+    /// Appends what products leave of the map, which is of the remainder.
+    pub fn append_left(&mut self, separable: &Separable) {
+        let Some((left, scale)) = separable.left_of_map() else { return };
+        self.texels.extend(left.iter().map(|v| (f64::from(*v) * scale) as f32));
     }
 }
 

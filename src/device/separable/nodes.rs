@@ -22,10 +22,6 @@ impl Nodes {
         Nodes { kelvin, sources }
     }
 
-    pub fn sources(&self) -> impl Iterator<Item = u16> + '_ {
-        self.sources.iter().copied()
-    }
-
     /// Two sources and how much of each is sent at a temperature. A single node is every temperature.
     pub fn at(&self, kelvin: f64) -> [(f64, u16); 2] {
         let last = self.kelvin.len() - 1;

@@ -35,6 +35,8 @@ pub struct Separable {
     pub(super) map: Option<Map>,
     /// The same for devices: [`SEPARATES_AS_FACTOR`] and [`SEPARATES_AS_SOURCE`] of each id.
     pub bits: Vec<u32>,
+    /// How many sources and factors products are made of.
+    pub counts: [usize; 2],
     /// Whether there is something that does not separate.
     pub has_remainder: bool,
 }
@@ -60,23 +62,14 @@ impl Separable {
         self.complements.get(&factor).copied()
     }
 
-    /// Numbers of all sources, and of factors: one more than the last.
-    pub fn ends(&self) -> [usize; 2] {
-        let end = |most: Option<u16>| most.map_or(0, |most| usize::from(most) + 1);
-        let of_ids = self.factors.iter().filter_map(|factor| factor.of_product());
-        let emitted = self.factors.iter().filter_map(|factor| match factor {
-            Factor::Source(source) => Some(*source),
-            _ => None,
-        });
-        let nodes = self.heat.iter().flatten().flat_map(|nodes| nodes.sources());
-        let of_map = self.map.iter().flat_map(|map| map.sources.iter().copied());
-        let sources = self.sources.iter().flatten().flatten().copied().chain(emitted).chain(nodes).chain(of_map);
-        [end(sources.max()), end(of_ids.chain(self.complements.values().copied()).max())]
-    }
-
     /// Whether a map is a sum of sources, but for what these leave of it.
     pub fn has_map(&self) -> bool {
         self.map.is_some()
+    }
+
+    /// What its sources leave of a map, if that is anything, and the map's scale.
+    pub fn left_of_map(&self) -> Option<(&[f32], f64)> {
+        self.map.as_ref().and_then(|map| Some((map.clusters.left.as_deref()?, map.scale)))
     }
 
     /// Of a map ([`Separable::has_map`]) how much of which sources there is at the place that a record names.
