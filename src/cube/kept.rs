@@ -213,9 +213,8 @@ impl Relit<'_> {
         let light = self.light;
         let make = || {
             let TileWeights { weights, remainder } = &*of_tile;
-            let rows = light.expander.rows(&weights.products);
-            let rows = rows.chunks(light.expander.channels().max(1));
-            let rows: Vec<[f64; 3]> = rows.map(|row| self.kept.colours.of_spectrum(row)).collect();
+            let mut rows: Vec<[f64; 3]> = Vec::with_capacity(weights.products.len());
+            light.expander.each_row(&weights.products, |row| rows.push(self.kept.colours.of_spectrum(row)));
             let mut planes = Vec::with_capacity(3 * weights.pixels());
             for pixel in 0..weights.pixels() {
                 let mut sum = [0.0f64; 3];
@@ -346,10 +345,11 @@ impl Relit<'_> {
                     }
                 }
                 pixels += shared.pixels();
-                let rows = self.light.expander.rows(&weights.products);
-                for (row, weight) in rows.chunks(all.max(1)).zip(of_products).filter(|(_, weight)| *weight != 0.0) {
+                let mut of_products = of_products.into_iter();
+                self.light.expander.each_row(&weights.products, |row| {
+                    let weight = of_products.next().expect("one of each");
                     radiance.iter_mut().zip(row).for_each(|(sum, &value)| *sum += weight * f64::from(value));
-                }
+                });
             },
         )?;
         radiance.iter_mut().for_each(|sum| *sum /= pixels as f64);

@@ -57,6 +57,11 @@ pub fn expanding() -> Source {
     compose(&[module!("passes/expand.wgsl")], &Defines::default())
 }
 
+/// What says how many workgroups a bounce takes; of no scene.
+pub fn launching() -> Source {
+    compose(&[module!("passes/launch.wgsl")], &Defines::default())
+}
+
 /// What takes spectra along records.
 const EVALUATING: &[Text] = &[TYPES, FRAME, SAVED_PATHS, Of(module!("common/spectra.wgsl")), Parts(Place::Evaluate)];
 

@@ -279,10 +279,15 @@ impl WavePlan {
         (u64::from(self.max_bounces) + 1) * 4
     }
 
+    /// How many workgroups the next bounce takes, in three dimensions.
+    pub fn launch_bytes(&self) -> u64 {
+        12
+    }
+
     /// Everything but the scene that a device holds: path buffers, means, and two staging buffers.
     pub fn wave_bytes(&self) -> u64 {
-        let fixed =
-            [size_of::<Wave>() as u64, size_of::<Counters>() as u64, self.step_bytes(), self.queue_length_bytes()];
+        let words = [size_of::<Wave>(), size_of::<Counters>()].map(|size| size as u64);
+        let fixed = [words[0], words[1], self.step_bytes(), self.queue_length_bytes(), self.launch_bytes()];
         let by_paths = [self.state_bytes(), self.head_bytes(), self.record_bytes(), self.queue_bytes()];
         let by_units = [self.unit_list_bytes(), self.mean_bytes(), self.staging_bytes(), self.staging_bytes()];
         let throughputs = self.scaled.then(|| self.throughput_bytes());

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use crate::cube::Weights;
 use crate::device::evaluator::EvaluateShape;
 use crate::device::facts;
+use crate::device::kernels::launching;
 use crate::device::part::OnDevice;
 use crate::device::prepared::Prepared;
 use crate::device::windows::Windows;
@@ -66,6 +67,9 @@ pub struct Worker {
     prepared: Arc<Prepared>,
     camera: Stage,
     bounce: Stage,
+    /// On software devices, between two bounces. A GPU is done with workgroups that have nothing to do in no time; a processor takes
+    /// them one by one.
+    launch: Option<Stage>,
     /// After every bounce, in the conventional path tracer.
     update: Option<Stage>,
     /// Before evaluation, where not all paths are evaluated.
@@ -191,6 +195,7 @@ impl Worker {
         };
         let camera = stage(&kernels.camera)?;
         let bounce = stage(&kernels.bounce)?;
+        let launch = gpu.is_software.then(|| stage(&launching())).transpose()?;
         let update = kernels.update.as_ref().map(stage).transpose()?;
         let thin = kernels.thin.as_ref().map(stage).transpose()?;
         let evaluate = kernels.evaluate.as_ref().map(stage).transpose()?;
@@ -213,6 +218,7 @@ impl Worker {
             prepared,
             camera,
             bounce,
+            launch,
             update,
             thin,
             evaluate,
@@ -483,7 +489,13 @@ impl Worker {
                 self.lap(&mut encoder, 1)?;
                 pass = self.begin(&mut encoder, "generate", 2 * bounce);
             }
-            self.bounce.dispatch(&mut pass, &step(bounce), all, 1);
+            match &self.launch {
+                Some(launch) if bounce > 0 => {
+                    launch.dispatch(&mut pass, &step(bounce - 1), [1, 1], 1);
+                    self.bounce.dispatch_indirect(&mut pass, &step(bounce), &self.path_buffers.launches);
+                }
+                _ => self.bounce.dispatch(&mut pass, &step(bounce), all, 1),
+            }
             if self.update.is_some() {
                 drop(pass);
                 self.lap(&mut encoder, 0)?;
@@ -600,10 +612,20 @@ fn sequence(number: u64) -> u32 {
 impl Stage {
     /// `offsets`: one per dynamic binding of the pass.
     fn dispatch(&self, pass: &mut wgpu::ComputePass<'_>, offsets: &[u32], [x, y]: [u32; 2], z: u32) {
+        self.set(pass, offsets);
+        pass.dispatch_workgroups(x, y, z);
+    }
+
+    /// Likewise, over as many workgroups as stand in a buffer by then.
+    fn dispatch_indirect(&self, pass: &mut wgpu::ComputePass<'_>, offsets: &[u32], groups: &wgpu::Buffer) {
+        self.set(pass, offsets);
+        pass.dispatch_workgroups_indirect(groups, 0);
+    }
+
+    fn set(&self, pass: &mut wgpu::ComputePass<'_>, offsets: &[u32]) {
         pass.set_pipeline(&self.pass.pipeline);
         pass.set_bind_group(0, &self.groups[0], &[]);
         pass.set_bind_group(1, &self.groups[1], offsets);
-        pass.dispatch_workgroups(x, y, z);
     }
 }
 

@@ -231,6 +231,16 @@ impl Expander {
         rows
     }
 
+    /// The same, product by product, of which some are in memory at a time.
+    pub fn each_row(&self, products: &[Product], mut each: impl FnMut(&[f32])) {
+        const AT_ONCE: usize = 64;
+        let mut rows = vec![0.0; AT_ONCE * self.channels];
+        for products in products.chunks(AT_ONCE) {
+            self.write_rows(products, 0..self.channels, self.channels, &mut rows);
+            rows.chunks(self.channels).take(products.len()).for_each(&mut each);
+        }
+    }
+
     /// The mean of each product over each of some channels: a product's in `out` from `width` times its number on. Fast where `products`
     /// ascend: what two have in common is multiplied once.
     pub fn write_rows(&self, products: &[Product], channels: Range<usize>, width: usize, out: &mut [f32]) {

@@ -501,7 +501,10 @@ impl Setup {
             let in_units = |(k, e)| (self.in_units(k, e), coarser * resolution(self.anchors[k].value));
             estimates.into_iter().enumerate().map(in_units).collect::<Measured>()
         };
-        let needed = epochs(1.0, 11).iter().map(|(pilot, target)| times(pilot.error, *target)).fold(1.0, f64::max);
+        let needed = epochs(size::either(1.0, 4.0), 11)
+            .iter()
+            .map(|(pilot, target)| times(pilot.error, *target))
+            .fold(1.0, f64::max);
         epochs(needed, 7)
     }
 
@@ -514,7 +517,7 @@ impl Setup {
                 let (mean, error) = (image.mean[0], image.standard_error[0]);
                 self.in_units(k, Estimate { mean, error, freedom: samples - 1.0 })
             };
-            let pilot = size::either(4_096.0, 32_768.0);
+            let pilot = size::either(4_096.0, 262_144.0);
             let target = resolution(self.anchors[k].value);
             (estimate(pilot * times(estimate(pilot, 11).error, target).max(1.0), 7), target)
         };

@@ -105,11 +105,11 @@ impl Weights {
         [values, errors]: [&mut Vec<f32>; 2],
     ) -> Result<()> {
         let size = self.pixels() * rows.channels();
-        values.resize(size, 0.0);
-        errors.clear();
         let divisor = groups.and_then(Groups::divisor);
-        if groups.is_some() {
-            errors.resize(size, f32::NAN);
+        values.resize(size, 0.0);
+        errors.resize(if groups.is_some() { size } else { 0 }, 0.0);
+        if divisor.is_none() {
+            errors.fill(f32::NAN);
         }
         let (mut in_groups, mut epochs) = (Vec::new(), Vec::new());
         if let (Some(groups), Some(_)) = (groups, divisor) {

@@ -18,6 +18,7 @@ pub struct PathBuffers {
     pub throughputs: Option<wgpu::Buffer>,
     pub queue: wgpu::Buffer,
     pub queue_lengths: wgpu::Buffer,
+    pub launches: wgpu::Buffer,
     pub counters: wgpu::Buffer,
     pub means: wgpu::Buffer,
 }
@@ -46,6 +47,7 @@ impl PathBuffers {
             throughputs: plan.scaled.then(|| buffer::empty(gpu, "throughputs", plan.throughput_bytes(), storage)),
             queue: buffer::empty(gpu, "queue", plan.queue_bytes(), storage),
             queue_lengths: buffer::empty(gpu, "queue_lengths", plan.queue_length_bytes(), storage),
+            launches: buffer::empty(gpu, "launches", plan.launch_bytes(), U::STORAGE | U::INDIRECT),
             counters: buffer::empty(gpu, "counters", size_of::<Counters>() as u64, storage),
             means: buffer::empty(gpu, "means", plan.mean_bytes(), storage),
         }
@@ -66,6 +68,7 @@ impl PathBuffers {
             "throughputs" => self.throughputs.as_ref()?,
             "queue" => &self.queue,
             "queue_lengths" => &self.queue_lengths,
+            "launches" => &self.launches,
             "counters" => &self.counters,
             "means" => &self.means,
             _ => return None,
