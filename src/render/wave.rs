@@ -286,8 +286,8 @@ impl WavePlan {
 
     /// Everything but the scene that a device holds: path buffers, means, and two staging buffers.
     pub fn wave_bytes(&self) -> u64 {
-        let words = [size_of::<Wave>(), size_of::<Counters>()].map(|size| size as u64);
-        let fixed = [words[0], words[1], self.step_bytes(), self.queue_length_bytes(), self.launch_bytes()];
+        let fixed =
+            [size_of::<Wave>() as u64, size_of::<Counters>() as u64, self.step_bytes(), self.queue_length_bytes()];
         let by_paths = [self.state_bytes(), self.head_bytes(), self.record_bytes(), self.queue_bytes()];
         let by_units = [self.unit_list_bytes(), self.mean_bytes(), self.staging_bytes(), self.staging_bytes()];
         let throughputs = self.scaled.then(|| self.throughput_bytes());
@@ -295,6 +295,7 @@ impl WavePlan {
         let saved = self.gathered.then(|| [self.saved_bytes(); SAVED_WAVES]);
         let sizes = [fixed, by_paths, by_units];
         let others = throughputs.into_iter().chain(spectral).chain(saved.into_iter().flatten());
+        let others = others.chain([self.launch_bytes()]);
         sizes.iter().flatten().copied().chain(others).map(buffer::allocated).sum::<u64>() + self.first_hit_bytes()
     }
 
