@@ -279,9 +279,9 @@ impl WavePlan {
         (u64::from(self.max_bounces) + 1) * 4
     }
 
-    /// How many workgroups the next bounce takes, in three dimensions.
-    pub fn launch_bytes(&self) -> u64 {
-        12
+    /// How many workgroups the next bounce takes, in three dimensions, where a pass says it.
+    pub fn launch_bytes(&self) -> Option<u64> {
+        self.limits.software.then_some(12)
     }
 
     /// Everything but the scene that a device holds: path buffers, means, and two staging buffers.
@@ -294,8 +294,8 @@ impl WavePlan {
         let spectral = (self.spectral_state_size > 0).then(|| self.spectral_state_bytes());
         let saved = self.gathered.then(|| [self.saved_bytes(); SAVED_WAVES]);
         let sizes = [fixed, by_paths, by_units];
-        let others = throughputs.into_iter().chain(spectral).chain(saved.into_iter().flatten());
-        let others = others.chain([self.launch_bytes()]);
+        let others =
+            throughputs.into_iter().chain(spectral).chain(self.launch_bytes()).chain(saved.into_iter().flatten());
         sizes.iter().flatten().copied().chain(others).map(buffer::allocated).sum::<u64>() + self.first_hit_bytes()
     }
 

@@ -195,7 +195,7 @@ impl Worker {
         };
         let camera = stage(&kernels.camera)?;
         let bounce = stage(&kernels.bounce)?;
-        let launch = gpu.is_software.then(|| stage(&launching())).transpose()?;
+        let launch = path_buffers.launches.is_some().then(|| stage(&launching())).transpose()?;
         let update = kernels.update.as_ref().map(stage).transpose()?;
         let thin = kernels.thin.as_ref().map(stage).transpose()?;
         let evaluate = kernels.evaluate.as_ref().map(stage).transpose()?;
@@ -489,10 +489,10 @@ impl Worker {
                 self.lap(&mut encoder, 1)?;
                 pass = self.begin(&mut encoder, "generate", 2 * bounce);
             }
-            match &self.launch {
-                Some(launch) if bounce > 0 => {
+            match (&self.launch, &self.path_buffers.launches) {
+                (Some(launch), Some(launches)) if bounce > 0 => {
                     launch.dispatch(&mut pass, &step(bounce - 1), [1, 1], 1);
-                    self.bounce.dispatch_indirect(&mut pass, &step(bounce), &self.path_buffers.launches);
+                    self.bounce.dispatch_indirect(&mut pass, &step(bounce), launches);
                 }
                 _ => self.bounce.dispatch(&mut pass, &step(bounce), all, 1),
             }

@@ -18,7 +18,8 @@ pub struct PathBuffers {
     pub throughputs: Option<wgpu::Buffer>,
     pub queue: wgpu::Buffer,
     pub queue_lengths: wgpu::Buffer,
-    pub launches: wgpu::Buffer,
+    /// Where a pass says how many workgroups a bounce takes.
+    pub launches: Option<wgpu::Buffer>,
     pub counters: wgpu::Buffer,
     pub means: wgpu::Buffer,
 }
@@ -47,7 +48,7 @@ impl PathBuffers {
             throughputs: plan.scaled.then(|| buffer::empty(gpu, "throughputs", plan.throughput_bytes(), storage)),
             queue: buffer::empty(gpu, "queue", plan.queue_bytes(), storage),
             queue_lengths: buffer::empty(gpu, "queue_lengths", plan.queue_length_bytes(), storage),
-            launches: buffer::empty(gpu, "launches", plan.launch_bytes(), U::STORAGE | U::INDIRECT),
+            launches: plan.launch_bytes().map(|bytes| buffer::empty(gpu, "launches", bytes, U::STORAGE | U::INDIRECT)),
             counters: buffer::empty(gpu, "counters", size_of::<Counters>() as u64, storage),
             means: buffer::empty(gpu, "means", plan.mean_bytes(), storage),
         }
@@ -68,7 +69,7 @@ impl PathBuffers {
             "throughputs" => self.throughputs.as_ref()?,
             "queue" => &self.queue,
             "queue_lengths" => &self.queue_lengths,
-            "launches" => &self.launches,
+            "launches" => self.launches.as_ref()?,
             "counters" => &self.counters,
             "means" => &self.means,
             _ => return None,
