@@ -234,7 +234,7 @@ impl Expander {
     /// The same, product by product, of which some are in memory at a time.
     pub fn each_row(&self, products: &[Product], mut each: impl FnMut(&[f32])) {
         const AT_ONCE: usize = 1024;
-        let mut rows = vec![0.0; AT_ONCE * self.channels];
+        let mut rows = vec![0.0; products.len().min(AT_ONCE) * self.channels];
         for products in products.chunks(AT_ONCE) {
             self.write_rows(products, 0..self.channels, self.channels, &mut rows);
             rows.chunks(self.channels).take(products.len()).for_each(&mut each);
