@@ -1,13 +1,8 @@
-// How many workgroups the next bounce takes: for the paths that are still under way.
-
-struct Step {
-    bounce: u32,
-    sample: u32,
-}
+// How many workgroups of 64 the next bounce takes, for the paths that are still under way: what `grid` (src/gpu/pass.rs) says on the host.
 
 @group(1) @binding(6) var<uniform> step: Step;
 @group(1) @binding(13) var<storage, read> queue_lengths: array<u32>;
-// Workgroups in x, y and z: a dimension takes at most 65,535.
+// In x, y and z.
 @group(1) @binding(14) var<storage, read_write> launches: array<u32>;
 
 @compute @workgroup_size(1)

@@ -208,7 +208,7 @@ impl Header {
     }
 
     /// Parts of the epochs whose weights are told apart.
-    pub fn groups(&self) -> usize {
+    pub(super) fn groups(&self) -> usize {
         if self.has_uncertainty() { GROUPS_WITH_UNCERTAINTY } else { GROUPS }
     }
 

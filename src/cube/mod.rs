@@ -66,7 +66,7 @@ pub use state::{CubeState, RegionMean, Seen, Window};
 pub use store::{Cube, Progress};
 pub use verify::Verification;
 pub use view::{Integers, Quantity, Reader, Strides, View, White};
-pub use weights::{Entries, Expand, Groups, Merging, Processor, Rows, Weights, systematic};
+pub use weights::{Entries, Expand, Merging, Processor, Rows, Weights, systematic};
 pub use writer::Writer;
 
 /// A number from others, the same on every machine (the mixing of SplitMix64: Steele, Lea and Flood 2014).

@@ -435,7 +435,7 @@ impl Cube {
     }
 
     /// How the samples of a tile are spread over the groups of epochs of a factored cube.
-    pub(super) fn groups(&self, samples: u32) -> Groups {
+    pub fn groups(&self, samples: u32) -> Groups {
         Groups::new(samples, self.header.epoch, self.header.groups())
     }
 

@@ -59,7 +59,7 @@ pub fn expanding() -> Source {
 
 /// What says how many workgroups a bounce takes; of no scene.
 pub fn launching() -> Source {
-    compose(&[module!("passes/launch.wgsl")], &Defines::default())
+    compose(&[module!("common/types.wgsl"), module!("passes/launch.wgsl")], &Defines::default())
 }
 
 /// What takes spectra along records.

@@ -69,7 +69,7 @@ pub struct Worker {
     bounce: Stage,
     /// On software devices, between two bounces. A GPU is done with workgroups that have nothing to do in no time; a processor takes
     /// them one by one.
-    launch: Option<Stage>,
+    launch: Option<(Stage, wgpu::Buffer)>,
     /// After every bounce, in the conventional path tracer.
     update: Option<Stage>,
     /// Before evaluation, where not all paths are evaluated.
@@ -195,7 +195,8 @@ impl Worker {
         };
         let camera = stage(&kernels.camera)?;
         let bounce = stage(&kernels.bounce)?;
-        let launch = path_buffers.launches.is_some().then(|| stage(&launching())).transpose()?;
+        let launches = path_buffers.launches.clone();
+        let launch = launches.map(|groups| Ok::<_, Error>((stage(&launching())?, groups))).transpose()?;
         let update = kernels.update.as_ref().map(stage).transpose()?;
         let thin = kernels.thin.as_ref().map(stage).transpose()?;
         let evaluate = kernels.evaluate.as_ref().map(stage).transpose()?;
@@ -489,10 +490,10 @@ impl Worker {
                 self.lap(&mut encoder, 1)?;
                 pass = self.begin(&mut encoder, "generate", 2 * bounce);
             }
-            match (&self.launch, &self.path_buffers.launches) {
-                (Some(launch), Some(launches)) if bounce > 0 => {
+            match &self.launch {
+                Some((launch, groups)) if bounce > 0 => {
                     launch.dispatch(&mut pass, &step(bounce - 1), [1, 1], 1);
-                    self.bounce.dispatch_indirect(&mut pass, &step(bounce), launches);
+                    self.bounce.dispatch_indirect(&mut pass, &step(bounce), groups);
                 }
                 _ => self.bounce.dispatch(&mut pass, &step(bounce), all, 1),
             }

@@ -59,9 +59,8 @@ pub trait Expand: Sync {
 
 /// The entries of a tile's pixels, and what they are multiplied by.
 pub struct Entries<'a> {
-    /// Where each pixel's entries begin and end, column by column of so many pixels.
+    /// Where each pixel's entries begin and end.
     pub pixels: Vec<[u32; 2]>,
-    pub height: usize,
     /// Of each entry its place among the rows.
     pub products: &'a [u32],
     /// Weights of all entries: of all samples, then of each group with epochs, if errors are wanted.
@@ -75,18 +74,21 @@ pub struct Entries<'a> {
 impl Weights {
     /// The radiance of all pixels, in the order of a chunk's files: column by column. Beyond `rect` NaN.
     pub fn expanded(&self, rows: Rows, tile: [u32; 2], rect: Rect) -> Vec<f32> {
-        let (mut values, mut errors) = (Vec::new(), Vec::new());
-        let done = self.expand_by(&Processor, rows, tile, rect, None, [&mut values, &mut errors]);
-        done.expect("a processor has no errors");
+        let [values, _] = self.expand_here(rows, tile, rect, None);
         values
     }
 
     /// Standard errors of the means of all pixels, by the spread of the groups; NaN below two epochs.
     pub fn standard_errors(&self, rows: Rows, tile: [u32; 2], rect: Rect, groups: &Groups) -> Vec<f32> {
-        let (mut values, mut errors) = (Vec::new(), Vec::new());
-        let done = self.expand_by(&Processor, rows, tile, rect, Some(groups), [&mut values, &mut errors]);
-        done.expect("a processor has no errors");
+        let [_, errors] = self.expand_here(rows, tile, rect, Some(groups));
         errors
+    }
+
+    fn expand_here(&self, rows: Rows, tile: [u32; 2], rect: Rect, groups: Option<&Groups>) -> [Vec<f32>; 2] {
+        let (mut values, mut errors) = (Vec::new(), Vec::new());
+        let done = self.expand_by(&Processor, rows, tile, rect, groups, [&mut values, &mut errors]);
+        done.expect("a processor has no errors");
+        [values, errors]
     }
 
     /// Both, to vectors that may have been used before; without groups no errors.
@@ -127,7 +129,6 @@ impl Weights {
         };
         let of = Entries {
             pixels: columns().map(entries_of).collect(),
-            height: tile[1] as usize,
             products: &self.product,
             sets: [&self.weight].into_iter().chain(&in_groups).map(Vec::as_slice).collect(),
             epochs,
@@ -197,27 +198,21 @@ impl WithSimd for Block<'_> {
         let all = of.rows.channels();
         let rows = bytemuck::cast_slice::<Line, S::f32s>(rows);
         let stride = stride * (16 / S::F32_LANES);
-        // Pixels that lie together have products in common: row by row of some columns.
-        let strips =
-            (0..of.pixels.len()).step_by(8 * of.height).map(|from| from..of.pixels.len().min(from + 8 * of.height));
-        let pixels =
-            strips.flat_map(|strip| (0..of.height).flat_map(move |y| (strip.start + y..strip.end).step_by(of.height)));
-        for pixel in pixels {
-            let [begin, end] = of.pixels[pixel];
-            let entries = begin as usize..end as usize;
-            let entries = &Pixel { of, products: &of.products[entries.clone()], entries };
-            let at = pixel * all + channels.start;
+        for (number, &[begin, end]) in of.pixels.iter().enumerate() {
+            let at = number * all + channels.start;
+            let pixel = |from| Pixel { simd, of, entries: begin as usize..end as usize, rows: &rows[from..], stride };
+            let pixels = (0..).step_by(WIDTH / S::F32_LANES).map(pixel);
             let values = values[at..][..channels.len()].chunks_mut(WIDTH);
             if errors.is_empty() {
-                for (values, from) in values.zip((0..).step_by(WIDTH / S::F32_LANES)) {
-                    let [sums] = entries.sums(simd, [0], &rows[from..], stride);
+                for (values, pixel) in values.zip(pixels) {
+                    let [sums] = pixel.sums([0]);
                     put(&sums, values);
                 }
                 continue;
             }
             let errors = errors[at..][..channels.len()].chunks_mut(WIDTH);
-            for ((values, errors), from) in values.zip(errors).zip((0..).step_by(WIDTH / S::F32_LANES)) {
-                let [mean, deviation] = entries.means(simd, &rows[from..], stride);
+            for ((values, errors), pixel) in values.zip(errors).zip(pixels) {
+                let [mean, deviation] = pixel.means();
                 put(&mean, values);
                 put(&deviation, errors);
             }
@@ -235,26 +230,28 @@ fn put(sums: &Sums, out: &mut [f32]) {
     }
 }
 
-/// The entries of a pixel.
-struct Pixel<'a> {
+/// The entries of a pixel, and the rows of all products from the first of `WIDTH` channels on.
+struct Pixel<'a, S: Simd> {
+    simd: S,
     of: &'a Entries<'a>,
-    products: &'a [u32],
     entries: Range<usize>,
+    rows: &'a [S::f32s],
+    stride: usize,
 }
 
-impl Pixel<'_> {
-    /// The means of some channels and their standard errors.
+impl<S: Simd> Pixel<'_, S> {
+    /// The means of the channels and their standard errors.
     #[inline(always)]
-    fn means<S: Simd>(&self, simd: S, rows: &[S::f32s], stride: usize) -> [Sums; 2] {
+    fn means(&self) -> [Sums; 2] {
         let mut mean = [0.0; WIDTH];
         let mut variance = [0.0f64; WIDTH];
         let count = self.of.sets.len();
         // Two sets at a time: their sums stay in registers, and a row is loaded once for both.
         for set in (0..count).step_by(2) {
             let sums = if set + 1 < count {
-                self.sums(simd, [set, set + 1], rows, stride)
+                self.sums([set, set + 1])
             } else {
-                let [sums] = self.sums(simd, [set], rows, stride);
+                let [sums] = self.sums([set]);
                 [sums; 2]
             };
             for (number, sums) in (set..count).zip(&sums) {
@@ -274,36 +271,26 @@ impl Pixel<'_> {
 
     /// Σ over the entries with each of some sets of weights.
     #[inline(always)]
-    fn sums<S: Simd, const SETS: usize>(
-        &self,
-        simd: S,
-        sets: [usize; SETS],
-        rows: &[S::f32s],
-        stride: usize,
-    ) -> [Sums; SETS] {
+    fn sums<const SETS: usize>(&self, sets: [usize; SETS]) -> [Sums; SETS] {
         // As many vectors as registers hold, and as fill the time that an addition takes.
         if SETS == 1 && WIDTH / S::F32_LANES >= 8 {
-            self.sums_by::<S, SETS, 8>(simd, sets, rows, stride)
+            self.sums_by::<SETS, 8>(sets)
         } else {
-            self.sums_by::<S, SETS, 4>(simd, sets, rows, stride)
+            self.sums_by::<SETS, 4>(sets)
         }
     }
 
     /// Likewise, `N` vectors at a time.
     #[inline(always)]
-    fn sums_by<S: Simd, const SETS: usize, const N: usize>(
-        &self,
-        simd: S,
-        sets: [usize; SETS],
-        rows: &[S::f32s],
-        stride: usize,
-    ) -> [Sums; SETS] {
+    fn sums_by<const SETS: usize, const N: usize>(&self, sets: [usize; SETS]) -> [Sums; SETS] {
+        let simd = self.simd;
+        let products = &self.of.products[self.entries.clone()];
         let weights = sets.map(|set| &self.of.sets[set][self.entries.clone()]);
         let mut sums = [[0.0; WIDTH]; SETS];
         for at in (0..WIDTH / S::F32_LANES).step_by(N) {
             let mut parts = [[simd.splat_f32s(0.0); N]; SETS];
-            for (i, &product) in self.products.iter().enumerate() {
-                let row = &rows[product as usize * stride + at..][..N];
+            for (i, &product) in products.iter().enumerate() {
+                let row = &self.rows[product as usize * self.stride + at..][..N];
                 for (parts, weights) in parts.iter_mut().zip(&weights) {
                     let weight = simd.splat_f32s(weights[i]);
                     for (part, &value) in parts.iter_mut().zip(row) {
