@@ -501,11 +501,10 @@ impl Setup {
             let in_units = |(k, e)| (self.in_units(k, e), coarser * resolution(self.anchors[k].value));
             estimates.into_iter().enumerate().map(in_units).collect::<Measured>()
         };
-        let needed = epochs(size::either(1.0, 4.0), 11)
-            .iter()
-            .map(|(pilot, target)| times(pilot.error, *target))
-            .fold(1.0, f64::max);
-        epochs(needed, 7)
+        let pilot = size::either(1.0, 4.0);
+        let needed =
+            epochs(pilot, 11).iter().map(|(found, target)| times(found.error, *target)).fold(1.0 / pilot, f64::max);
+        epochs(pilot * needed, 7)
     }
 
     fn by_reference(&self) -> Measured {
