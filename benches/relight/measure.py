@@ -1,4 +1,5 @@
-"""Factored cubes against ordinary ones: how fast they render, what they take, how fast they are relit, and what wavelengths cost.
+"""Factored cubes against ordinary ones: how fast they render, what they take, how fast they are relit, whether that is what a fresh render of other
+seed shows, and what wavelengths cost.
 
     measure.py --spectile PROGRAM [-o FOLDER] [--rounds N] [--samples N]
 
@@ -21,6 +22,12 @@ import tempfile
 import time
 
 SCENES = [("cornell/cornell", "64x64", ["spectra.lamp.blackbody=2700"]), ("lounge/lounge", "64x40", ["spectra.ceiling_lamp.scale=0.1"])]
+# Other lamps, paints and light, by scene; and which of these make a picture, in how many channels.
+LAMPS = {"cornell": {"spectra.lamp.blackbody": "2700", "spectra.lamp.scale": "1e-4"},
+         "lounge": {"spectra.ceiling_lamp": "0.0", "spectra.standing_lamp.blackbody": "2500"}}
+PAINTS = {"cornell": {"spectra.red": "0.3"}, "lounge": {"spectra.wall": "0.4", "spectra.sofa": "0.7"}}
+LIGHT = {"cornell": {"spectra.lamp": '{ illuminant = "FL11", scale = 0.02 }'}, "lounge": {"spectra.window": '{ illuminant = "D75", scale = 0.02 }'}}
+CHANGES = [("lamps", [LAMPS], 60), ("paints", [PAINTS], 60), ("illuminant", [LIGHT], 60), ("lamps, paints", [LAMPS, PAINTS], 37), ("illuminant, paints", [LIGHT, PAINTS], 200)]
 CHANNELS = [400, 2000]
 # Lines of mercury in the Cornell box.
 SPIKY = "spectra.lamp={{ file = \"{}\", column = \"mercury\" }}"
@@ -106,6 +113,17 @@ def measure(program, rounds, samples):
             what="relight", scene=name, samples=samples, ns_a_value_and_its_error=1e9 * expand / values, ns_a_value_written=1e9 * seconds / values,
             relight_s=seconds, render_again_s=again, ratio=again / seconds,
         )
+        # The same as a fresh render, in every channel.
+        common = ["--uncertainty", "--set", "integrator.epoch=16"]
+        program.render(scene, size, 60, "before.zarr", samples, "--factored", *common)
+        for changed, of, channels in CHANGES:
+            settings = [argument for kind in of for key, value in kind[name].items() for argument in ("--set", f"{key}={value}")]
+            relit = str(program.folder / "relit.zarr")
+            program.run("relight", str(program.folder / "before.zarr"), "-o", relit, "--overwrite", "--channels", f"equal.count={channels}", *settings, "--json")
+            program.render(scene, size, channels, "fresh.zarr", samples, "--seed", "1", *common, *settings)
+            compared = program.run("compare", relit, str(program.folder / "fresh.zarr"), "--json")
+            distances = [abs(channel["z"]) for channel in compared[-1]["channels"]]
+            tell(what="relit against fresh", scene=name, changed=changed, channels=channels, median_z=statistics.median(distances), largest_z=max(distances))
     # A lamp of lines in eight channels: what of the noise is that of wavelengths.
     lamps = (program.scenes / "conference/spectra/lamps.csv").resolve()
     scene, size, _ = SCENES[0]
@@ -128,7 +146,7 @@ def page(rows, device):
     parts = [f"<!doctype html><meta charset=utf-8><title>Factored cubes</title><style>{style}</style><h1>Factored cubes against ordinary ones</h1>"]
     parts.append(
         f"<p>{html.escape(device)}. Microseconds and seconds are processor time; relighting is on one core, to 1,000 channels, written included. "
-        "<i>ratio</i>: what the ordinary cube takes over what the factored one does. Made by benches/relight/run.</p>"
+        "<i>ratio</i>: what the ordinary cube takes over what the factored one does. <i>z</i>: distance of a channel's mean in standard errors. Made by benches/relight/run.</p>"
     )
     for what in dict.fromkeys(row["what"] for row in rows):
         of = [row for row in rows if row["what"] == what]
